@@ -142,7 +142,7 @@ def measured(plan: Plan, scene: pl.Scene, points: np.ndarray) -> float:
     """Return the largest error of a plan at these points, in the unit of the signal."""
     whole = tabulated(scene)
     one, other = (signals(p, whole, points, build) for p in (plan, full_plan(scene)))
-    return largest_difference(one, other, plan.signal)
+    return largest_difference(one, other, plan.degrees)
 
 
 def main() -> int:

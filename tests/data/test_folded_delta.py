@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.data.folded_delta import can_be_folded, kinks
 from pellicle.data.read_spectrum import read_spectrum
+from pellicle.signals.folded_delta import can_be_folded, kinks
 
 NM = np.arange(300.0, 900.5, 2.0)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pellicle.data.generalised import RATIOS, SIGNAL, delta_sigma
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.generalised import RATIOS, delta_sigma
+
+SIGNAL = "generalised-psi-delta"
 
 NM = np.linspace(400.0, 800.0, 6)
 PSI = np.stack([np.linspace(20, 30, 6), np.linspace(0, 2, 6), np.linspace(1, 0.5, 6)], axis=1)

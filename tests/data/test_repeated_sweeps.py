@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
-from pellicle.data.repeated_sweeps import coordinates, mean_spectrum, repeatability, sweep_numbers
+from pellicle.data.repeated_sweeps import mean_spectrum, repeatability, sweep_numbers
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.sphere import ncs
 
 NM = np.arange(400.0, 500.0, 10.0)
 LEVELS = 0.3 + 0.1 * np.cos(NM / 20)
@@ -88,7 +88,7 @@ def test_several_angles_at_one_wavelength(tmp_path):
     assert found.delta is not None
     np.testing.assert_array_equal(found.angle, angle)
     # the direction of the mean vector, by its definition
-    vectors = np.mean([coordinates(sweep) for sweep in found.sweeps], axis=0)
+    vectors = np.mean([sweep.kind.coordinates(sweep) for sweep in found.sweeps], axis=0)
     expected = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     np.testing.assert_allclose(ncs(found.values, found.delta), expected, atol=1e-12)
     np.testing.assert_allclose(found.values, angle / 2 + 0.5, atol=0.01)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.data.generalised import SIGNAL
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
 from pellicle.optics.anisotropy import Principal, permittivity
 from pellicle.scene.film import turned, with_wavelength
+
+SIGNAL = "generalised-psi-delta"
 
 NM = np.linspace(500.0, 700.0, 8)
 ANGLE, DEPTH = 60.0, 240.0

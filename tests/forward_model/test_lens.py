@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.data.generalised import SIGNAL
 from pellicle.effects import presence
 from pellicle.effects.anisotropy import anisotropy
 from pellicle.effects.cone import angle_spread
@@ -21,6 +20,8 @@ from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import insert, start_values
 
 from ..optics.lens_reference import Plate, muellers, permittivity
+
+SIGNAL = "generalised-psi-delta"
 
 NM = np.array([450.0, 600.0])
 ORDINARY, EXTRAORDINARY, DEPTH, AXIS = 1.62, 1.78, 240.0, (40.0, 25.0)

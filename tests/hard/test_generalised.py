@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from mpmath import mp, mpc, mpf
 
-from pellicle.forward_model.mixed_polarisations import ratio_angles, ratio_sums, ratio_sums_of_mueller
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.mueller import mueller_elements
 from pellicle.optics.pair import Pair
+from pellicle.signals.generalised import Generalised
+from pellicle.signals.waves import ratio_sums_of_mueller
 
 CASES = json.loads(Path(__file__).with_name("anisotropic.json").read_text(encoding="utf-8"))["cases"]
 NUMBERS = np.array([case["value"] for case in CASES.values()])[:, :8]
@@ -27,7 +28,8 @@ SLOPES = np.array([case["slope"] for case in CASES.values()])[:, :8]
 
 def angles(*numbers):
     """N, C, S of each ratio from the real and imaginary parts of pp, ps, sp, ss."""
-    return jnp.stack(ratio_angles(ratio_sums(Elements(*(Pair(*numbers[i : i + 2]) for i in range(0, 8, 2))))))
+    signal, jones = Generalised(), Elements(*(Pair(*numbers[i : i + 2]) for i in range(0, 8, 2)))
+    return jnp.stack(signal.of_sums(signal.of_jones(jones)))
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +86,7 @@ def test_sums_of_the_mueller_matrix():
     """Two films whose light adds: the sums of both are those of the added Mueller matrices."""
     jones = [Elements(*(Pair(*NUMBERS[row, i : i + 2]) for i in range(0, 8, 2))) for row in (0, 3)]
     added = np.sum([mueller_elements(*own) for own in jones], axis=0)
-    expected = np.sum([ratio_sums(own) for own in jones], axis=0)
+    expected = np.sum([Generalised().of_jones(own) for own in jones], axis=0)
     np.testing.assert_allclose(ratio_sums_of_mueller(added.tolist()), expected, atol=1e-15)
 
 

@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.effects.film_plan import full_plan
 from pellicle.effects.removal import FilmRemoval
 from pellicle.fitting.film.parameters import anonymous
@@ -50,7 +49,7 @@ class Case(NamedTuple):
     @property
     def in_degrees(self) -> bool:
         """True where errors are degrees on the sphere of N, C, S."""
-        return self.plan.signal in ("psi-delta", generalised.SIGNAL)
+        return self.plan.degrees
 
 
 def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: int = 0) -> Case:

@@ -21,8 +21,7 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
 
-TOLERANCE = {"psi-delta": 0.1, "generalised-psi-delta": 0.1}
-DEFAULT_TOLERANCE = 1e-3
+TOLERANCE, TOLERANCE_IN_DEGREES = 1e-3, 0.1
 """Default tolerance: a fraction, or degrees on the sphere of N, C, S."""
 
 
@@ -68,7 +67,7 @@ def cost(
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
     scene, and for a scene whose signal is 0 everywhere.
     """
-    default = TOLERANCE.get(scene.light.signal, DEFAULT_TOLERANCE)
+    default = TOLERANCE_IN_DEGREES if scene.light.kind.degrees else TOLERANCE
     tolerance = (default if noise is None else noise) if tolerance is None else tolerance
     if not 0 < tolerance < np.inf:
         raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")

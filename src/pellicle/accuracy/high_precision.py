@@ -12,11 +12,12 @@ import mpmath
 import numpy as np
 
 from pellicle.accuracy.case import Case
-from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
+from pellicle.signals.generalised import Generalised
+from pellicle.signals.psi_delta import PsiDelta
 
 mp: Any = mpmath.mp  # its functions are created at run time, which type checkers do not see
 mpc: Any = mpmath.mpc
@@ -139,11 +140,13 @@ def _signal(scene: Scene, point: _Point) -> list[Any]:
         )
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
         N, C, S = (s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)
-        if light.signal == generalised.SIGNAL:
+        if isinstance(light.kind, Generalised):
             return [N, C, S, 1, 0, 0, 1, 0, 0]
-        return [N, C, S] if light.signal == "psi-delta" else [-N, 0, 0, -N, 1, *[0] * 4, C, S, 0, 0, -S, C]
+        return (
+            [N, C, S] if isinstance(light.kind, PsiDelta) else [-N, 0, 0, -N, 1, *[0] * 4, C, S, 0, 0, -S, C]
+        )
     letters = "sp" if light.polarisation == "unpolarised" else light.polarisation
-    which = 0 if light.signal == "R" else 1
+    which = 1 if light.kind.transmitted else 0
     return [sum(_powers(point, 0, letter)[which] for letter in letters) / len(letters)]
 
 

@@ -10,7 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.case import Case, Variant, compiled
-from pellicle.data.generalised import RATIOS, SIGNAL
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.problem import Explained, Form, Problem
@@ -50,11 +49,9 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     noisy = clean + random.normal(0.0, sigma, clean.shape)
     channels = clean.shape[1] // len(case.wavelength)
     noisy = noisy.reshape(count, -1, channels) if channels > 1 else noisy
-    elements = tuple(range(channels)) if scene.light.signal == "mueller" else ()
-    ratios = tuple(range(len(RATIOS))) if scene.light.signal == SIGNAL else ()
     nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        DataSet(make(Measured(scene, nm, values, sigmas, elements=elements, ratios=ratios)), unit, start)
+        DataSet(make(Measured(scene, nm, values, sigmas, scene.light.kind)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 

@@ -15,11 +15,10 @@ from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from pellicle.recipes.film import FilmRecipe
     from pellicle.recipes.surface import SurfaceRecipe
     from pellicle.scene.film import Scene
+    from pellicle.signals.base import Signal
     from pellicle.simulation.spectra import SimulatedSignal
 
 
@@ -163,6 +162,7 @@ def _write_spectrum(
     """Write a spectrum; `noises` are those of the signal and of the depolarisation."""
     from pellicle.files import write_text
     from pellicle.fitting.film.messages import log_plan, log_scene
+    from pellicle.signals.registry import of_parts
     from pellicle.simulation.spectra import simulate_signal
 
     scene = recipe.scene()
@@ -172,9 +172,11 @@ def _write_spectrum(
     grid = wavelengths(recipe, scene)
     scene, nm = each_setting(scene, grid)
     noise, of_depolarisation = noises
-    result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation)
+    elements, kind = recipe.tables.data.elements, scene.light.kind
+    kind = kind if elements is None or not kind.parts else of_parts(elements, scene.light.signal)
+    result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation, kind)
     log_plan(result.plan)
-    write_text(out, _csv(scene, result, noise, comments, recipe.tables.data.elements))
+    write_text(out, _csv(scene, result, kind, noise, comments))
     span = f"{grid[0]:g} to {grid[-1]:g} nm" if len(grid) > 1 else f"at {grid[0]:g} nm"
     say(f"{out}: {len(nm)} points, {span}" if len(nm) > 1 else f"{out}: 1 point, {span}")
 
@@ -219,14 +221,12 @@ def _truth(scene: Scene) -> str:
 def _csv(
     scene: Scene,
     result: SimulatedSignal,
+    kind: Signal,
     noise: float,
     comments: list[str],
-    elements: Sequence[str] | None,
 ) -> str:
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     import numpy as np
-
-    from pellicle.data import generalised, mueller
 
     light, count = scene.light, len(result.wavelength)
     angles = np.asarray(getattr(light.angle, "start", light.angle), float)
@@ -241,18 +241,7 @@ def _csv(
         names.append("azimuth_deg")
         before.append([f"{own:.10g}" for own in np.broadcast_to(light.azimuth, count).tolist()])
     table = result.values.reshape(count, -1)
-    if light.signal == "psi-delta":
-        names += ["psi_deg", "delta_deg"]
-    elif light.signal in (mueller.SIGNAL, generalised.SIGNAL):
-        every = mueller.ELEMENTS if light.signal == mueller.SIGNAL else generalised.RATIOS
-        chosen = every if elements is None else tuple(elements)
-        (mueller.check_elements if every is mueller.ELEMENTS else generalised.check_ratios)(chosen)
-        table = table.reshape(count, len(every), -1)[:, [every.index(name) for name in chosen]]
-        both = [f"{angle}_{name}_deg" for name in chosen for angle in ("psi", "delta")]
-        names += chosen if light.signal == mueller.SIGNAL else both
-        table = table.reshape(count, -1)
-    else:
-        names.append(light.signal)
+    names += [quantity.header for quantity in kind.quantities]
     if result.depolarisation is not None:
         table = np.column_stack([table, result.depolarisation])
         names.append("depolarisation")

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Int
 
 from pellicle.data.noise_level import noise_level
-from pellicle.data.signal_checks import Where, refuse_first
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import UsageError
+from pellicle.signals.limits import Where, refuse_first
 
 CHANNELS = (("value",), ("R", "G", "B"))
 ROUNDING = 1e-3

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.data.colours import SPACES
-from pellicle.data.signal_checks import Where, refuse_first
 from pellicle.data.tabular.layout import plain_columns
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number, open_binary, read_bytes, split, text_file
 from pellicle.data.tabular.units import colour_unit
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import Where, refuse_first
 
 _ANGLES = ("angle", "aoi", "angle of incidence")
 _NAMES = ("name", "film", "sample", "patch", "label", "id")

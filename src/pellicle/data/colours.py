@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.data.signal_checks import Where, refuse_first
 from pellicle.errors import UsageError
 from pellicle.files import write_text
+from pellicle.signals.limits import Where, refuse_first
 
 SPACES = ("rgb", "srgb", "xyz", "lab")
 _POLARISATIONS = ("s", "p", "unpolarised")

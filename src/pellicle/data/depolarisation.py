@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pellicle.data.signal_checks import check_depolarisation, refuse_first
 from pellicle.data.tabular.column_selection import only
 from pellicle.data.tabular.columns import Column
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
+from pellicle.signals.limits import check_depolarisation, refuse_first
 
 
 def columns(table: Table, every: Sequence[Column]) -> tuple[Column, ...]:

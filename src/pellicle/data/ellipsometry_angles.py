@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
+from pellicle.signals.limits import refuse_first
 
 PSI_DELTA, NCS = ("psi", "delta"), ("N", "C", "S")
 ALPHA_BETA, TAN_COS = ("alpha", "beta"), ("tan_psi", "cos_delta")
@@ -34,19 +34,6 @@ class PsiDelta(NamedTuple):
     delta: Float[np.ndarray, " points"]
     note: str | None = None
     depolarisation: Float[np.ndarray, " points"] | None = None
-
-
-def ncs(psi: Float[np.ndarray, "*points"], delta: Float[np.ndarray, "*points"]) -> np.ndarray:
-    """N, C, S (..., 3) of Ψ and Δ in degrees: a point on the unit sphere."""
-    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
-    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
-
-
-def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ψ and Δ in degrees from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
-    n, c, *measured = np.moveaxis(sphere, -1, 0)
-    s = measured[0] if measured else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
-    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0
 
 
 def from_ncs(table: Table, position: int, columns: Float[np.ndarray, "3 points"]) -> PsiDelta:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pellicle.data import generalised, mueller
 from pellicle.data.read_ellipsometry import (
     SIGNAL,
     EllipsometryColumns,
@@ -18,15 +17,17 @@ from pellicle.data.tabular.column_selection import SpectrumColumns, named_column
 from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.generalised import Generalised
+from pellicle.signals.mueller import Mueller
 
 ALL = "all"
 _MOST_LISTED = 40
 _ELLIPSOMETRY = {
     SIGNAL: "psi and delta",
-    mueller.SIGNAL: "Mueller elements",
-    generalised.SIGNAL: "generalised psi and delta",
+    Mueller.word: "Mueller elements",
+    Generalised.word: "generalised psi and delta",
 }
-_OF_ANISOTROPIC = (mueller.SIGNAL, generalised.SIGNAL)
+_OF_ANISOTROPIC = (Mueller.word, Generalised.word)
 """Signals of anisotropic samples, which yield to psi and delta where none is asked for."""
 
 
@@ -59,9 +60,9 @@ def candidates(
         )
     own = table.layout.name
     found = []
-    ratios = elements is not None and not set(elements).isdisjoint(generalised.RATIOS)
-    wanted = signal == mueller.SIGNAL or (signal is None and elements is not None and not ratios)
-    generally = signal == generalised.SIGNAL or (signal is None and ratios)
+    ratios = elements is not None and not set(elements).isdisjoint(Generalised().parts)
+    wanted = signal == Mueller.word or (signal is None and elements is not None and not ratios)
+    generally = signal == Generalised.word or (signal is None and ratios)
     if generally or (
         not wanted and signal is None and has_generalised(named) and not has_ellipsometry(named)
     ):
@@ -69,8 +70,8 @@ def candidates(
             Candidate(
                 table,
                 generalised_columns(table, named, elements),
-                own or generalised.SIGNAL,
-                generalised.SIGNAL,
+                own or Generalised.word,
+                Generalised.word,
                 None,
             )
         )
@@ -78,7 +79,7 @@ def candidates(
             return found
     elif wanted or (signal is None and has_mueller(named) and not has_ellipsometry(named)):
         chosen = mueller_columns(table, named, elements)
-        found.append(Candidate(table, chosen, own or mueller.SIGNAL, mueller.SIGNAL, None))
+        found.append(Candidate(table, chosen, own or Mueller.word, Mueller.word, None))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
             return found
     elif signal == SIGNAL or (signal is None and has_ellipsometry(named)):

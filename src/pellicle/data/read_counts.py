@@ -10,7 +10,6 @@ import numpy as np
 
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import check_noise, check_power
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns
 from pellicle.data.tabular.column_selection import (
@@ -20,6 +19,7 @@ from pellicle.data.tabular.column_selection import (
 )
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import check_noise, check_power
 
 
 def read_counts(
@@ -123,7 +123,9 @@ def reflectance_from_counts(
     values = (sample.values - background) / full * known
     sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
     remedy = "leave it out with `range`, or measure again"
-    check_power("R", values, sigma, sample.place("reflectance from counts"), too_high=remedy, remedy=remedy)
+    check_power(
+        "reflectance", values, sigma, sample.place("reflectance from counts"), too_high=remedy, remedy=remedy
+    )
     each = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
     return Spectrum(
         wavelength=sample.wavelength,

@@ -26,15 +26,15 @@ from pellicle.data.ellipsometry_angles import (
     from_ncs,
     from_tan_cos,
 )
-from pellicle.data.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import FOLDED_DELTA, check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.axis_and_signal import Axis, axis_note, axis_unit, read_axis
 from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, first_column, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
+from pellicle.signals.limits import FOLDED_DELTA, check_psi_delta, refuse_first
 
 SIGNAL = "psi-delta"
 _METAL_N, _METAL_K = 13, 80

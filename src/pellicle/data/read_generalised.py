@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.generalised import RATIOS, SIGNAL, check_ratios, delta_sigma
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import check_psi_delta, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_axis
 from pellicle.data.tabular.column_names import RATIO_COLUMNS
@@ -17,6 +15,8 @@ from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, on
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma
+from pellicle.signals.limits import check_psi_delta, refuse_first
 
 _REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "psi_ane", "delta_ane", "psi_aps", "delta_aps"]`'
@@ -48,7 +48,7 @@ def generalised_columns(
             f"{_EXAMPLE}"
         )
     if ratios is not None:
-        check_ratios(ratios)
+        Generalised(tuple(ratios))
     found: dict[str, tuple[Column, Column]] = {}
     for name in RATIOS:
         psi, delta = (only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
@@ -149,7 +149,7 @@ def read_generalised(
             "delta_sigma": delta_error,
             "lines": table.source_lines(rows),
         },
-        signal=SIGNAL,
+        signal=Generalised.word,
         ratios=chosen.ratios,
         path=table.path,
         sha256=table.sha256,

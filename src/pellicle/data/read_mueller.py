@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.mueller import ELEMENTS, HIGHEST, SIGNAL, check_elements, check_mueller, sign_notes
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_axis
 from pellicle.data.tabular.column_names import MUELLER
@@ -17,6 +15,8 @@ from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, on
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import refuse_first
+from pellicle.signals.mueller import ELEMENTS, HIGHEST, Mueller, check_element, sign_notes
 
 _REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
@@ -56,7 +56,7 @@ def mueller_columns(
         )
     present = {role: only(table, columns, role) for role in MUELLER}
     if elements is not None:
-        check_elements(elements)
+        Mueller(tuple(elements))
         if absent := [name for name in elements if present[name] is None]:
             have = ", ".join(name for name in ELEMENTS if present[name]) or "no elements"
             raise UsageError(f"{table.path}: has no column {', '.join(absent)}; it has {have}")
@@ -137,14 +137,14 @@ def read_mueller(
             refuse_first(sigma[:, i], sigma[:, i] <= 0, table.places(column.position, rows), reason)
     for i, column in enumerate(chosen.values):
         where = table.places(column.position, rows)
-        check_mueller(values[:, i], None if sigma is None else sigma[:, i], elements[i], where, _REMEDY)
+        check_element(values[:, i], None if sigma is None else sigma[:, i], elements[i], where, _REMEDY)
     values, sigma, elements, note = _without_constants(table, values, sigma, elements)
     notes += [*note, *sign_notes(elements, values)]
     axis = axis.taken(rows)
     return of_rows(
         sweep_numbers(axis.wavelength, axis.setting),
         {**axis._asdict(), "values": values, "sigma": sigma, "lines": table.source_lines(rows)},
-        signal=SIGNAL,
+        signal=Mueller.word,
         elements=elements,
         path=table.path,
         sha256=table.sha256,

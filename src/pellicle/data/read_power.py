@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.signal_checks import check_power, refuse_first
 from pellicle.data.spectrum import Spectrum, inside_range
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns, signal_scale
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
+from pellicle.signals.limits import check_power, refuse_first
+from pellicle.signals.registry import KINDS
 
 
 def read_power(
@@ -86,4 +87,6 @@ def _check(
         '`signal_unit="absorbance"`, or in its header'
     )
     where = table.places(position, rows)
-    check_power(signal, values, sigma, where, too_high=remedy if unit_stated else too_high, remedy=remedy)
+    check_power(
+        KINDS[signal].noun, values, sigma, where, too_high=remedy if unit_stated else too_high, remedy=remedy
+    )

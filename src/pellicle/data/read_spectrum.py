@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data import generalised, mueller
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.options import SpectrumOptions
@@ -18,12 +17,14 @@ from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
 from pellicle.data.read_generalised import GeneralisedColumns, read_generalised
 from pellicle.data.read_mueller import MuellerColumns, read_mueller
 from pellicle.data.read_power import read_power
-from pellicle.data.signal_checks import check_noise
 from pellicle.data.spectrum import POLARISATIONS, Spectrum
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.columns import SIGNALS
 from pellicle.data.tabular.table import Table
 from pellicle.errors import UsageError
+from pellicle.signals.generalised import Generalised
+from pellicle.signals.limits import check_noise
+from pellicle.signals.mueller import Mueller
 
 log = getLogger(__name__)
 
@@ -123,7 +124,7 @@ class _Reading(SpectrumOptions):
 
     def __post_init__(self) -> None:
         for name, known in (
-            ("signal", (*SIGNALS, SIGNAL, mueller.SIGNAL, generalised.SIGNAL)),
+            ("signal", (*SIGNALS, SIGNAL, Mueller.word, Generalised.word)),
             ("polarisation", POLARISATIONS),
         ):
             value = getattr(self, name)
@@ -138,8 +139,8 @@ class _Reading(SpectrumOptions):
         if (self.folded or self.analyser is not None) and all(one.signal != SIGNAL for one in found):
             name = "folded" if self.folded else "analyser"
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
-        kinds = {SIGNAL: "psi and delta are in degrees", mueller.SIGNAL: "Mueller elements have no unit"}
-        kinds[generalised.SIGNAL] = kinds[SIGNAL]
+        kinds = {SIGNAL: "psi and delta are in degrees", Mueller.word: "Mueller elements have no unit"}
+        kinds[Generalised.word] = kinds[SIGNAL]
         if all(one.signal in kinds for one in found):
             if self.signal_unit is not None:
                 raise UsageError(f"{path}: {kinds[found[0].signal]}; leave `signal_unit` out")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from pellicle.data.ellipsometry_angles import ncs, psi_delta
 from pellicle.data.spectrum import FEWEST_POINTS, Spectrum
 from pellicle.errors import DataError, UsageError
 
@@ -104,7 +103,17 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     first, count = sweeps[0], len(sweeps)
     if count < 2:
         raise UsageError("a mean needs two sweeps or more")
-    for name in ("signal", "elements", "ratios", "polarisation", "folded", "wavelength", "angle", "azimuth"):
+    for name in (
+        "signal",
+        "transmission",
+        "elements",
+        "ratios",
+        "polarisation",
+        "folded",
+        "wavelength",
+        "angle",
+        "azimuth",
+    ):
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
     copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]
@@ -116,7 +125,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     size, alike = repeatability(sweeps), _alike(deviations(sweeps))
     mean = _mean(sweeps)
     level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
-    if first.delta is not None:
+    if first.kind.degrees:
         level, unit = math.degrees(0.5), " degrees"
     apart = size / level
     if alike > _ALIKE and apart > MOST_APART:
@@ -140,30 +149,20 @@ def repeatability(sweeps: Sequence[Spectrum]) -> float:
     half the distance on the sphere of N, C, S, in each of its two directions.
     """
     apart = deviations(sweeps)
-    count, points, channels = apart.shape
-    first = sweeps[0]
-    independent = channels if first.elements else 2 * len(first.ratios) or min(channels, 2)
-    size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * independent))
-    return size if first.delta is None else math.degrees(size) / 2
-
-
-def coordinates(spectrum: Spectrum) -> Float[np.ndarray, "points channels"]:
-    """The values as differences of them are compared: as they are, or N, C and S, of a folded Δ N and C, of
-    generalised Ψ and Δ those of each ratio."""
-    if spectrum.delta is None:
-        return spectrum.values.reshape(len(spectrum), -1)
-    sphere = ncs(spectrum.values, spectrum.delta)
-    return sphere.reshape(len(spectrum), -1) if spectrum.ratios else sphere[:, : 2 if spectrum.folded else 3]
+    count, points, _ = apart.shape
+    kind = sweeps[0].kind
+    size = math.sqrt(float(np.sum(apart**2)) / ((count - 1) * points * kind.independent))
+    return math.degrees(size) / 2 if kind.degrees else size
 
 
 def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points channels"]:
     """Each sweep less the mean of all."""
-    points = np.stack([coordinates(sweep) for sweep in sweeps])
+    points = np.stack([sweep.kind.coordinates(sweep) for sweep in sweeps])
     return points - points.mean(axis=0)
 
 
 def _same(one: Spectrum, other: Spectrum) -> bool:
-    return np.array_equal(coordinates(one), coordinates(other))
+    return np.array_equal(one.kind.coordinates(one), other.kind.coordinates(other))
 
 
 def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
@@ -175,12 +174,9 @@ def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
 
 def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
     """Values and standard deviations of the mean."""
-    first, count = sweeps[0], len(sweeps)
-    found: dict[str, Any] = {"values": np.mean([sweep.values for sweep in sweeps], axis=0)}
-    if first.delta is not None:
-        mean = np.mean([coordinates(sweep) for sweep in sweeps], axis=0)
-        sphere = mean.reshape(len(first), -1, 3) if first.ratios else mean
-        found["values"], found["delta"] = psi_delta(sphere)
+    kind, count = sweeps[0].kind, len(sweeps)
+    points = np.mean([kind.coordinates(sweep) for sweep in sweeps], axis=0)
+    found: dict[str, Any] = dict(kind.averaged(points))
     depolarised = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
     found["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
     for name in ("sigma", "delta_sigma", "depolarisation_sigma"):

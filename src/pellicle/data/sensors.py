@@ -16,12 +16,12 @@ from pellicle.colour.observers import (
     sensor,
     srgb_sensor,
 )
-from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.axis_and_signal import axis_unit, read_axis
 from pellicle.data.tabular.column_selection import AxisColumns, first_column
 from pellicle.data.tabular.columns import Column, listed, recognise_all
 from pellicle.data.tabular.table import Table, read_table
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import refuse_first
 
 SRGB = "srgb"
 _DAYLIGHT = "D65"

@@ -8,21 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from pellicle.data import generalised, mueller
-from pellicle.data.folded_delta import folding_at, folding_note
 from pellicle.data.settings import Setting, setting_numbers, settings
-from pellicle.data.signal_checks import (
-    Where,
-    check_depolarisation,
-    check_power,
-    check_psi_delta,
-    refuse_first,
-)
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.base import Signal
+from pellicle.signals.folded_delta import folding_at, folding_note
+from pellicle.signals.limits import Where, refuse_first
+from pellicle.signals.registry import KEYWORDS, KINDS, SIGNALS
 
-SIGNALS = ("R", "T", "psi-delta", mueller.SIGNAL, generalised.SIGNAL, "counts")
-ELLIPSOMETRY = ("psi-delta", mueller.SIGNAL, generalised.SIGNAL)
-"""Signals that compare polarisations, without a scale or an offset."""
 POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
 """A range that keeps fewer points is a mistake in the range."""
@@ -39,6 +31,8 @@ _ARRAYS = (
     "depolarisation",
     "depolarisation_sigma",
 )
+_OF_PARTS = ("values", "sigma", "delta", "delta_sigma")
+"""Arrays with a column for each part of a signal."""
 _REMEDY = "correct or delete that point"
 
 
@@ -73,7 +67,8 @@ class Spectrum:
       for "psi-delta".
     - `elements`: names of the columns of `values`, such as ("m12", "m33", "m34"), for "mueller".
     - `ratios`: names of the columns of `values`, `delta` and their errors, some of "ane", "aps" and "asp"
-      (`pellicle.data.generalised`), for "generalised-psi-delta".
+      (`pellicle.signals.generalised`), for "generalised-psi-delta".
+    - `transmission`: Ψ and Δ are those of t_p/t_s, for "psi-delta".
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -103,12 +98,14 @@ class Spectrum:
     elements: tuple[str, ...] = ()
     azimuth: np.ndarray | None = None
     ratios: tuple[str, ...] = ()
+    transmission: bool = False
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:
             if isinstance(value := getattr(self, name), str):
                 raise UsageError(f"`{name}` must be an array, not {value!r}: pl.read_spectrum reads files")
-        size = np.size(self.wavelength)
+        self._check_words()
+        size, parts = np.size(self.wavelength), self.kind.parts
         rising = (
             self.angle is None
             and self.azimuth is None
@@ -123,9 +120,9 @@ class Spectrum:
             value = getattr(self, name)
             if value is None:
                 continue
-            columns = self._columns(name)
-            if np.shape(value) != ((size, len(columns)) if columns else (size,)):
-                expected = f"{len(columns)} numbers" if columns else "one number"
+            columns = len(parts) if name in _OF_PARTS else 0
+            if np.shape(value) != ((size, columns) if columns else (size,)):
+                expected = f"{columns} numbers" if columns else "one number"
                 raise ValueError(
                     f"`{name}`: expected {expected} per wavelength ({size}), got {np.shape(value)}"
                 )
@@ -133,21 +130,19 @@ class Spectrum:
             array = array if order is None else array[order]
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        self._check_words()
         self._check_arrays()
         if self.folded is None:
             self._find_folding()
 
-    def _columns(self, name: str) -> tuple[str, ...]:
-        """Names of the columns of an array; none where it has one number per wavelength."""
-        if name in ("values", "sigma"):
-            return self.elements or self.ratios
-        return self.ratios if name in ("delta", "delta_sigma") else ()
+    @property
+    def kind(self) -> Signal:
+        """What the numbers are, and how a fit compares them."""
+        return KINDS[self.signal].of(self)
 
     def _find_folding(self) -> None:
         """Set `folded`, with a note where it is true."""
         at = None
-        if self.delta is not None and not self.ratios:
+        if self.delta is not None and not self.kind.parts:
             group = np.zeros(len(self)) if self.setting is None else self.setting
             at = folding_at(self.wavelength, self.values, self.delta, group)
         object.__setattr__(self, "folded", at is not None)
@@ -158,18 +153,14 @@ class Spectrum:
         for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
             if getattr(self, name) not in known:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
-        if (self.signal in ("psi-delta", generalised.SIGNAL)) != (self.delta is not None):
-            raise UsageError('`delta` goes with `signal="psi-delta"`: give both, or neither')
-        if (self.signal == generalised.SIGNAL) != bool(self.ratios):
-            raise UsageError(f'`ratios` go with `signal="{generalised.SIGNAL}"`: give both, or neither')
-        if self.ratios and self.folded:
-            raise UsageError("`folded` is for psi and delta of one ratio: leave it out")
-        if (self.signal == mueller.SIGNAL) != bool(self.elements):
-            raise UsageError('`elements` go with `signal="mueller"`: give both, or neither')
-        mueller.check_elements(self.elements)
-        generalised.check_ratios(self.ratios)
-        if self.depolarisation is not None and (self.delta is None or self.ratios):
-            raise UsageError('`depolarisation` goes with `signal="psi-delta"`: leave it out')
+        own = KINDS[self.signal]
+        for name in KEYWORDS:
+            value = getattr(self, name)
+            given = value is not None and value is not False and not (isinstance(value, tuple) and not value)
+            if (given and name not in own.keywords) or (not given and name in own.required):
+                kinds = [word for word, kind in KINDS.items() if name in kind.keywords] or [""]
+                go = "go" if name.endswith("s") else "goes"
+                raise UsageError(f'`{name}` {go} with `signal="{kinds[0]}"`: give both, or neither')
         if self.depolarisation_sigma is not None and self.depolarisation is None:
             raise UsageError("`depolarisation_sigma` goes with `depolarisation`: give both, or neither")
 
@@ -177,8 +168,8 @@ class Spectrum:
         """Refuse what a file may not contain either. Raises DataError."""
         present = {name: array for name in _ARRAYS if (array := getattr(self, name)) is not None}
         for name in tuple(present):
-            if columns := self._columns(name):
-                pairs = zip(columns, present.pop(name).T, strict=True)
+            if present[name].ndim > 1:
+                pairs = zip(self.kind.parts, present.pop(name).T, strict=True)
                 present |= {f"{column} {name}": own for column, own in pairs}
         for name, array in present.items():
             refuse_first(array, ~np.isfinite(array), self.place(f"`{name}`"), f"is not finite; {_REMEDY}")
@@ -191,29 +182,12 @@ class Spectrum:
         repeated = (np.diff(self.wavelength) == 0) & np.all(np.atleast_2d(np.diff(same)) == 0, axis=0)
         reason = "comes twice at one angle; keep one of the points, or their mean"
         refuse_first(self.wavelength[1:], repeated, lambda row: self.place("`wavelength`")(row + 1), reason)
-        values = self.place("`values`")
-        if self.ratios and self.delta is not None:
-            for name, psi, delta in zip(self.ratios, self.values.T, self.delta.T, strict=True):
-                places = self.place(f"`{name} values`"), self.place(f"`{name} delta`")
-                check_psi_delta(psi, delta, False, *places, _REMEDY)
-        elif self.delta is not None:
-            check_psi_delta(
-                self.values, self.delta, bool(self.folded), values, self.place("`delta`"), _REMEDY
-            )
-            if self.depolarisation is not None:
-                check_depolarisation(self.depolarisation, self.place("`depolarisation`"), _REMEDY)
-        elif self.elements:
-            for i, element in enumerate(self.elements):
-                sigma = None if self.sigma is None else self.sigma[:, i]
-                mueller.check_mueller(self.values[:, i], sigma, element, self.place(f"`{element}`"), _REMEDY)
-        elif self.signal != "counts" and self.calibrated and len(self):
-            too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
-            check_power(self.signal, self.values, self.sigma, values, too_high=too_high, remedy=_REMEDY)
+        self.kind.check(self, self.place, _REMEDY)
 
     @property
     def ellipsometric(self) -> bool:
         """True for Ψ and Δ and for Mueller elements, which have no scale and no offset."""
-        return self.signal in ELLIPSOMETRY
+        return self.kind.ellipsometric
 
     @property
     def setting(self) -> np.ndarray | None:

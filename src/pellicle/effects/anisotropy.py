@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic, isotropic_in_plane, mixes_polarisations
 from pellicle.effects.bounds import largest_attenuation
 from pellicle.errors import UsageError
@@ -22,7 +21,9 @@ def anisotropy(scene: Scene) -> Row:
     **Raises:** UsageError for what is not computed: see `_check`.
     """
     media = [medium for medium in scene_media(scene) if isinstance(medium, Anisotropic)]
-    apart = "s and p stay apart" + (", r_ps = r_sp = 0" if scene.light.signal == generalised.SIGNAL else "")
+    apart = "s and p stay apart" + (
+        ", r_ps = r_sp = 0" if scene.light.kind.degrees and scene.light.kind.parts else ""
+    )
     if scene.light.azimuth is not None and all(map(isotropic_in_plane, media)):
         apart += ", and the azimuth of the sample has no effect"
     if not media:

@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.free import free_leaves, insert, is_free, start_values
 
@@ -98,14 +97,14 @@ def gradients(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.nd
     return np.asarray(_gradients(build, plan.static_key, *_split(scene, points)), dtype=float)
 
 
-def largest_difference(one: np.ndarray, other: np.ndarray, signal: str) -> float:
+def largest_difference(one: np.ndarray, other: np.ndarray, degrees: bool) -> float:
     """Largest difference of two arrays of signals, in the unit of the signal.
 
-    For ellipsometry it is the arc, in degrees, between two points (N, C, S). Infinite where one of the
+    In `degrees` it is the arc between two points (N, C, S). Infinite where one of the
     signals is not a number.
     """
     apart = np.abs(one - other)
-    if signal in ("psi-delta", generalised.SIGNAL):
+    if degrees:
         apart = np.rad2deg(np.linalg.norm(apart.reshape(-1, 3), axis=1))
     return float(np.max(np.where(np.isfinite(apart), apart, np.inf), initial=0.0))
 
@@ -175,7 +174,7 @@ def measured(full: Plan, chosen: Plan, cheaper: Mapping[str, list[Plan]], evalua
     """Savings compared with the `full` plan; `cheaper` has at most one plan for each effect."""
     others = {effect: plan for effect, plans in cheaper.items() for plan in plans}
     exact = evaluation.signals(full)
-    errors = [largest_difference(evaluation.signals(plan), exact, full.signal) for plan in others.values()]
+    errors = [largest_difference(evaluation.signals(plan), exact, full.degrees) for plan in others.values()]
     whole, planned, *times = evaluation.seconds([full, chosen, *others.values()])
     each = zip(others, errors, times, strict=True)
     return Savings({effect: Saving(error, whole - time) for effect, error, time in each}, whole, planned)

@@ -66,7 +66,8 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     """
     known = {row.effect: row for row in given}
     rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)
-    return Plan(rows, scene.light.signal, scene.light.polarisation)
+    light = scene.light
+    return Plan(rows, light.signal, light.polarisation, transmission=light.transmission)
 
 
 def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:
@@ -134,14 +135,14 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
     scene, light = stage.scene, stage.scene.light
     meaningless = {
         "oblique": light.ellipsometric,
-        "back-face": light.signal == "T",
+        "back-face": light.kind.transmitted,
         "polarisation": light.ellipsometric
         or is_free(light.angle)
         or is_free(scene.instrument.angle_shift)  # with the angle s and p change in opposite directions
         or scene.instrument.has_cone,
     }
     removals = []
-    if effect == "opaque" and light.signal != "T":
+    if effect == "opaque" and not light.kind.transmitted:
         # a graded layer is no half space
         plain = (isinstance(x, Layer) and not isinstance(x.material, Graded) for x in scene.layers)
         opaque = (one and absorbs(x.material) for one, x in zip(plain, scene.layers, strict=True))

@@ -11,7 +11,6 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.dispersion.base import known_index
 from pellicle.dispersion.empirical import Scaled, Tabulated
 from pellicle.effects.bounds import least_ambient, normal_incidence, upper
@@ -67,7 +66,7 @@ def gradient(scene: Scene) -> Row:
         error = measured(count) if error < GRADIENT_ERROR else error
         if error < GRADIENT_ERROR:
             break
-    error = error if scene.light.signal not in ("psi-delta", generalised.SIGNAL) else float(np.rad2deg(error))
+    error = float(np.rad2deg(error)) if scene.light.kind.degrees else error
     what = "a graded layer"
     if not normal_incidence(scene) and any(map(_passes_zero, few)):
         what += " whose Re ε passes 0, where p converges slowly"

@@ -123,8 +123,9 @@ def polarisation(scene: Scene) -> Row:
 
 def transmission(scene: Scene) -> Row:
     """On where the signal, or the back face of a plate, needs the transmitted light."""
-    if scene.light.signal == "T":
-        return Row("transmission", True, "the signal is a transmittance")
+    if scene.light.kind.transmitted:
+        noun = "transmittance" if scene.light.signal == "T" else "comparison of transmitted light"
+        return Row("transmission", True, f"the signal is a {noun}")
     if back_face(scene).on:
         return Row("transmission", True, "light that reaches the back face returns through the layer")
     return Row("transmission", False, "the signal is a reflectance and the substrate has no back face")
@@ -136,7 +137,7 @@ def back_face(scene: Scene) -> Row:
     if not plates:
         return Row("back-face", False, "the substrate is a half space, without a back face")
     share, count = plates[0].back_collected, plates[0].back_reflections
-    if isinstance(share, int | float) and share == 0 and scene.light.signal != "T":
+    if isinstance(share, int | float) and share == 0 and not scene.light.kind.transmitted:
         return Row("back-face", False, "no light from the back face is collected (back_collected = 0)")
     part = _collected(share, count)
     if len(plates) == 1 and scene.substrate.back is not None:

@@ -30,7 +30,7 @@ from pellicle.effects.tolerance import (
     reduced_plan,
     removal_steps,
 )
-from pellicle.forward_model.plan import Plan, Row
+from pellicle.forward_model.plan import SURFACE, Plan, Row
 from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.surface import LAYERED, SurfaceView
@@ -201,7 +201,7 @@ have the effect."""
 def exact(view: SurfaceView) -> Plan:
     """The effects that a surface has; one is off only where it is provably absent."""
     rows = [judge(view) for judge in JUDGES]
-    return Plan(tuple(row for row in rows if row is not None), "brdf", view.polarisation)
+    return Plan(tuple(row for row in rows if row is not None), SURFACE, view.polarisation)
 
 
 def largest_angle(view: SurfaceView) -> float:

@@ -74,7 +74,7 @@ def reduced_plan(
 
 def _after(step: Step, stage: Stage, evaluation: Evaluation) -> Stage:
     signals = evaluation.signals(step.plan)
-    bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.signal)
+    bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.degrees)
     effect = step.row.effect
     bound += stage.changed[effect].error_bound if effect in stage.changed else 0.0
     return Stage(

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.mueller import SIGNAL as MUELLER
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
@@ -98,11 +97,9 @@ def data_curves(spectra: Sequence[Spectrum], against_angle: bool = False) -> lis
     curves = []
     every = measured_angles(spectra)
     for spectrum in spectra:
-        columns = {spectrum.signal: spectrum.values}
-        if spectrum.delta is not None:
-            columns = {"Ψ": spectrum.values, "Δ": spectrum.delta}
-        elif spectrum.signal == MUELLER:
-            columns = dict(zip(spectrum.elements, spectrum.values.T, strict=True))
+        columns = {
+            q.symbol: q.measured(spectrum) for q in spectrum.kind.quantities if q.array != "depolarisation"
+        }
         for rows, x, setting in lines(spectrum, every, against_angle):
             for label, values in columns.items():
                 curves.append(Curve(label, x, np.asarray(values)[rows], setting, spectrum.name))

@@ -10,7 +10,6 @@ import equinox as eqx
 import numpy as np
 from jax.tree_util import GetAttrKey
 
-from pellicle.data import generalised
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
@@ -41,6 +40,7 @@ from pellicle.explorer.programs import (
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
+from pellicle.signals.generalised import Generalised
 from pellicle.simulation.spectra import VISIBLE, default_wavelengths
 
 _FEWEST, _MOST, _POINTS = 100, 1500, 401
@@ -60,7 +60,7 @@ class FilmView:
     kind, parts = "spectrum", ("curves", "colour", "sphere", "plan")
 
     def __init__(self, scene: Scene, wavelength: Any = None, folded: bool = False) -> None:
-        if scene.light.signal == generalised.SIGNAL:
+        if scene.light.signal == Generalised.word:
             raise UsageError(
                 "the explorer does not draw generalised psi and delta: give the scene another signal, such as"
                 ' "psi-delta" or "mueller"'
@@ -117,13 +117,12 @@ class FilmView:
         order = sorted(
             self.controls, key=lambda c: (groups.index(c.group), c.optional, c.label != "thickness")
         )
-        signal = self.scene.light.signal
+        kind = self.scene.light.kind
         across = "angle of incidence (°)" if self.against_angle else "wavelength (nm)"
-        units = {"psi-delta": "Ψ, Δ (°)", "mueller": "normalised Mueller element"}
         return {
             "controls": [control.to_json() for control in order],
-            "signals": {"psi-delta": ["Ψ", "Δ"]}.get(signal, [signal]),
-            "axis": {"label": across, "value": units.get(signal, f"{signal} (fraction)")},
+            "signals": [kind.word] if kind.parts else [q.symbol for q in kind.quantities],
+            "axis": {"label": across, "value": kind.ordinate},
             "angles": self.angles.tolist() if len(self.angles) > 1 and not self.against_angle else [],
             "at_one_wavelength": float(self.wavelength[0]) if self.against_angle else None,
         }
@@ -131,7 +130,7 @@ class FilmView:
     @property
     def light_in_words(self) -> str:
         """The light whose colour is shown, in words."""
-        return "transmitted light" if self.scene.light.signal == "T" else "reflected light"
+        return "transmitted light" if self.scene.light.kind.transmitted else "reflected light"
 
     def structure(self, values: Mapping[str, float]) -> Structure:
         """Return the effects that values other than 0 need. Raises UsageError for an impossible cone."""

@@ -101,9 +101,8 @@ def fitted_curves(found: Fit, against_angle: bool = False) -> list[Curve]:
     for part in found.parts:
         curve = part.curve
         if isinstance(curve, FittedCurve) and np.ndim(curve.model) == 1:
-            columns = {part.spectrum.signal: curve.model}
-            if curve.delta_model is not None:
-                columns = {"Ψ": curve.model, "Δ": curve.delta_model}
+            quantities = [q for q in part.spectrum.kind.quantities if q.array != "depolarisation"]
+            columns = {q.symbol: q.curve(curve)[1] for q in quantities}
             for rows, x, setting in lines(part.spectrum, every, against_angle):
                 for label, y in columns.items():
                     curves.append(Curve(label, x, y[rows], setting, part.spectrum.name))

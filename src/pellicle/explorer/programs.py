@@ -10,18 +10,15 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.tree_util import GetAttrKey
 
 from pellicle.colour import integration_bands
-from pellicle.data.mueller import ELEMENTS
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
 from pellicle.explorer.controls import Control, free_paths, template, with_value
 from pellicle.forward_model.film_signal import build, tabulated
-from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.instrument import Drift, Instrument
@@ -133,18 +130,14 @@ def spectrum_program(
 
     **Raises:** ValueError where a material has no data.
     """
-    scale, offset, signal = scene.instrument.scale, scene.instrument.offset, scene.light.signal
+    scale, offset, kind = scene.instrument.scale, scene.instrument.offset, scene.light.kind
     gain = 1.0 if isinstance(scale, Drift) else float(scale)
     shift = 0.0 if isinstance(offset, Drift) else float(offset)
-    labels = {"psi-delta": ("Ψ", "Δ"), "mueller": ELEMENTS}.get(signal, (signal,))
+    kind = replace(kind, folded=True) if folded else kind
+    labels = [quantity.symbol for quantity in kind.quantities]
 
     def rows(found: Any) -> Any:
-        if signal == "psi-delta":
-            psi, delta = jnp.broadcast_arrays(*psi_delta(*found.reshape(-1, 3).T))
-            return jnp.stack([psi, jnp.minimum(delta, 360.0 - delta) if folded else delta])
-        if signal == "mueller":
-            return found.reshape(len(wavelength), -1).T
-        return gain * found[None] + shift
+        return gain * kind.drawn(found.reshape(len(wavelength), -1)) + shift
 
     compute = _compiled(with_wavelength(scene, wavelength), names, after=rows, count=count)
 

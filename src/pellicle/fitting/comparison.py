@@ -16,12 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.data.colours import Colours
-from pellicle.data.ellipsometry_angles import ncs
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
-from pellicle.fitting.film.targets import ratio_directions
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import Fit, Part, Status
@@ -147,9 +145,7 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
             names += [type(data)]
-            names += [
-                (data.signal, data.folded, data.elements, data.ratios) if isinstance(data, Spectrum) else ""
-            ]
+            names += [data.kind if isinstance(data, Spectrum) else ""]
             light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
                 light = "wavelength azimuth delta delta_sigma depolarisation depolarisation_sigma"
@@ -174,58 +170,23 @@ class _Residuals(NamedTuple):
     part: Part
     rows: np.ndarray
     known: bool
-
-    @property
-    def independent(self) -> int:
-        """Independent numbers: three on the sphere of N, C and S are two."""
-        points, channels = self.rows.shape
-        on_sphere = isinstance(self.part.curve, Curve) and self.part.curve.delta_data is not None
-        return points * (min(channels, 2) if on_sphere else channels)
+    independent: int
 
 
 def _residuals(part: Part) -> list[_Residuals]:
-    """Residuals of a part, and of its depolarisation, where that was measured."""
-    known, of_part = part.sigma_from in ("given", "usual"), _residual(part)
-    if isinstance(part.curve, Curve) and part.spectrum.elements:
-        return [_Residuals(part, column[:, None], known) for column in of_part.T]  # each of its own noise
-    if isinstance(part.curve, Curve) and part.spectrum.ratios:
-        return [_Residuals(part, of_part[:, i], known) for i in range(len(part.spectrum.ratios))]
-    result = [_Residuals(part, of_part, known)]
-    if isinstance(part.curve, Curve) and part.curve.depolarisation_data is not None:
-        sigma = part.spectrum.depolarisation_sigma
-        own = part.curve.depolarisation_residual / (1.0 if sigma is None else sigma)
-        result.append(_Residuals(part, own[:, None], sigma is not None))
-    return result
-
-
-def _residual(part: Part) -> np.ndarray:
-    """Residuals over a given σ, else as they are, (points, channels): of Ψ and Δ on the sphere, (points,
-    ratios, channels) of generalised ones."""
-    if isinstance(part.curve, BrdfCurve):
-        return part.curve.residual
-    if isinstance(part.curve, ColourCurve):
-        return part.curve.residual / part.curve.sigma
-    c, spectrum = part.curve, part.spectrum
-    sigma = spectrum.sigma
-    if c.delta_data is None or c.delta_model is None:
-        residual = c.residual if sigma is None else c.residual / sigma
-        return residual if spectrum.elements else residual[:, None]
-    if spectrum.ratios:
-        frames, spread = ratio_directions(spectrum)
-        apart = ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
-        residual = np.einsum("prij,prj->pri", frames, apart)
-        return (residual if sigma is None else residual / spread)[..., :2]
-    if sigma is None:
-        return ncs(c.data, c.delta_data) - ncs(c.model, c.delta_model)
-    across = sigma if spectrum.delta_sigma is None else spectrum.delta_sigma
-    # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
-    sine = np.sin(2 * np.deg2rad(c.data)) / np.hypot(np.sin(2 * np.deg2rad(c.data)), 2 * np.deg2rad(sigma))
-    return np.stack([c.residual / sigma, sine * c.delta_residual / across], axis=1)
+    """Residuals of a part, by their noises."""
+    known = part.sigma_from in ("given", "usual")
+    if isinstance(part.curve, Curve):
+        each = part.spectrum.kind.residuals(part.spectrum, part.curve, known)
+        return [_Residuals(part, *own) for own in each]
+    rows = part.curve.residual
+    rows = rows / part.curve.sigma if isinstance(part.curve, ColourCurve) else rows
+    return [_Residuals(part, rows, known, rows.size)]
 
 
 def _correlation(residuals: _Residuals) -> float:
     """Number of points that count as one: neighbours in a sweep, or in a file of BRDF samples."""
-    part, rows, _ = residuals
+    part, rows, *_ = residuals
     if isinstance(part.curve, BrdfCurve):
         return float(np.mean([correlation_length(column) for column in rows.T]))
     if isinstance(part.curve, ColourCurve):

@@ -60,7 +60,7 @@ def lack_of_fit(part: Part, free: int) -> LackOfFit | None:
     if not isinstance(data, Spectrum) or not data.sweeps:
         return None
     count, size = len(data.sweeps), repeatability(data.sweeps)
-    values = len(data) * (len(data.elements) or 2 * len(data.ratios) or (1 if data.delta is None else 2))
+    values = len(data) * data.kind.independent
     freedom = max(values - free, 1), values * (count - 1)
     if not size:
         return None  # copies

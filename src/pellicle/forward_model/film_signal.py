@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
+from pellicle.errors import UsageError
 from pellicle.forward_model import instrument, mixed_polarisations
 from pellicle.forward_model.coherent_groups import (
     CoherentGroup,
@@ -28,7 +28,7 @@ from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.lens import Turn
-from pellicle.scene.film import ELLIPSOMETRY, Scene, media, thickness_spread, turned
+from pellicle.scene.film import Scene, media, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
 
@@ -76,18 +76,15 @@ def build(plan: Plan) -> Simulate:
     """The forward model of a plan: simulate(scene) → signal at `scene.light.wavelength`.
 
     The signal is a fraction, without scale or offset; for ellipsometry it is one array with N, C, S of the
-    first wavelength, then of the next, N, C, S of each ratio of `data.generalised`, or the 15 elements of a
-    Mueller matrix beside m11. `scene` contains
-    numbers only (see `scene.free.insert`). The function is pure and can be traced.
+    first wavelength, then of the next, or with the other rows of its kind of signal. `scene` contains numbers
+    only (see `scene.free.insert`). The function is pure and can be traced.
     """
-    ellipsometric = plan.signal in ELLIPSOMETRY
+    kind, ellipsometric = plan.kind, plan.kind.ellipsometric
     powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
-    if plan.signal == generalised.SIGNAL and plan.on("angle-spread"):
-        finish = _ratio_rows
     mixed = plan.row("anisotropy").count >= GENERAL
     if mixed:
-        powers, finish = partial(mixed_polarisations.rows, plan), partial(mixed_polarisations.finished, plan)
+        powers, finish = partial(mixed_polarisations.rows, plan), kind.of_sums
     averaged = plan.row("coherence").count or plan.on("angle-spread")
 
     def at_each_wavelength(groups: list[CoherentGroup], **turn: Any) -> Sequence[Any]:
@@ -119,12 +116,7 @@ def build(plan: Plan) -> Simulate:
             scene = remove(scene)
         rows = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
-        rows = _mueller_rows(*rows) if plan.signal == "mueller" and not mixed else rows
-        if plan.signal == "psi-delta":
-            rows = rows[:3]
-        if plan.signal == generalised.SIGNAL and not mixed and not cone.on:
-            one, none = jnp.ones_like(rows[0]), jnp.zeros_like(rows[0])
-            rows = [*rows, *(one, none, none) * 2]  # r_ps = r_sp = 0
+        rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
     return simulate
@@ -181,26 +173,9 @@ def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
     return [*found, *ellipsometry.normalised(ellipsometry.Stokes(n, m22, m44, intensity))[1:]]
 
 
-def _mueller_rows(n: Any, c: Any, s: Any, m22: Any = None, m44: Any = None) -> Sequence[Any]:
-    """The elements m12, m13, ..., m44 of the normalised Mueller matrix of an isotropic sample."""
-    m22, m44, none = jnp.ones_like(n) if m22 is None else m22, c if m44 is None else m44, jnp.zeros_like(n)
-    return [-n, none, none, -n, m22, *[none] * 4, c, s, none, none, -s, m44]
-
-
-def _ratio_rows(rows: Sequence[Any]) -> Sequence[Any]:
-    """N, C and S of each ratio, of an isotropic sample in a cone of light."""
-    n, c, s, intensity, m22, m44 = rows
-    none = jnp.zeros_like(n)
-    return mixed_polarisations.ratio_angles(
-        mixed_polarisations.ratio_sums_of_mueller(
-            [[intensity, -n, none, none], [-n, m22, none, none], [none, none, c, s], [none, none, -s, m44]]
-        )
-    )
-
-
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     """R or T of one polarisation, or of both."""
-    power = reflected if plan.signal == "R" else transmitted
+    power = transmitted if plan.kind.transmitted else reflected
     polarisations = "sp"
     if not plan.on("polarisation"):
         one = (plan.on("oblique") or plan.on("anisotropy")) and plan.polarisation != "unpolarised"
@@ -210,13 +185,17 @@ def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
 
 def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes:
     """Stokes parameters before normalisation."""
+    through = plan.kind.transmitted
     if len(groups) == 1:
         s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
-        return ellipsometry.stokes(s, p)
+        return ellipsometry.transmitted_stokes(s, p) if through else ellipsometry.stokes(s, p)
     if _birefringent_on_plates(plan):
+        if through:
+            raise UsageError(mixed_polarisations.NO_PLATE)
         return mixed_polarisations.stokes(plan, groups)
-    s, p = (reflected(plan, groups, polarisation) for polarisation in "sp")
-    return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups))
+    s, p = ((transmitted if through else reflected)(plan, groups, polarisation) for polarisation in "sp")
+    cross = _transmitted_product(plan, groups) if through else _cross_product(plan, groups)
+    return ellipsometry.stokes_from_sums(s, p, cross)
 
 
 def _birefringent_on_plates(plan: Plan) -> bool:
@@ -234,4 +213,16 @@ def _cross_product(plan: Plan, groups: list[CoherentGroup]):
     front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
     if not below:
         return front.reflected
-    return plate.multiple_reflections(*front, _cross_product(plan, below), group.internal, group.collected)
+    orders = front.reflected, front.passed_twice, front.below, _cross_product(plan, below)
+    return plate.multiple_reflections(*orders, group.internal, group.collected)
+
+
+def _transmitted_product(plan: Plan, groups: list[CoherentGroup]):
+    """conj(t_p) t_s through the first group and everything below it."""
+    group, *below = groups
+    front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
+    if not below:
+        return front.passed
+    face = plate.Face(front.reflected, front.passed, front.below)
+    back, passed = _cross_product(plan, below), _transmitted_product(plan, below)
+    return plate.plate_transmittance(face, back, passed, group.internal, group.collected)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
-from pellicle.data import generalised
+from pellicle.signals.base import Signal
+from pellicle.signals.registry import of_light
+
+SURFACE = "brdf"
+"""Word of the signal of a surface."""
 
 CLOSED_FORMS, GENERAL, SLICED = 2, 4, 8
 """`Row.count` of the effect "anisotropy": size of the matrices; `SLICED` is 4×4 with layers that may be
@@ -55,6 +59,12 @@ class Plan:
     left_out: tuple[Removal, ...] = ()
     tolerance: float = 0.0
     gradient_error: float = 0.0
+    transmission: bool = False
+
+    @property
+    def kind(self) -> Signal:
+        """The kind of the signal. Raises KeyError for that of a surface."""
+        return of_light(self.signal, self.transmission)
 
     def row(self, effect: str) -> Row:
         """The row of one effect. Raises KeyError for an unknown name."""
@@ -70,7 +80,12 @@ class Plan:
     @property
     def ellipsometric(self) -> bool:
         """True for the signals of ellipsometry."""
-        return self.signal in ("psi-delta", "mueller", generalised.SIGNAL)
+        return self.signal != SURFACE and self.kind.ellipsometric
+
+    @property
+    def degrees(self) -> bool:
+        """True where differences of the signal are degrees on spheres of N, C, S."""
+        return self.signal != SURFACE and self.kind.degrees
 
     @property
     def error_bound(self) -> float:
@@ -81,7 +96,7 @@ class Plan:
     def static_key(self) -> Plan:
         """The plan without reasons and bounds: everything that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
-        return Plan(rows, self.signal, self.polarisation, self.left_out)
+        return replace(self, rows=rows, tolerance=0.0, gradient_error=0.0)
 
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)

@@ -37,6 +37,24 @@ def stokes(s: Response, p: Response) -> Stokes:
     return Stokes(abs2(rs) - abs2(rp), real(both), imag(both), abs2(rs) + abs2(rp))
 
 
+def transmitted_stokes(s: Response, p: Response) -> Stokes:
+    """Return the Stokes sums of light transmitted by layers into a transparent medium.
+
+    The amplitudes are those of the power: |t|² = T. In a transparent medium t_p and t_s have one factor to
+    those of the electric field, and the phase of 1/denominator.
+    """
+    powers = transmittance(s), transmittance(p)
+    product = jnp.conj(to_complex(s.denominator)) * to_complex(p.denominator)
+    cross = _root(powers[0] * powers[1]) * product / jnp.abs(product)
+    return stokes_from_sums(*powers, cross)
+
+
+def _root(power: Any) -> Any:
+    """Return the square root, with a finite slope where nothing is transmitted."""
+    some = power > 0
+    return jnp.where(some, jnp.sqrt(jnp.where(some, power, 1.0)), 0.0)
+
+
 @jax.custom_jvp
 def _amplitude(reflected: Number, denominator: Number) -> Any:
     """Return r = reflected / denominator, stored as a complex array that one loop computes.
@@ -57,6 +75,7 @@ class CrossProducts(NamedTuple):
     """conj(x_p) x_s of the amplitudes x of one coherent group of layers."""
 
     reflected: Any
+    passed: Any  # transmitted into the medium below
     passed_twice: Any  # transmitted down and up again
     below: Any  # reflected from below
 
@@ -70,9 +89,11 @@ def cross_products(s: Response, p: Response) -> CrossProducts:
     ds, dp = to_complex(s.denominator), to_complex(p.denominator)
     product = jnp.conj(ds) * dp
     phase = product / jnp.abs(product)
+    powers = transmittance(p) * transmittance(s)
     return CrossProducts(
         jnp.conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
-        transmittance(p) * transmittance(s) * phase * phase,
+        _root(powers) * phase,
+        powers * phase * phase,
         jnp.conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
     )
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
-from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, SamplesView
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.evaluation import curves
@@ -17,6 +16,7 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Part
+from pellicle.signals.sphere import psi_delta
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""
@@ -101,7 +101,7 @@ def _spectrum(
                 result.append(Prediction(*about, own[:, i], drawn[..., i], noise[..., i]))
         return result
     result = []
-    if view.depolarisation is not None and curve.depolarisation_data is not None:
+    if view.signal.depolarisation and curve.depolarisation_data is not None:
         name, drawn = "depolarisation", (of_model[..., -1], of_noisy[..., -1])
         result.append(Prediction(name + suffix, prefix + name, axis, curve.depolarisation_data, *drawn))
         of_model, of_noisy = of_model[..., :-1], of_noisy[..., :-1]

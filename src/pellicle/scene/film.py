@@ -15,7 +15,6 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from pellicle.data import generalised
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
@@ -33,9 +32,9 @@ from pellicle.scene.layers import (
     ambient_medium,
     divided,
 )
+from pellicle.signals.base import Signal
+from pellicle.signals.registry import SIMULATED, of_light
 
-SIGNALS = ("R", "T", "psi-delta", "mueller", generalised.SIGNAL)
-ELLIPSOMETRY = ("psi-delta", "mueller", generalised.SIGNAL)
 POLARISATIONS = ("unpolarised", "s", "p")
 
 
@@ -53,7 +52,7 @@ class Light(eqx.Module):
     take them); `signal`, "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; `polarisation`,
     "unpolarised", "s" or "p"; `azimuth` in degrees, one or one per wavelength: the rotation of the sample
     about its normal, clockwise as seen from the side of the light, which adds to the angle φ of every axis
-    (None is 0).
+    (None is 0); `transmission`: Ψ and Δ are those of transmitted light, conj(t_p/t_s).
 
     **Raises:** ValueError for an unknown word, for angles outside 0 to 90 degrees, and for a free azimuth.
 
@@ -66,10 +65,12 @@ class Light(eqx.Module):
     signal: str = eqx.field(static=True, default="R")
     polarisation: str = eqx.field(static=True, default="unpolarised")
     azimuth: Any = eqx.field(converter=_listed, default=None)
+    transmission: bool = eqx.field(static=True, default=False)
 
     def __check_init__(self):
-        if self.signal not in SIGNALS:
-            raise ValueError(f"`signal` must be one of {', '.join(SIGNALS)}, not {self.signal!r}")
+        if self.signal not in SIMULATED:
+            raise ValueError(f"`signal` must be one of {', '.join(SIMULATED)}, not {self.signal!r}")
+        of_light(self.signal, self.transmission)
         check_polarisation(self.polarisation)
         for name in ("wavelength", "angle", "azimuth"):
             if isinstance(getattr(self, name), str):
@@ -85,7 +86,12 @@ class Light(eqx.Module):
     @property
     def ellipsometric(self) -> bool:
         """True for signals that compare polarisations: Ψ and Δ, also generalised, or Mueller elements."""
-        return self.signal in ELLIPSOMETRY
+        return self.kind.ellipsometric
+
+    @property
+    def kind(self) -> Signal:
+        """The kind of the signal."""
+        return of_light(self.signal, self.transmission)
 
     @property
     def largest_angle(self) -> float:
@@ -287,5 +293,5 @@ def with_wavelength(scene: Scene, wavelength: Any, angle: Any = None, azimuth: A
     """Return the scene with other wavelengths (nm), and other angles and azimuths (degrees) if given."""
     light = scene.light
     angle, azimuth = light.angle if angle is None else angle, light.azimuth if azimuth is None else azimuth
-    light = Light(wavelength, angle, light.signal, light.polarisation, azimuth)
+    light = replace(light, wavelength=wavelength, angle=angle, azimuth=azimuth)
     return eqx.tree_at(lambda s: s.light, scene, light)

@@ -9,7 +9,6 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.repeated_sweeps import mean_spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
@@ -18,6 +17,7 @@ from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.problem import Problem
 from pellicle.sampling.predict import predictions
+from pellicle.signals.sphere import psi_delta
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)
 SILICON = np.asarray(pl.refractive_index(WAVELENGTH, "Si"))

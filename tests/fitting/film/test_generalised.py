@@ -9,14 +9,11 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.data.ellipsometry_angles import ncs
-from pellicle.data.generalised import RATIOS, SIGNAL, delta_sigma
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
-from pellicle.fitting.film import generalised
 from pellicle.fitting.film.sweeps import sweeps
-from pellicle.fitting.film.targets import measured, seen_as, sphere_frame
+from pellicle.fitting.film.targets import measured, seen_as
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.figures import draw_spectrum as draw_data
 from pellicle.reporting.fit_tables import fit_csv
@@ -24,6 +21,10 @@ from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
 from pellicle.reporting.page import figures
 from pellicle.reporting.spectrum_text import describe
+from pellicle.signals.generalised import RATIOS, Generalised, block_frame, delta_sigma, upright
+from pellicle.signals.sphere import ncs, sphere_frame
+
+SIGNAL = "generalised-psi-delta"
 
 NM = np.linspace(400.0, 800.0, 64)
 ANGLE, THICKNESS, INDEX, SUBSTRATE = 70.0, 180.0, 1.46, 3.9 + 0.02j
@@ -126,7 +127,7 @@ def test_each_ratio_has_its_own_noise_and_compare_ranks(fit):
 def test_channels_are_directions_along_psi_and_delta():
     own = data()
     target = measured(own, scene())
-    assert target.ratios == (0, 1, 2)
+    assert target.signal == Generalised()
     sphere = ncs(own.values, own.delta).reshape(64, -1)
     channels = np.einsum("pij,pj->pi", target.frame, sphere)
     np.testing.assert_allclose(channels, np.tile([0.0] * 6 + [1.0] * 3, (64, 1)), atol=1e-12)
@@ -137,8 +138,8 @@ def test_channels_are_directions_along_psi_and_delta():
     # 2σ along Ψ and across it
     np.testing.assert_allclose(target.sigma[:, [0, 2, 4]], np.tile(2 * np.deg2rad(NOISE), (64, 1)))
     np.testing.assert_allclose(target.sigma[:, [1, 3, 5]], np.tile(2 * np.deg2rad(NOISE), (64, 1)), rtol=1e-9)
-    groups = generalised.noise_groups(2, True, 64)
-    assert [(group.channels, group.independent) for group in groups] == [((0, 1, 4), 128), ((2, 3, 5), 128)]
+    groups = Generalised(("ane", "aps")).groups(6, True)
+    assert [(group.channels, group.independent) for group in groups] == [((0, 1, 4), 2), ((2, 3, 5), 2)]
 
 
 def test_directions_of_a_ratio_of_nothing_do_not_turn_with_its_noise():
@@ -153,7 +154,7 @@ def test_directions_of_a_ratio_of_nothing_do_not_turn_with_its_noise():
 def test_errors_that_differ_keep_their_own_directions():
     psi, delta = np.array([[20.0, 90.0]]), np.array([[100.0, 77.0]])
     frames, sigma = sphere_frame(psi, delta), np.array([[[0.001, 0.004, 0.003], [0.004, 0.004, 0.004]]])
-    turned, shared = generalised.upright(frames, sigma, psi, delta)
+    turned, shared = upright(frames, sigma, psi, delta)
     np.testing.assert_array_equal(turned[0, 0], frames[0, 0])
     np.testing.assert_allclose(shared, sigma, rtol=1e-12)
     # at Ψ = 90, along C and S
@@ -164,8 +165,8 @@ def test_some_ratios_alone():
     every = data(with_sigma=False)
     one = replace(every, values=every.values[:, 1:], ratios=("aps", "asp"), delta=every.delta[:, 1:])
     target = measured(one, scene())
-    assert target.ratios == (1, 2)
-    assert generalised.positions(target.ratios) == (3, 4, 5, 6, 7, 8)
+    rows = np.arange(18.0).reshape(2, 9)
+    np.testing.assert_array_equal(target.signal.compared(rows, None, False), rows[:, 3:].ravel())
 
 
 def test_offsets_are_changes_of_psi_and_delta():
@@ -173,7 +174,7 @@ def test_offsets_are_changes_of_psi_and_delta():
     psi, delta = np.array([[20.0, 5.0]]), np.array([[100.0, 250.0]])
     step = 1e-4
     allowed = replace(pl.Uncertainty.none(), psi=step, delta=2 * step)
-    effects = generalised.offsets(("ane", "aps"), ncs(psi, delta), allowed)
+    effects = Generalised(("ane", "aps")).offsets(ncs(psi, delta).reshape(1, -1), allowed)
     names = [
         "offset of psi of ane",
         "offset of delta of ane",
@@ -184,9 +185,9 @@ def test_offsets_are_changes_of_psi_and_delta():
     for i, effect in enumerate(effects):
         ratio = np.array([[i // 2 == 0, i // 2 == 1]])
         moved = ncs(psi + step * ratio * (i % 2 == 0), delta + 2 * step * ratio * (i % 2 == 1))
-        np.testing.assert_allclose(effect.change, moved - ncs(psi, delta), atol=1e-10)
-    frames = generalised.block_frame(sphere_frame(psi, delta))
-    along = np.einsum("pij,pj->pi", frames, effects[2].change.reshape(1, -1))
+        np.testing.assert_allclose(effect.change, (moved - ncs(psi, delta)).reshape(1, -1), atol=1e-10)
+    frames = block_frame(sphere_frame(psi, delta))
+    along = np.einsum("pij,pj->pi", frames, effects[2].change)
     np.testing.assert_allclose(along, [[0, 0, 2 * np.deg2rad(step), 0, 0, 0]], atol=1e-12)
 
 

@@ -18,8 +18,8 @@ from pellicle.data.cubes.detect import read_raw
 from pellicle.data.cubes.numpy_files import is_numpy, mapped_array
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.signal_checks import HIGHEST
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import HIGHEST
 
 _AXES = {1: (WAVELENGTH,), 2: ("x", WAVELENGTH), 3: ("y", "x", WAVELENGTH)}
 _BLOCK = 64

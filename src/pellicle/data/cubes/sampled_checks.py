@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.signal_checks import DELTA, HIGHEST, LOWEST, PSI
 from pellicle.errors import DataError
+from pellicle.signals.limits import DELTA, HIGHEST, LOWEST, PSI
 
 WHOLE = 1_000_000
 """Values up to which a cube is checked whole."""

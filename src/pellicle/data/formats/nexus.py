@@ -16,11 +16,11 @@ import numpy as np
 
 from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
-from pellicle.data.mueller import ELEMENTS
 from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
+from pellicle.signals.mueller import ELEMENTS
 
 _MEASURED = "measured_data"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}

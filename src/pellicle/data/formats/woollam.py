@@ -3,7 +3,7 @@
 Lines of heading (a title, `VASEmethod[...]`, `Original[...]`, `Dynamic`), a line with the unit of the axis
 (`nm`, `Angstroms`, `eV`, `1/cm`), then rows of wavelength, angle of incidence, values and usually their
 errors. A label before a row names its quantity: `E` or none is Ψ and Δ, `dpolE` the depolarisation in
-percent, `AnE`, `Aps` and `Asp` generalised Ψ and Δ (`data.generalised`), `mm12` an element of a normalised
+percent, `AnE`, `Aps` and `Asp` generalised Ψ and Δ (`signals.generalised`), `mm12` an element of a normalised
 Mueller matrix, `pR`, `sR`, `uR`, `pT`, `sT`, `uT` a reflectance
 or transmittance of p, s or unpolarised light. Rows of dynamic data end with their time in minutes. The layout
 is that of files of both programs.

@@ -10,12 +10,12 @@ import numpy as np
 
 from pellicle.data.repeated_sweeps import are_sweeps, one_way, sweep_numbers
 from pellicle.data.settings import setting_numbers
-from pellicle.data.signal_checks import refuse_first
 from pellicle.data.tabular.column_selection import AxisColumns, SpectrumColumns
 from pellicle.data.tabular.columns import Column, unknown_unit
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import refuse_first
 
 SHORTEST_ASSUMED = 30.0
 """An axis below this (nm) whose unit is not stated is more likely in µm or eV."""

@@ -43,7 +43,7 @@ def comparison(spectra: Sequence[Target], ranked: RankedMinima) -> Comparison | 
     views = ranked.problem.views
     spectral = [i for i, view in enumerate(views) if isinstance(view, SpectrumView)]
     dependent = [i for i in spectral if views[i].plan.on("back-face")]
-    dependent = [i for i in dependent if views[i].of_power] or dependent
+    dependent = [i for i in dependent if not views[i].signal.ellipsometric] or dependent
     backs = [spectra[i].scene.substrate for i in dependent]
     if not dependent or any(
         free_leaves((plate.back, plate.plate_mm, plate.back_collected)) for plate in backs

@@ -224,7 +224,7 @@ class ColoursView:
             return 0.0
         at = np.asarray(values)[None]
         planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
-        return largest_difference(planned, whole, self.plan.signal)
+        return largest_difference(planned, whole, self.plan.degrees)
 
     def encoded(self, linear: Any) -> np.ndarray:
         """Linear channels (..., 3) in the space of the data."""

@@ -23,7 +23,11 @@ def unexplained(
     the scene has none."""
     sentences = []
     for spectrum, measured, view in zip(data, spectra, views, strict=True):
-        if not isinstance(spectrum, Spectrum) or spectrum.depolarisation is None or view.depolarisation:
+        if (
+            not isinstance(spectrum, Spectrum)
+            or spectrum.depolarisation is None
+            or view.signal.depolarisation
+        ):
             continue
         if spectrum.depolarisation_sigma is None:
             parts = [local_noise(spectrum.depolarisation[rows]) for rows in view.sweeps()]

@@ -69,7 +69,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
                 view.correlation_length,
                 DRIFT_CORRELATION if view.noise.drifting else 1.0,
                 0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
-                _signals(view) if view.ratios else (),
+                _signals(view) if view.signal.degrees and view.signal.parts else (),
             )
         )
     return result

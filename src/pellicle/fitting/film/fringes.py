@@ -71,7 +71,7 @@ def phase_per_thickness(
     layers = [x for x in scene.layers if isinstance(x, Layer)]
     if (
         isinstance(view, ColoursView)
-        or not view.of_power
+        or view.signal.ellipsometric
         or len(layers) < len(scene.layers)
         or np.ptp(angle[rows]) > 0
         or view.rows < 16

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from pellicle.data.colours import Colours
-from pellicle.data.folded_delta import can_be_folded
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.result import Fit, Status
+from pellicle.signals.folded_delta import can_be_folded
 
 _NO_FIT = (Status.FAILED, Status.NOT_CONVERGED, Status.MISFIT)
 _LARGE = 3.0

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.colours import Colours
-from pellicle.data.ellipsometry_angles import psi_delta
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.curves import ColourCurve, Curve, Deferred
@@ -63,7 +62,7 @@ def together(parts: tuple[Part, ...]) -> float | None:
     if len(parts) == 1:
         return parts[0].rms
     spectra = [part.data for part in parts if isinstance(part.data, Spectrum)]
-    units = {spectrum.signal if spectrum.ellipsometric else "power" for spectrum in spectra}
+    units = {"power" if spectrum.kind.has_scale else spectrum.signal for spectrum in spectra}
     if len(spectra) < len(parts) or len(units) > 1 or not all(spectrum.calibrated for spectrum in spectra):
         return None
     sizes = [part.spectral.wavelength.size for part in parts]
@@ -108,7 +107,7 @@ def with_curves(
 def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
     if isinstance(view, ColoursView):
         return colours_accuracy(view, part.sigma)
-    if not view.of_power:
+    if view.signal.ellipsometric:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
         return Accuracy(largest=LARGEST_ANGLES)
     if view.noise.drifting:
@@ -125,29 +124,17 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
     wavelength = np.asarray(view.scene.light.wavelength)[:rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
-    sigma, angles = 1 / (weight if view.elements else weight[:, 0]), {}
+    arrays = view.signal.curves(data, model, weight)
     if spectrum.depolarisation is not None:
         # a scene without depolarisation has none at any wavelength
-        share = np.zeros(rows) if view.depolarisation is None else model[:, -1]
-        angles = {"depolarisation_data": spectrum.depolarisation, "depolarisation_model": share}
-    if view.depolarisation is not None:
-        data, model = data[:, :-1], model[:, :-1]
-    if view.ratios:
-        sigma = 1 / weight[:, [2 * i for i in range(len(view.ratios))]]
-        data, model = (x.reshape(rows, -1, 3) for x in (data, model))
-    if spectrum.delta is not None:
-        (data, delta_data), (model, delta_model) = psi_delta(data), psi_delta(model)
-        sigma = np.rad2deg(sigma) / 2
-        angles |= {"delta_data": delta_data, "delta_model": delta_model}
+        arrays["depolarisation_data"] = spectrum.depolarisation
+        arrays.setdefault("depolarisation_model", np.zeros(rows))
     return Curve(
         wavelength=wavelength,
-        data=data if view.elements or view.ratios else np.ravel(data),
-        sigma=sigma,
-        model=model if view.elements or view.ratios else np.ravel(model),
         n=n,
         k=k,
         n_stderr=n_stderr,
         k_stderr=k_stderr,
         principal=principal_indices(view.scene, at, covariance, wavelength),
-        **angles,
+        **arrays,
     )

@@ -97,9 +97,7 @@ def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> Spect
         spectrum.noise,
         points * channels,
         steepest,
-        spectrum.depolarisation,
-        spectrum.elements,
-        spectrum.ratios,
+        spectrum.signal,
     )
 
 

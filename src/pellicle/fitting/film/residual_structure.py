@@ -108,4 +108,6 @@ def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
         return None
     stretches.sort(reverse=True)
     spans = tuple(dict.fromkeys(span for _, span, _ in stretches))
-    return Missed(spans, stretches[0][2] if view.of_power else None, covered > _EVERYWHERE * residuals.size)
+    return Missed(
+        spans, None if view.signal.ellipsometric else stretches[0][2], covered > _EVERYWHERE * residuals.size
+    )

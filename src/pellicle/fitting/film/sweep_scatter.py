@@ -76,7 +76,7 @@ def _steps(
             result.append((np.zeros((0, len(gain))), np.zeros(len(gain))))
             continue
         apart = deviations(spectrum.sweeps)
-        if view.depolarisation is not None:
+        if view.signal.depolarisation:
             own = np.stack([sweep.depolarisation for sweep in spectrum.sweeps])  # type: ignore[misc]
             apart = np.concatenate([apart, (own - own.mean(axis=0))[..., None]], axis=2)
         if view.data.frame is not None:

@@ -8,10 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.data.generalised import RATIOS
-from pellicle.data.mueller import ELEMENTS
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
-from pellicle.fitting.film import generalised
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.extended_scene import ExtendedScene, Number, extended
 from pellicle.fitting.film.form import Local
@@ -20,7 +17,7 @@ from pellicle.optics.orders import FWHM
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
 from pellicle.scene.instrument import Drift
-from pellicle.scene.layers import Layer, Uncertainty
+from pellicle.scene.layers import Layer
 
 _STEP = 1e-2
 """Finite step of a linear effect, in standard uncertainties: on a thick film a whole one is not linear."""
@@ -66,7 +63,7 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
     result = []
     for row, weights, own in simulated_effects(view, values, scene):
         change = change_of_data(view, at, weights @ own)
-        if view.depolarisation is not None:
+        if view.signal.depolarisation:
             change[:, -1] = _depolarising(view, at, own, weights)
         result.append(row.effect(change))
     return named_for([*result, *effects_on_signal(view, at, scene)], view.name)
@@ -74,7 +71,10 @@ def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene:
 
 def change_of_data(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
     """Change of the data (..., rows, measured channels) by a change of the signal (..., data values)."""
-    return _on_sphere(view, at, _columns(view, np.asarray(at.gain) * change))
+    columns = view.in_columns(at.signal)
+    return view.signal.along(
+        columns, _columns(view, np.asarray(at.gain) * change), view.data.frame is not None
+    )
 
 
 def named_for(effects: list[Effect], name: str) -> list[Effect]:
@@ -169,16 +169,14 @@ def simulations_of(
 def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
     """Effects that act on the signal alone; leading axes of `at` are those of the changes too."""
     allowed, signal = scene.uncertainty, np.asarray(at.signal)
-    if view.elements:
-        return _of_elements(view, signal, allowed)
-    if view.ratios:
-        each, names = _spheres(view, signal), [RATIOS[i] for i in view.ratios]
-        offsets = generalised.offsets(names, each[..., : view.rows, :, :], allowed)
-        return [
-            replace(e, change=_in_frame(view, e.change.reshape(*e.change.shape[:-2], -1))) for e in offsets
-        ]
-    if not view.of_power:
-        return _of_angles(view, at, allowed)
+    offsets = view.signal.offsets(view.in_columns(signal), allowed)
+    effects = [
+        Effect(x.name, x.size, x.unit, view.in_channels(x.change), positive=x.positive, shared=False)
+        for x in offsets
+        if x.size
+    ]
+    if not view.signal.has_scale:
+        return effects
     position, curves = np.asarray(view.data.position), []
     if not isinstance(scene.instrument.scale, Drift):
         size, bent = allowed.scale, allowed.scale / 2
@@ -210,114 +208,17 @@ def _lamp_structure(
     return [(f"term {k} of the scale", _LAMP, _LAMP * signal * wave[k] * has[k]) for k in terms]
 
 
-def _of_angles(view: SpectrumView, at: Local, allowed: Uncertainty) -> list[Effect]:
-    """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share.
-
-    An instrument that measures the depolarisation divides it out; its offset counts instead.
-    """
-    n, c, s = np.moveaxis(_sphere(view, at.signal), -1, 0)
-    sine = np.maximum(np.hypot(c, s), 1e-9)
-    psi, delta, share = np.deg2rad(2 * allowed.psi), np.deg2rad(allowed.delta), 1 - allowed.depolarisation
-    third = np.where(s < 0, -1, 1) * np.sqrt(np.maximum(1 - (share * n) ** 2 - (share * c) ** 2, 0.0))
-    less = np.stack([share * n - n, share * c - c, third - s], axis=-1)
-    of_psi = psi * np.stack([-sine, n * c / sine, n * s / sine], axis=-1)
-    of_delta = delta * np.stack([0 * n, -s, c], axis=-1)
-    changes = (
-        ("offset of psi", allowed.psi, "deg", of_psi, False),
-        ("offset of delta", allowed.delta, "deg", of_delta, False),
-        ("depolarisation", 0.0 if view.depolarisation else allowed.depolarisation, "", less, True),
-    )
-    result = []
-    for name, size, unit, change, positive in changes:
-        if size:
-            data = _in_frame(view, change[..., : view.rows, :])
-            result.append(Effect(name, size, unit, data, positive=positive, shared=False))
-    size = allowed.depolarisation
-    if size and view.depolarisation is not None:
-        change = np.zeros((view.rows, view.measured_channels))
-        change[:, -1] = size
-        result.append(Effect("offset of the depolarisation", size, "", change, shared=False))
-    return result
-
-
-def _of_elements(view: SpectrumView, signal: np.ndarray, allowed: Uncertainty) -> list[Effect]:
-    """An offset of each element, and a depolarisation that mixes the phases of s and p: elements of the third
-    and fourth rows and columns lose a share."""
-    columns = signal[: view.points].reshape(view.rows, view.channels)
-    names = [ELEMENTS[i] for i in view.elements]
-    result = []
-    for channel, name in enumerate(names) if allowed.mueller else ():
-        change = np.zeros(columns.shape)
-        change[:, channel] = allowed.mueller
-        result.append(Effect(f"offset of {name}", allowed.mueller, "", change, shared=False))
-    mixed = [allowed.depolarisation * bool({"3", "4"} & set(name[1:])) for name in names]
-    if any(mixed):
-        size = allowed.depolarisation
-        result.append(Effect("depolarisation", size, "", -columns * mixed, positive=True, shared=False))
-    return result
-
-
-def _in_frame(view: SpectrumView, change: np.ndarray) -> np.ndarray:
-    """A change of N, C and S (..., rows, 3), which leaves the depolarisation, as (..., rows, measured
-    channels)."""
-    keep = view.measured_channels
-    if view.depolarisation is not None:
-        change = np.insert(change, 3 if view.channels == 4 else 2, 0.0, axis=-1)
-    if view.data.frame is not None:
-        frame = np.asarray(view.data.frame)[..., : view.rows, :, :]
-        change = np.einsum("...pij,...pj->...pi", frame, change)
-    return change[..., :keep]
-
-
 def _columns(view: SpectrumView, values: np.ndarray) -> np.ndarray:
     """Data values, or a change of them, (..., data values) as (..., rows, measured channels)."""
     columns = values[..., : view.points].reshape(*values.shape[:-1], view.rows, view.channels)
     return columns[..., : view.measured_channels]
 
 
-def _on_sphere(view: SpectrumView, at: Local, change: np.ndarray) -> np.ndarray:
-    """Change of N, C, S without its part outwards: Ψ and Δ do not depend on the degree of polarisation."""
-    if view.elements:
-        return change
-    sphere = view.channels if view.depolarisation is None else view.channels - 1
-    if sphere < 3 or view.data.frame is not None:
-        return change
-    outwards = _sphere(view, at.signal)[..., : view.rows, :]
-    change[..., :3] -= outwards * np.sum(change[..., :3] * outwards, axis=-1, keepdims=True)
-    return change
-
-
-def _depolarising(view: SpectrumView, at: Local, signals: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _depolarising(view: SpectrumView, at: Local, changed: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Change of the depolarisation (rows,) by a weighted sum of signals.
 
     Averaged are N, C, S before they are brought to their sphere: of v = (N, C, S), 1 − v² changes by −2 v dv.
     """
-
-    def polarised(signal: Any) -> np.ndarray:
-        share = np.asarray(signal)[: view.points].reshape(view.rows, -1)[:, view.measured_channels - 1]
-        return _sphere(view, signal)[: view.rows] * np.sqrt(np.maximum(1 - share, 0.0))[:, None]
-
-    change = sum(weight * polarised(signal) for weight, signal in zip(weights, signals, strict=True))
-    return -2 * np.sum(polarised(at.signal) * change, axis=1)
-
-
-def _spheres(view: SpectrumView, signal: Any) -> np.ndarray:
-    """N, C, S of each ratio of a signal (..., data values), (..., wavelengths with padding, ratios, 3)."""
-    signal = np.asarray(signal)
-    columns = signal.reshape(*signal.shape[:-1], -1, view.channels)
-    columns = np.einsum("...pij,...pi->...pj", np.asarray(view.data.frame), columns)
-    return columns.reshape(*columns.shape[:-1], -1, generalised.CHANNELS)
-
-
-def _sphere(view: SpectrumView, signal: Any) -> np.ndarray:
-    """N, C, S of a signal (..., data values), (..., wavelengths with padding, 3)."""
-    signal = np.asarray(signal)
-    columns = signal.reshape(*signal.shape[:-1], -1, view.channels)
-    if view.data.frame is not None:
-        columns = np.einsum("...pij,...pi->...pj", np.asarray(view.data.frame), columns)
-    if view.depolarisation is not None:
-        columns = columns[..., :-1]
-    if columns.shape[-1] == 3:
-        return columns
-    third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=-1, keepdims=True), 0.0))
-    return np.concatenate([columns, third], axis=-1)
+    signal, pairs = view.signal, zip(weights, changed, strict=True)
+    change = sum(weight * signal.polarised(view.in_columns(own)) for weight, own in pairs)
+    return -2 * np.sum(signal.polarised(view.in_columns(at.signal)) * change, axis=1)

@@ -8,49 +8,36 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.data.colours import Colours
-from pellicle.data.ellipsometry_angles import ncs
-from pellicle.data.generalised import RATIOS
-from pellicle.data.mueller import ELEMENTS
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
-from pellicle.fitting.film import generalised
 from pellicle.fitting.film.colour_targets import MeasuredColours
 from pellicle.fitting.problem import Noise
 from pellicle.forward_model.film_signal import depolarises
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
-
-ROUGH = 0.01
-"""First guess of the noise of N, C, S, of a depolarisation and of Mueller elements."""
+from pellicle.signals.base import Signal
 
 
 class Measured(NamedTuple):
     """Values of one spectrum, and the scene that is to explain them.
 
-    `values` are fractions (points,), or N, C, S (points, 3) for ellipsometry, which have no wrap-around, or N
-    and C alone (points, 2) where Δ is folded; `wavelength` (nm) is (points,), `sigma` too or the shape of
-    `values`; `independent_fraction` is how many independent points each counts for. Where some light is
-    unpolarised and its depolarisation was measured, that follows N, C, S (or N, C), and `depolarisation` is
-    its noise. With a `frame` (points, channels, channels) the values are those of N, C, S and depolarisation
-    in it. Of a Mueller matrix the values are (points, elements), and `elements` their positions among m12,
-    m13, ..., m44. Of generalised Ψ and Δ they are the channels of `fitting.film.generalised`, and `ratios`
-    the positions of the ratios.
+    `values` (points,) or (points, channels) are those of `Signal.channels`; `wavelength` (nm) is (points,),
+    `sigma` too or the shape of `values`; `independent_fraction` is how many independent points each counts
+    for. With a `frame` (points, channels, channels) the values are components in it.
     """
 
     scene: Scene
     wavelength: np.ndarray
     values: np.ndarray
     sigma: np.ndarray
+    signal: Signal
     independent_fraction: float = 1.0
     noise: Noise = Noise()
     name: str = ""  # that of one among several
     frame: np.ndarray | None = None
-    depolarisation: Noise | None = None
-    elements: tuple[int, ...] = ()
-    ratios: tuple[int, ...] = ()
 
 
 Target: TypeAlias = Measured | MeasuredColours
@@ -69,76 +56,10 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
-    values, sigma, frame = data.values, _sigma(data, source), None
-    depolarisation = None
-    if data.ratios:
-        frames, spread = ratio_directions(data)
-        outwards = np.broadcast_to([0.0, 0.0, 1.0], spread.shape)
-        values, sigma = generalised.in_directions(outwards), generalised.in_directions(spread)
-        frame = generalised.block_frame(frames)
-        known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
-        return Measured(*known, ratios=tuple(RATIOS.index(ratio) for ratio in data.ratios))
-    if data.delta is not None:
-        values = ncs(data.values, data.delta)[:, : 2 if data.folded else 3]
-    if data.depolarisation is not None and depolarises(exact(scene)):
-        depolarisation = Noise(data.depolarisation_sigma is not None)
-    if data.delta is not None and data.sigma is not None and not data.folded:
-        frame = sphere_frame(data.values, data.delta)
-        values = np.einsum("pij,pj->pi", frame, values)
-    if depolarisation is not None and data.depolarisation is not None:
-        # the last of what is measured: before the direction outwards
-        at = values.shape[1] if frame is None else values.shape[1] - 1
-        own = ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
-        sigma = np.broadcast_to(np.reshape(sigma, (len(data), -1)), values.shape)
-        values = np.insert(values, at, data.depolarisation, axis=1)
-        sigma = np.insert(sigma, at, own, axis=1)
-        if frame is not None:
-            frame = np.insert(np.insert(frame, at, 0.0, axis=1), 3, 0.0, axis=2)
-            frame[:, at, 3] = 1.0
-    known = scene, data.wavelength, values, sigma, independent_fraction, source, name, frame
-    return Measured(*known, depolarisation, tuple(ELEMENTS.index(name) for name in data.elements))
-
-
-def ratio_directions(data: Spectrum) -> tuple[np.ndarray, np.ndarray]:
-    """Directions of each ratio of generalised Ψ and Δ, (points, ratios, 3, 3), and σ of N, C, S in them,
-    (points, ratios, 3): see `generalised.upright`."""
-    assert data.delta is not None
-    sigma = np.full((*data.values.shape, 3), ROUGH)
-    if data.sigma is not None and data.delta_sigma is not None:
-        sigma = sphere_sigma(data.values, data.delta, data.sigma, data.delta_sigma)
-    return generalised.upright(sphere_frame(data.values, data.delta), sigma, data.values, data.delta)
-
-
-def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
-    """Directions of N, C, S along Ψ, along Δ and outwards, (..., 3, 3), at Ψ and Δ in degrees (...).
-
-    In them the measured point is (0, 0, 1), and errors of Ψ and of Δ are errors of one component each.
-    """
-    outwards = ncs(psi, delta)
-    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
-    zero = np.zeros_like(psi)
-    along = np.stack([-np.sin(psi), np.cos(psi) * np.cos(delta), np.cos(psi) * np.sin(delta)], axis=-1)
-    across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=-1)
-    return np.stack([along, across, outwards], axis=-2)
-
-
-def sphere_sigma(
-    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray, folded: bool = False
-) -> np.ndarray:
-    """σ of N, C, S in their `sphere_frame`, (..., 3), of Ψ and Δ and their σ in degrees (...).
-
-    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ
-    across it, of which Ψ's own error leaves something at the poles. Outwards there is no first order: the
-    mean serves. A folded Δ leaves N and C, which share one σ (...): the mean square of what both errors move.
-    An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
-    """
-    psi, delta, psi_sigma, delta_sigma = (np.deg2rad(x) for x in (psi, delta, psi_sigma, delta_sigma))
-    along, sine = 2 * psi_sigma, np.sin(2 * psi)
-    if folded:
-        visible = sine**2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
-        return np.sqrt(0.5 * (visible * along**2 + (sine * delta_sigma * np.sin(delta)) ** 2 + along**4))
-    across = np.hypot(sine, along) * delta_sigma
-    return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=-1)
+    signal = data.kind.seen_in(depolarises(exact(scene)))
+    values, sigma, frame = signal.channels(data, _guess(data, source))
+    known = values, sigma, signal, independent_fraction, source, name, frame
+    return Measured(scene, data.wavelength, *known)
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:
@@ -164,7 +85,8 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
         angle = float(data.angle[0]) if np.ptp(data.angle) == 0 else data.angle
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
-    light = Light(data.wavelength, angle, data.signal, polarisation, _azimuth(scene, data))
+    transmission = data.transmission or (data.signal == scene.light.signal and scene.light.transmission)
+    light = Light(data.wavelength, angle, data.signal, polarisation, _azimuth(scene, data), transmission)
     return eqx.tree_at(lambda s: s.light, scene, light)
 
 
@@ -227,16 +149,11 @@ def _check(data: Spectrum, scene: Scene) -> None:
         )
 
 
-def _sigma(data: Spectrum, source: Noise) -> np.ndarray:
-    """σ of each point: the data's, the model's own error, or a guess that the residuals will replace."""
-    if data.sigma is None and data.ellipsometric:
-        return np.full(len(data), ROUGH)
-    if data.sigma is None and source.drifting:
+def _guess(data: Spectrum, source: Noise) -> np.ndarray | None:
+    """σ of each point where the data have none: the model's own error, or one for residuals to replace."""
+    if data.sigma is not None or data.ellipsometric:
+        return None
+    if source.drifting:
         return noise.drifting_sigma(data.values)
-    if data.sigma is None:
-        guess = max(0.01 * np.ptp(data.values), np.median(noise.local_noise(data.values)), 1e-12)
-        return np.full(len(data), float(guess))
-    if data.delta is None:
-        return data.sigma
-    delta_sigma = data.sigma if data.delta_sigma is None else data.delta_sigma
-    return sphere_sigma(data.values, data.delta, data.sigma, delta_sigma, bool(data.folded))
+    guess = max(0.01 * np.ptp(data.values), np.median(noise.local_noise(data.values)), 1e-12)
+    return np.full(len(data), float(guess))

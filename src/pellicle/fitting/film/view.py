@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.film import generalised, nuisance
+from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm, local
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
@@ -20,6 +20,7 @@ from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
+from pellicle.signals.base import Signal
 
 ROUND = 64
 """Spectra are padded to a multiple of this, so that files of nearly one length share a program."""
@@ -33,9 +34,7 @@ class SpectrumView:
     """One spectrum of a problem.
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
-    the problem. `data` is padded to a round length. `depolarisation` is the noise of a measured one, where
-    that is a channel, `elements` and `ratios` the positions of elements of a Mueller matrix and of ratios, as
-    in `SpectrumForm`.
+    the problem. `data` is padded to a round length. `signal` is what was measured, as in `SpectrumForm`.
     """
 
     name: str  # empty where there is no other
@@ -44,21 +43,13 @@ class SpectrumView:
     data: Data
     takes: tuple[int, ...]
     noise: Noise
-    points: int  # data values: N, C, S, or N and C, and depolarisation, or elements, for each wavelength
+    points: int  # data values: all channels of each wavelength
     largest_index: float
-    depolarisation: Noise | None = None
-    elements: tuple[int, ...] = ()
-    ratios: tuple[int, ...] = ()
+    signal: Signal
 
     @property
     def form(self) -> SpectrumForm:
-        own = self.depolarisation is not None, self.elements, self.ratios
-        return SpectrumForm(self.plan.static_key, *own)
-
-    @property
-    def of_power(self) -> bool:
-        """True for R and T, which have a scale, an offset and fringes; False for ellipsometry."""
-        return not self.plan.ellipsometric
+        return SpectrumForm(self.plan.static_key, self.signal)
 
     @property
     def arrays(self) -> tuple[Scene, Data]:
@@ -77,7 +68,7 @@ class SpectrumView:
     @property
     def measured_channels(self) -> int:
         """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
-        return self.channels if self.data.frame is None else self.channels - max(len(self.ratios), 1)
+        return self.channels if self.data.frame is None else self.channels - self.signal.outwards
 
     @property
     def independent(self) -> int:
@@ -86,20 +77,14 @@ class SpectrumView:
 
     @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
-        """The channels of the signal, and that of the depolarisation; elements of a matrix and ratios one by
-        one."""
-        every = tuple(range(self.channels))
-        if self.ratios:
-            return generalised.noise_groups(len(self.ratios), self.noise.known, self.rows)
-        if self.elements:
-            return tuple(NoiseGroup((channel,), self.noise.known, self.rows) for channel in every)
-        if self.depolarisation is None:
-            return (NoiseGroup(every, self.noise.known, min(self.channels, 2) * self.rows),)
-        own = self.measured_channels - 1
-        others = tuple(channel for channel in every if channel != own)
-        return (
-            NoiseGroup(others, self.noise.known, 2 * self.rows),
-            NoiseGroup((own,), self.depolarisation.known, self.rows),
+        """The channels of each noise."""
+        return tuple(
+            NoiseGroup(
+                group.channels,
+                self.noise.known if group.known is None else group.known,
+                group.independent * self.rows,
+            )
+            for group in self.signal.groups(self.channels, self.data.frame is not None)
         )
 
     @property
@@ -207,23 +192,25 @@ class SpectrumView:
             return 0.0
         at = np.asarray(values)[None]
         planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
-        return largest_difference(planned, whole, self.plan.signal)
+        return largest_difference(planned, whole, self.signal.degrees)
 
     def in_columns(self, values: Any) -> np.ndarray:
-        """Data values or a model of them (..., data values) as signals, or as N, C and S, without padding,
-        (..., rows, channels). A depolarisation is the last channel."""
+        """Data values or a model of them (..., data values) as columns of the signal, such as N, C and S,
+        without padding, (..., rows, columns). A depolarisation is the last."""
         values = np.asarray(values)[..., : self.points]
         columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
         if self.data.frame is None:
             return columns
-        return np.einsum("pij,...pi->...pj", np.asarray(self.data.frame)[: self.rows], columns)
+        return np.einsum("...pij,...pi->...pj", np.asarray(self.data.frame)[..., : self.rows, :, :], columns)
+
+    def in_channels(self, change: np.ndarray) -> np.ndarray:
+        """A change of the columns (..., rows, columns) as (..., rows, measured channels)."""
+        if self.data.frame is not None:
+            frame = np.asarray(self.data.frame)[..., : self.rows, :, :]
+            change = np.einsum("...pij,...pj->...pi", frame, change)
+        return change[..., : self.measured_channels]
 
     def rms(self, model: Any) -> float:
         """rms of the residuals. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere, in each
         of its two directions."""
-        if self.channels == 1 or self.elements:
-            return float(np.sqrt(np.mean((self.data.values - np.asarray(model))[: self.points] ** 2)))
-        residual = self.in_columns(self.data.values - np.asarray(model))
-        residual = residual if self.depolarisation is None else residual[:, :-1]
-        directions = 2 * self.rows * max(len(self.ratios), 1)
-        return float(np.rad2deg(np.sqrt(np.sum(residual**2) / directions)) / 2)
+        return self.signal.rms(self.in_columns(self.data.values - np.asarray(model)))

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pellicle.data.ellipsometry_angles import ncs
 from pellicle.fitting import noise
-from pellicle.fitting.film.targets import ROUGH, sphere_frame, sphere_sigma
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.robust_losses import MAD_TO_SIGMA, median
 from pellicle.mapping.pixels.minima import PixelData
+from pellicle.signals.sphere import ROUGH, ncs, sphere_frame, sphere_sigma
 
 _TO_NORMAL = MAD_TO_SIGMA / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.data.signal_checks import FOLDED_DELTA, ROUNDING
+from pellicle.signals.limits import FOLDED_DELTA, ROUNDING
 
 _HALF_WIDTHS = (4, 5, 6, 8, 11, 15, 20, 28, 40)
 """Points on each side of a kink to which cubic polynomials are fitted."""

@@ -28,8 +28,6 @@ ROUNDING = 1e-3
 Where = Callable[[int], str]
 """The place of a row for a message: file, line and column."""
 
-_NOUNS = {"R": "reflectance", "T": "transmittance"}
-
 
 def refuse_first(values: np.ndarray, wrong: np.ndarray, where: Where, reason: str) -> None:
     """Raise DataError for the first wrong value: its place, the value, the reason."""
@@ -47,20 +45,20 @@ def check_noise(noise: float | None) -> None:
 
 
 def check_power(
-    signal: str, values: np.ndarray, sigma: np.ndarray | None, where: Where, *, too_high: str, remedy: str
+    noun: str, values: np.ndarray, sigma: np.ndarray | None, where: Where, *, too_high: str, remedy: str
 ) -> None:
-    """Refuse what no sample reflects or transmits. Raises DataError.
+    """Refuse what no sample reflects or transmits; `noun` names it. Raises DataError.
 
     Values are at most 1.5 and at least -0.05, or with σ at least −5 σ or -0.01, whichever is lower: an offset
     of the dark current reaches that. `too_high` and `remedy` are the advice for too high and too low values.
     """
     if values.max() > HIGHEST:
         high = values == values.max()
-        refuse_first(values, high, where, f"is above {HIGHEST} for a {_NOUNS[signal]}; {too_high}")
+        refuse_first(values, high, where, f"is above {HIGHEST} for a {noun}; {too_high}")
     limit = np.full(values.shape, LOWEST) if sigma is None else np.minimum(LOWEST_WITH_SIGMA, -5 * sigma)
     lowest = int(np.argmin(values - limit))
     if values[lowest] < limit[lowest]:
-        reason = f"is a {_NOUNS[signal]} below zero by more than noise ({limit[lowest]:g}); {remedy}"
+        reason = f"is a {noun} below zero by more than noise ({limit[lowest]:g}); {remedy}"
         refuse_first(values, np.arange(values.size) == lowest, where, reason)
 
 

@@ -1,0 +1,282 @@
+"""Generalised Ψ and Δ: three ratios of the elements of a Jones matrix, of samples that turn p into s.
+
+With r_ab the amplitude of the reflected b for incident a, as in files of J. A. Woollam:
+
+- AnE: r_pp/r_ss,
+- Aps: r_ps/r_pp, s over p of the light that is reflected where p is incident,
+- Asp: r_sp/r_ss, p over s of the light that is reflected where s is incident.
+
+`pellicle.jones` has the indices in the other order: its r_sp, row s and column p, is r_ps here. Each ratio
+is tan Ψ exp(iΔ), with the sign of Δ of `pellicle.ellipsometry`. Of a sample that does not mix s and p, Aps
+and Asp are 0.
+
+In a fit each ratio is a point N, C, S on a sphere of its own. The channels are directions on it: two of each
+ratio, and behind these the direction outwards of each, in which nothing is measured.
+
+Source: M. Schubert, Phys. Rev. B 53, 4265 (1996), for the ratios and the order of the indices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, final
+
+import numpy as np
+from jaxtyping import Float
+
+from pellicle.errors import UsageError
+from pellicle.signals.base import (
+    Arrays,
+    ChannelGroup,
+    Channels,
+    Offset,
+    Place,
+    Quantity,
+    Residuals,
+    Signal,
+)
+from pellicle.signals.limits import check_psi_delta
+from pellicle.signals.sphere import (
+    ROUGH,
+    angle_changes,
+    ncs,
+    psi_delta,
+    rms_of_psi,
+    scattered,
+    sphere_frame,
+    sphere_sigma,
+)
+
+RATIOS = ("ane", "aps", "asp")
+FORMULAS = {"ane": "r_pp/r_ss", "aps": "r_ps/r_pp", "asp": "r_sp/r_ss"}
+"""Ratios in Woollam's indices, the first of them incident."""
+CHANNELS = 3
+"""N, C and S."""
+_ALIKE = 1.5
+"""Largest ratio of errors that are alike."""
+_POLE = 4.0
+"""Standard deviations of Ψ from 0 or 90 degrees within which Δ is mostly noise."""
+
+
+@final
+@dataclass(frozen=True)
+class Generalised(Signal):
+    """Ψ and Δ of the ratios `parts`, all by default. Raises UsageError for unknown and repeated ones."""
+
+    word: ClassVar[str] = "generalised-psi-delta"
+    title: ClassVar[str] = "generalised ellipsometry, psi and delta of ratios"
+    noun: ClassVar[str] = "generalised psi and delta"
+    simulated: ClassVar[str] = "Stokes"
+    ordinate: ClassVar[str] = "Ψ, Δ (°)"
+    keywords: ClassVar[frozenset[str]] = frozenset({"ratios", "delta", "delta_sigma"})
+    required: ClassVar[frozenset[str]] = frozenset({"ratios", "delta"})
+    degrees: ClassVar[bool] = True
+    parts: tuple[str, ...] = RATIOS
+
+    def __post_init__(self) -> None:
+        for name in self.parts:
+            if name not in RATIOS:
+                raise UsageError(
+                    f"`elements` of generalised psi and delta must be among ane, aps, asp, not {name!r}"
+                )
+        if len(set(self.parts)) < len(self.parts):
+            raise UsageError(f"`elements` are repeated: {', '.join(self.parts)}")
+
+    @classmethod
+    def of(cls, data: Any) -> Generalised:
+        return Generalised(tuple(data.ratios))
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        each = (("psi", "Ψ", "values"), ("delta", "Δ", "delta"))
+        return tuple(
+            Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i)
+            for i, name in enumerate(self.parts)
+            for angle, sign, array in each
+        )
+
+    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+        assert data.delta is not None
+        for name, psi, delta in zip(self.parts, data.values.T, data.delta.T, strict=True):
+            places = place(f"`{name} values`"), place(f"`{name} delta`")
+            check_psi_delta(psi, delta, False, *places, remedy)
+
+    @property
+    def words(self) -> dict[str, Any]:
+        return {"ratios": self.parts}
+
+    def errors(self, values: np.ndarray, noise: float) -> dict[str, np.ndarray]:
+        """One error along Ψ and across it."""
+        sigma = np.full(values.shape, float(noise))
+        return {"sigma": sigma, "delta_sigma": delta_sigma(values, sigma)}
+
+    @property
+    def independent(self) -> int:
+        return 2 * len(self.parts)
+
+    def coordinates(self, data: Arrays) -> np.ndarray:
+        assert data.delta is not None
+        return ncs(data.values, data.delta).reshape(len(data), -1)
+
+    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
+        values, delta = psi_delta(coordinates.reshape(len(coordinates), -1, CHANNELS))
+        return {"values": values, "delta": delta}
+
+    def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
+        from pellicle.signals import waves
+
+        if len(rows) > CHANNELS:
+            return waves.angles_of_sums(waves.ratio_sums_of_mueller(waves.isotropic_matrix(*rows)))
+        return waves.without_mixing(rows)
+
+    def of_jones(self, jones: Any) -> list[Any]:
+        from pellicle.signals import waves
+
+        # Woollam's r_ps is the element in row s and column p
+        pairs = (jones.pp, jones.ss), (jones.sp, jones.pp), (jones.ps, jones.ss)
+        return [part for pair in pairs for part in waves.stokes_of_jones(*pair)]
+
+    def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
+        from pellicle.signals import waves
+
+        return waves.ratio_sums_of_mueller(matrix)
+
+    def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
+        from pellicle.signals import waves
+
+        return waves.angles_of_sums(sums)
+
+    def drawn(self, rows: Any) -> Any:
+        from pellicle.signals import waves
+
+        return waves.drawn_angles(rows, False)
+
+    def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        from pellicle.signals import waves
+
+        sphere = rows.reshape(len(rows), -1, CHANNELS)
+        keep = [RATIOS.index(name) for name in self.parts]
+        noisy, clean = (
+            waves.angles(own)[:, keep].reshape(len(rows), -1)
+            for own in (scattered(sphere, noise, seed), sphere)
+        )
+        return noisy, clean
+
+    def chosen(self, parts: Sequence[str]) -> Generalised:
+        return replace(self, parts=tuple(parts))
+
+    def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:
+        frames, spread = self._directions(data)
+        outwards = np.broadcast_to([0.0, 0.0, 1.0], spread.shape)
+        return Channels(_in_directions(outwards), _in_directions(spread), block_frame(frames))
+
+    def _directions(self, data: Arrays) -> tuple[np.ndarray, np.ndarray]:
+        """Directions of each ratio, (points, ratios, 3, 3), and σ of N, C, S in them, (points, ratios, 3)."""
+        assert data.delta is not None
+        sigma = np.full((*data.values.shape, 3), ROUGH)
+        if data.sigma is not None and data.delta_sigma is not None:
+            sigma = sphere_sigma(data.values, data.delta, data.sigma, data.delta_sigma)
+        return upright(sphere_frame(data.values, data.delta), sigma, data.values, data.delta)
+
+    def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
+        """N, C, S of the measured ratios, each brought to its sphere, in the frame of the data."""
+        from pellicle.signals import waves
+
+        positions = [CHANNELS * RATIOS.index(name) + i for name in self.parts for i in range(CHANNELS)]
+        rows = waves.columns(rows, positions)
+        rows = waves.on_spheres(rows) if depolarises else rows
+        return waves.in_frame(frame, rows).reshape(-1)
+
+    def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
+        ratios = len(self.parts)
+        return tuple(ChannelGroup((2 * i, 2 * i + 1, 2 * ratios + i), 2) for i in range(ratios))
+
+    @property
+    def outwards(self) -> int:
+        return len(self.parts)
+
+    def rms(self, residual: np.ndarray) -> float:
+        return rms_of_psi(residual, 2 * len(residual) * len(self.parts))
+
+    def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
+        """Offsets of Ψ and of Δ of each ratio."""
+        spheres = columns.reshape(*columns.shape[:-1], -1, CHANNELS)
+        both = angle_changes(spheres, allowed.psi, allowed.delta)
+        result = []
+        for i, name in enumerate(self.parts):
+            for angle, size, every in zip(("psi", "delta"), (allowed.psi, allowed.delta), both, strict=True):
+                change = np.zeros(spheres.shape)
+                change[..., i, :] = every[..., i, :]
+                result.append(
+                    Offset(f"offset of {angle} of {name}", size, "deg", change.reshape(columns.shape))
+                )
+        return result
+
+    def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
+        sigma = 1 / weight[:, [2 * i for i in range(len(self.parts))]]
+        (psi, delta), (psi_model, delta_model) = (
+            psi_delta(own.reshape(len(own), -1, CHANNELS)) for own in (data, model)
+        )
+        result = {"data": psi, "model": psi_model, "delta_data": delta, "delta_model": delta_model}
+        return result | {"sigma": np.rad2deg(sigma) / 2}
+
+    def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
+        frames, spread = self._directions(data)
+        apart = ncs(curve.data, curve.delta_data) - ncs(curve.model, curve.delta_model)
+        rows = np.einsum("prij,prj->pri", frames, apart)
+        rows = (rows if data.sigma is None else rows / spread)[..., :2]
+        return [Residuals(rows[:, i], known, 2 * len(rows)) for i in range(len(self.parts))]
+
+
+def delta_sigma(
+    psi: Float[np.ndarray, "*points"], psi_sigma: Float[np.ndarray, "*points"] | float
+) -> Float[np.ndarray, "*points"]:
+    """Return the σ of Δ where a ratio has the same error along Ψ and across it; all in degrees.
+
+    On the sphere of N, C, S a σ of Ψ is 2σ in any direction, and one of Δ moves a point by sin 2Ψ σ_Δ. Where
+    the ratio is 0 or infinite Δ has no meaning, and its σ ends at 1 radian.
+    """
+    along = 2 * np.deg2rad(psi_sigma)
+    return np.rad2deg(along / np.hypot(np.sin(2 * np.deg2rad(psi)), along))
+
+
+def upright(
+    frames: Float[np.ndarray, "points ratios 3 3"],
+    sigma: Float[np.ndarray, "points ratios 3"],
+    psi: Float[np.ndarray, "points ratios"],
+    delta: Float[np.ndarray, "points ratios"],
+) -> tuple[Float[np.ndarray, "points ratios 3 3"], Float[np.ndarray, "points ratios 3"]]:
+    """Return frames along Ψ and Δ, and σ in them, turned so that they do not turn with Δ.
+
+    Where a ratio is nearly 0 its Δ is noise, and the direction along Ψ is that of the noise itself: residuals
+    in it are all of one sign. The directions of C and S have no such sense. Frames are turned where the
+    errors of both directions are alike, or where Ψ is within its noise of 0 or 90 degrees; they share one σ
+    then.
+    """
+    along, across = sigma[..., 0], sigma[..., 1]
+    pole = np.sin(2 * np.deg2rad(psi)) < _POLE * along
+    alike = pole | (np.abs(np.log(across / along)) < np.log(_ALIKE))
+    turn = np.deg2rad(np.where(alike, np.where(psi < 45, delta, -delta), 0.0))[..., None]
+    one, other = frames[..., 0, :], frames[..., 1, :]
+    turned = np.cos(turn) * one - np.sin(turn) * other, np.sin(turn) * one + np.cos(turn) * other
+    shared = np.where(alike[..., None], np.sqrt((along**2 + across**2) / 2)[..., None], sigma)
+    return np.stack([*turned, frames[..., 2, :]], axis=-2), shared
+
+
+def _in_directions(each: Float[np.ndarray, "points ratios 3"]) -> Float[np.ndarray, "points channels"]:
+    """Return the channels, of numbers in two directions and outwards of each ratio."""
+    return np.concatenate([each[..., :2].reshape(len(each), -1), each[..., 2]], axis=1)
+
+
+def block_frame(
+    frames: Float[np.ndarray, "points ratios 3 3"],
+) -> Float[np.ndarray, "points channels channels"]:
+    """Return the frame of all ratios, of the frame of each."""
+    points, count = frames.shape[:2]
+    size = CHANNELS * count
+    whole = np.zeros((points, size, size))
+    for i in range(count):
+        rows = [2 * i, 2 * i + 1, 2 * count + i]
+        whole[:, rows, CHANNELS * i : CHANNELS * (i + 1)] = frames[:, i]
+    return whole

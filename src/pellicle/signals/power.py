@@ -1,0 +1,73 @@
+"""Reflectance, transmittance and raw counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+from pellicle.signals.base import Arrays, Place
+from pellicle.signals.limits import check_power
+from pellicle.signals.one_column import OneColumn
+
+
+@dataclass(frozen=True)
+class _Power(OneColumn):
+    """A power: with fringes, a scale and an offset."""
+
+    has_scale: ClassVar[bool] = True
+
+    @property
+    def label(self) -> str:
+        return self.noun
+
+    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+        if data.calibrated and len(data):
+            too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
+            where = place("`values`")
+            check_power(self.noun, data.values, data.sigma, where, too_high=too_high, remedy=remedy)
+
+
+@final
+@dataclass(frozen=True)
+class Reflectance(_Power):
+    """Reflectance as a fraction."""
+
+    word: ClassVar[str] = "R"
+    title: ClassVar[str] = "reflectance R"
+    noun: ClassVar[str] = "reflectance"
+    simulated: ClassVar[str] = "R"
+    ordinate: ClassVar[str] = "R (fraction)"
+
+
+@final
+@dataclass(frozen=True)
+class Transmittance(_Power):
+    """Transmittance as a fraction."""
+
+    word: ClassVar[str] = "T"
+    title: ClassVar[str] = "transmittance T"
+    noun: ClassVar[str] = "transmittance"
+    simulated: ClassVar[str] = "T"
+    ordinate: ClassVar[str] = "T (fraction)"
+    transmission: ClassVar[bool] = True
+
+
+@final
+@dataclass(frozen=True)
+class Counts(OneColumn):
+    """Raw counts of a detector, which become a reflectance by a reference."""
+
+    word: ClassVar[str] = "counts"
+    title: ClassVar[str] = "raw counts"
+    noun: ClassVar[str] = "counts"
+    simulated: ClassVar[str] = ""
+    ordinate: ClassVar[str] = "counts"
+    has_scale: ClassVar[bool] = True
+    of_counts: ClassVar[bool] = True
+
+    @property
+    def label(self) -> str:
+        return self.noun
+
+    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+        """Accept any finite count."""

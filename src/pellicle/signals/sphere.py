@@ -1,0 +1,90 @@
+"""Ψ and Δ as points N, C, S of a unit sphere, where they do not wrap around: angles in degrees.
+
+N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ (Jellison and Modine 1990, Appl. Opt. 29, 959).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+ROUGH = 0.01
+"""First guess of the noise of N, C, S, of a depolarisation and of Mueller elements."""
+
+
+def ncs(psi: Float[np.ndarray, "*points"], delta: Float[np.ndarray, "*points"]) -> np.ndarray:
+    """N, C, S (..., 3) of Ψ and Δ: a point on the unit sphere."""
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    return np.stack([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)], axis=-1)
+
+
+def psi_delta(sphere: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ψ and Δ from N, C, S (..., 3), or from N and C (..., 2): then Δ is in 0 to 180."""
+    n, c, *measured = np.moveaxis(sphere, -1, 0)
+    s = measured[0] if measured else np.sqrt(np.maximum(1 - n**2 - c**2, 0.0))
+    return np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360.0
+
+
+def with_third(columns: Float[np.ndarray, "*points channels"]) -> np.ndarray:
+    """N, C, S (..., 3) from these, or from N and C alone with S ≥ 0."""
+    if columns.shape[-1] == 3:
+        return columns
+    third = np.sqrt(np.maximum(1 - np.sum(columns**2, axis=-1, keepdims=True), 0.0))
+    return np.concatenate([columns, third], axis=-1)
+
+
+def sphere_frame(psi: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """Directions of N, C, S along Ψ, along Δ and outwards, (..., 3, 3), at Ψ and Δ (...).
+
+    In them the measured point is (0, 0, 1), and errors of Ψ and of Δ are errors of one component each.
+    """
+    outwards = ncs(psi, delta)
+    psi, delta = 2 * np.deg2rad(psi), np.deg2rad(delta)
+    zero = np.zeros_like(psi)
+    along = np.stack([-np.sin(psi), np.cos(psi) * np.cos(delta), np.cos(psi) * np.sin(delta)], axis=-1)
+    across = np.stack([zero, -np.sin(delta), np.cos(delta)], axis=-1)
+    return np.stack([along, across, outwards], axis=-2)
+
+
+def sphere_sigma(
+    psi: np.ndarray, delta: np.ndarray, psi_sigma: np.ndarray, delta_sigma: np.ndarray, folded: bool = False
+) -> np.ndarray:
+    """σ of N, C, S in their `sphere_frame`, (..., 3), of Ψ and Δ and their σ (...).
+
+    On the sphere of N, C, S an error of Ψ moves a point by 2σ_Ψ along its meridian, one of Δ by sin(2Ψ) σ_Δ
+    across it, of which Ψ's own error leaves something at the poles. Outwards there is no first order: the
+    mean serves. A folded Δ leaves N and C, which share one σ (...): the mean square of what both errors move.
+    An error of Δ at 0 or 180° moves neither to first order; the second order of σ_Ψ keeps σ above zero.
+    """
+    psi, delta, psi_sigma, delta_sigma = (np.deg2rad(x) for x in (psi, delta, psi_sigma, delta_sigma))
+    along, sine = 2 * psi_sigma, np.sin(2 * psi)
+    if folded:
+        visible = sine**2 + (np.cos(2 * psi) * np.cos(delta)) ** 2
+        return np.sqrt(0.5 * (visible * along**2 + (sine * delta_sigma * np.sin(delta)) ** 2 + along**4))
+    across = np.hypot(sine, along) * delta_sigma
+    return np.stack([along, across, np.sqrt(0.5 * (along**2 + across**2))], axis=-1)
+
+
+def angle_changes(
+    sphere: Float[np.ndarray, "*points 3"], psi: float, delta: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of N, C, S (..., 3) by offsets of Ψ and of Δ."""
+    n, c, s = np.moveaxis(sphere, -1, 0)
+    sine = np.maximum(np.hypot(c, s), 1e-9)
+    of_psi = 2 * np.deg2rad(psi) * np.stack([-sine, n * c / sine, n * s / sine], axis=-1)
+    return of_psi, np.deg2rad(delta) * np.stack([0 * n, -s, c], axis=-1)
+
+
+def rms_of_psi(residual: np.ndarray, directions: int) -> float:
+    """rms in degrees of Ψ of residuals on the sphere: half the distance, in each of its directions."""
+    return float(np.rad2deg(np.sqrt(np.sum(residual**2) / directions)) / 2)
+
+
+def scattered(sphere: Float[np.ndarray, "*points 3"], noise: float, seed: int) -> np.ndarray:
+    """N, C, S with noise of 2 · `noise` (degrees of Ψ) in any direction along their sphere."""
+    length = np.linalg.norm(sphere, axis=-1, keepdims=True)
+    points = sphere / np.where(length > 0, length, 1.0)
+    step = 2 * math.radians(noise) * np.random.default_rng(seed).normal(size=points.shape)
+    return points + step - points * np.sum(step * points, axis=-1, keepdims=True)
