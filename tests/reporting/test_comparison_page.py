@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.comparison import compare
-from pellicle.reporting.page.comparison_page import comparison_page
+from pellicle.reporting.comparison import comparison_page
 from tests.reporting.test_page import Page
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.mapping.pixels.results import CODES, STATUSES
-from pellicle.reporting import map_blocks
+from pellicle.reporting import map_panels
 from pellicle.reporting.map_axes import Axis, MapAxes
 from pellicle.reporting.map_figures import figures
 from pellicle.reporting.map_panels import COLOURS, HATCHES, overlay
@@ -109,14 +109,14 @@ def test_coordinates_and_scales():
 def test_uneven_coordinates_are_drawn_where_they_are():
     y, x = np.arange(2.0), np.array([0.0, 1.0, 2.0, 10.0])  # the border of the last two is at 6
     axes = MapAxes("image", Axis("x", "mm", x), Axis("y", "mm", y), None, (2, 4))
-    row = map_blocks.evenly(np.array([[0, 1, 2, 3], [4, 5, 6, 7]]), axes, 1)[0]
+    row = map_panels.evenly(np.array([[0, 1, 2, 3], [4, 5, 6, 7]]), axes, 1)[0]
     centres = -0.5 + (np.arange(row.size) + 0.5) * 14.5 / row.size  # from -0.5 to 14
     assert list(row) == list(np.searchsorted([0.5, 1.5, 6.0], centres))
 
 
 def test_large_maps_are_drawn_by_blocks(monkeypatch):
-    monkeypatch.setattr("pellicle.reporting.map_blocks.MOST_POINTS", 20)
-    monkeypatch.setattr("pellicle.reporting.map_blocks.SLAB", 200)  # several slabs
+    monkeypatch.setattr("pellicle.reporting.map_panels.MOST_POINTS", 20)
+    monkeypatch.setattr("pellicle.reporting.map_panels.SLAB", 200)  # several slabs
     status = image(31, 59)  # blocks of 3, and smaller ones at the end
     status[0:2, 0:3] = CODES["misfit"]  # most of the first block
     status[3, 3] = CODES["misfit"]  # least of another one

@@ -143,7 +143,7 @@ def test_the_keyboard_reads_points_and_zooms(opened, curved):
     for _ in range(3):
         plot.press("ArrowRight")
     said = page.locator("#data-0-reading").inner_text()
-    assert said.startswith("wavelength (nm) 420.00, data ")
+    assert said.startswith("wavelength (nm) 420.00, reflectance ")
     before = page.evaluate("document.getElementById('data-0')._fullLayout.xaxis.range")
     plot.press("+")
     page.wait_for_timeout(300)

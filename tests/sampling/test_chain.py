@@ -16,7 +16,7 @@ import pytest
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.progress import quiet
-from pellicle.reporting.netcdf import write_netcdf
+from pellicle.reporting.posterior import write_netcdf
 from pellicle.sampling.chain import empty
 from pellicle.sampling.density import Target
 from pellicle.sampling.ensemble import run

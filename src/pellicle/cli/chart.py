@@ -81,7 +81,7 @@ def chart(
 
     inverse = None
     if invert is not None:
-        from pellicle.reporting.colour_inverse import invert_chart
+        from pellicle.reporting.colour_figures import invert_chart
 
         inverse = invert_chart(scene, invert, nm, angles[0], layer, **eye, source=Path(recipe).name)
     outside = colour_figures.chart(

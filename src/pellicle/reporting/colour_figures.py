@@ -1,21 +1,26 @@
-"""Interference colour chart of a film."""
+"""Interference colour chart of a film, and its inverse: every thickness of each colour, as CSV."""
 
 from __future__ import annotations
 
+import csv
 import os
+from dataclasses import dataclass
+from importlib.metadata import version
+from io import StringIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pellicle.colour import ColourInverse
+from pellicle.colour.inverse import SIGMA, ColourThickness
 from pellicle.colour.spaces import outside
+from pellicle.files import write_text
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.scene.film import Scene
-from pellicle.simulation.colours import interference_colours
+from pellicle.simulation.colours import colour_table, interference_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from pellicle.reporting.colour_inverse import ChartInverse
 
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""
@@ -79,3 +84,75 @@ def _draw_chart(
         axes.set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
     (others or [strip])[-1].set_xlabel("thickness (nm)")
     return figure
+
+
+COLOURS = 301
+"""Thicknesses, equally spaced, whose colours are inverted."""
+LEAST = 1e-3
+"""Least probability of an order that is listed."""
+_HEADER = ["hex", "red", "green", "blue", "thickness_nm", "stderr_nm", "probability", "delta_e"]
+
+
+@dataclass(frozen=True)
+class ChartInverse:
+    """Colours of a film and every thickness of each of them."""
+
+    source: np.ndarray  # (colours,), nm: where the colours were taken
+    srgb: np.ndarray  # (colours, 3), rounded to 8 bits
+    found: ColourThickness
+
+    @property
+    def admissible(self) -> np.ndarray:
+        """True for orders that are listed, (colours, orders)."""
+        return np.nan_to_num(self.found.probability) >= LEAST
+
+    @property
+    def ambiguous(self) -> float:
+        """Share of the colours with more than one thickness."""
+        return float(np.mean(self.admissible.sum(axis=1) > 1))
+
+
+def invert_chart(
+    scene: Scene,
+    path: str | os.PathLike[str],
+    thickness: tuple[float, float],
+    angle: float,
+    layer: str | None = None,
+    *,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    source: str = "",
+) -> ChartInverse:
+    """Invert the colours of a film at one angle and write them into a CSV file.
+
+    Each row is one thickness of an 8-bit sRGB colour, the most probable first, for noise of 1.5 of 255 and
+    the exposure at which a perfect reflector is white. ΔE is CIE 1976.
+
+    **Arguments:** as for `pellicle.reporting.colour_figures.chart`, with one `angle` (degrees) and the name
+    of the `source` for the header.
+
+    **Raises:** UsageError where the file exists or cannot be written, and as `colour_table` does.
+    """
+    low = max(angle - 1.0, 0.0)  # a table needs a range of angles
+    table = colour_table(scene, thickness, (low, low + 1.0), layer, observer=observer, illuminant=illuminant)
+    nm = np.linspace(*table.thickness, COLOURS)
+    srgb = np.round(255 * np.asarray(table(nm, np.cos(np.deg2rad(angle))).srgb)) / 255
+    inverse = ChartInverse(nm, srgb, ColourInverse.build(table, angle)(srgb, orders=16))
+    text = StringIO()
+    text.write(f"# thicknesses of the sRGB colours of {source} at {angle:g} degrees under {illuminant}\n")
+    text.write(f"# noise {SIGMA:.3g} of each channel, pellicle {version('pellicle')}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_HEADER)
+    written = set()
+    found = inverse.found
+    for row, colour in enumerate(np.round(255 * srgb).astype(int).tolist()):
+        name = "{:02x}{:02x}{:02x}".format(*colour)
+        if name not in written:
+            columns = (found.thickness, found.stderr, found.probability, found.delta_e)
+            for order in np.flatnonzero(inverse.admissible[row]):
+                nm_text, stderr, probability, delta_e = (float(x[row, order]) for x in columns)
+                numbers = [f"{nm_text:.1f}", f"{stderr:.1f}", f"{probability:.4f}", f"{delta_e:.2f}"]
+                writer.writerow([name, *colour, *numbers])
+        written.add(name)
+    write_text(path, text.getvalue())
+    return inverse

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pellicle.reporting import matplotlib_figure
 from pellicle.reporting.cost_text import error_label, time_unit
-from pellicle.reporting.label_placement import Label, place_labels
-from pellicle.reporting.matplotlib_figure import ABOVE, BLUE, GREY, ORANGE, new_figure
+from pellicle.reporting.drawable import Line, Panel, Section, Style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from pellicle.accuracy.cost import Cost
@@ -32,54 +31,47 @@ def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
         solvers = None
     else:
         kinds, solvers = [cost.methods], cost.solvers if cost.solvers and cost.solvers.results else None
-    count = len(kinds) + (solvers is not None)
-    figure = new_figure(8.0, 0.4 + 4.6 * count)
-    panels = np.atleast_1d(figure.subplots(count, 1))
-    labels = [_methods(axes, methods, name) for axes, methods in zip(panels, kinds, strict=False)]
+    sections = [_methods(methods) for methods in kinds]
     if solvers is not None:
-        axes = panels[-1]
-        labels.append(_scatter(axes, solvers.results, solvers.recommended, 1e3))
-        axes.set(xlabel="time of one fit (ms)", ylabel="mean error of the parameters,\nshare of the bounds")
-    figure.draw_without_rendering()  # gives the panels the size in which labels are placed
-    for axes, names in zip(panels, labels, strict=True):
-        place_labels(axes, names)
-    return figure
+        label = "mean error of the parameters,\nshare of the bounds"
+        panel = _panel(solvers.results, solvers.recommended, 1e3, label)
+        sections.append(Section("time of one fit (ms)", [[panel]]))
+    return matplotlib_figure.draw(sections, name)
 
 
-def _methods(axes: Axes, methods: Comparison, name: str) -> list[Label]:
-    """Draw methods of simulation, and return the labels of their points."""
+def _methods(methods: Comparison) -> Section:
+    """Error against time of methods of simulation, and the tolerance."""
     unit, scale = time_unit(methods)
-    labels = _scatter(axes, methods.results, methods.recommended, scale)
-    label = f"{error_label(methods, f'{methods.tolerance:g}')} (tolerance)"
-    axes.axhline(methods.tolerance, color=BLUE, linewidth=0.8, linestyle=":", label=label)
-    axes.legend(**ABOVE, fontsize="x-small")
     which = "mean" if methods.sample == "colour" else "largest"
-    axes.set(
-        xlabel=f"time of one {methods.sample} ({unit})",
-        ylabel=f"{which} {error_label(methods)},\nagainst {methods.reference}",
+    label = f"{which} {error_label(methods)},\nagainst {methods.reference}"
+    tolerance = f"{error_label(methods, f'{methods.tolerance:g}')} (tolerance)", methods.tolerance
+    panel = _panel(methods.results, methods.recommended, scale, label, tolerance)
+    return Section(f"time of one {methods.sample} ({unit})", [[panel]])
+
+
+def _panel(
+    items: Sequence[Any],
+    recommended: str | None,
+    scale: float,
+    label: str,
+    tolerance: tuple[str, float] | None = None,
+) -> Panel:
+    """Numbered points, the Pareto front joined; an error of zero is drawn at the bottom."""
+    shown = sorted((item for item in items if np.isfinite(item.error)), key=lambda item: item.seconds)
+    x = np.array([item.seconds * scale for item in shown])
+    y = np.array([max(item.error, FLOOR) for item in shown])
+    front = np.array([item.pareto for item in shown], dtype=bool)
+    best = np.array([item.name == recommended for item in shown], dtype=bool)
+    lines = [Line(x[front], y[front], "", "fit", width=1.0)]
+    if tolerance is not None:
+        lines.append(Line(x[[0, -1]], np.full(2, tolerance[1]), tolerance[0], "blue", "dotted", 0.8))
+    groups: tuple[tuple[np.ndarray, str, str, Style], ...] = (
+        (front & ~best, "fastest at its accuracy", "fit", "circle"),
+        (~front & ~best, "", "data", "circle"),
+        (best, "recommended", "fit", "diamond"),
     )
-    axes.set_title(name.replace("$", r"\$"), loc="left", fontsize="medium")
-    return labels
-
-
-def _scatter(axes: Axes, items: Sequence[Any], recommended: str | None, scale: float) -> list[Label]:
-    """Draw points, join the Pareto front, and draw an error of zero at the bottom; return their labels."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    points = [(item.seconds * scale, max(item.error, FLOOR)) for item in items]
-    front = sorted(point for point, item in zip(points, items, strict=True) if item.pareto)
-    axes.plot(*zip(*front, strict=True), color=ORANGE, linewidth=1.0, zorder=1)
-    labels = []
-    for point, item in zip(points, items, strict=True):
-        if not np.isfinite(point[1]):
-            continue
-        colour = ORANGE if item.pareto else GREY
-        axes.plot(*point, "D" if item.name == recommended else "o", color=colour, markersize=5)
-        labels.append(Label(item.name, *point, colour))
-    axes.set(xscale="log", yscale="log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.14, y=0.1)
-    axes.grid(alpha=0.2)
-    return labels
+    lines += [Line(x[rows], y[rows], name, colour, style) for rows, name, colour, style in groups]
+    notes = [(*place, str(i)) for i, place in enumerate(zip(x, y, strict=True), start=1)]
+    key = [f"{i}  {item.name}" for i, item in enumerate(shown, start=1)]
+    axes: Any = {"scale": "log", "abscissa": "log", "legend": "above"}
+    return Panel(label, lines, height=4.0, notes=notes, key=key, **axes)

@@ -69,8 +69,8 @@ class Panel:
     A panel without lines and images is empty and shows its title. `legend` is its place, `zero` adds a line
     at 0, `height` is in inches. `scale` "symlog" is linear below `threshold`. `limits` are those of the
     ordinate, `span` those of the abscissa. `ticks` are words at 1, 2, ... of the abscissa, `notes` texts
-    (x, y, text) above points. An `image` (2, n, 3) shows patches of data above those of the fit, with
-    `captions` on these.
+    (x, y, text) above points, which a `key` beside the panel explains. An `image` (2, n, 3) shows patches of
+    data above those of the fit, with `captions` on these.
     """
 
     label: str
@@ -81,6 +81,7 @@ class Panel:
     legend: Place = ""
     zero: bool = False
     scale: Literal["linear", "log", "symlog"] = "linear"
+    abscissa: Literal["linear", "log"] = "linear"
     threshold: float = 1.0
     limits: tuple[float, float] | None = None
     span: tuple[float, float] | None = None
@@ -88,6 +89,7 @@ class Panel:
     notes: Sequence[tuple[float, float, str]] = ()
     image: np.ndarray | None = None
     captions: Sequence[str] = ()
+    key: Sequence[str] = ()
 
     @property
     def empty(self) -> bool:

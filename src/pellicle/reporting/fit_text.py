@@ -10,7 +10,7 @@ from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import budget_text, fitted_colours, parameter_text
+from pellicle.reporting import fitted_colours, parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
 from pellicle.reporting.quantities import weighted_delta
@@ -55,7 +55,7 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
         ("Fit statistics", facts(statistic_rows(fit))),
         ("Parameters", parameter_text.parameters(fit)),
         ("Birefringence: extraordinary less ordinary index", facts(_birefringence(fit))),
-        ("Uncertainty budget", budget_text.budget(fit)),
+        ("Uncertainty budget", parameter_text.budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
         (
             f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",

@@ -56,8 +56,7 @@ def write_fit(
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
     DataError for a full disk.
     """
-    from pellicle.reporting.figures import draw_fit, draw_predictions
-    from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
+    from pellicle.reporting.figures import draw_fit
     from pellicle.reporting.fit_text import report
     from pellicle.reporting.matplotlib_figure import save_figure
     from pellicle.reporting.page.fit_page import fit_page
@@ -69,34 +68,43 @@ def write_fit(
         record[SCENE] = dict(described)
     write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
     write_text(target / REPORT, report(fit, posterior), overwrite=True)
-    write_text(target / "fit.csv", fit_csv(fit), overwrite=True)
+    _write_tables(target, fit)
     if recipe is not None:
         with suppress(UsageError):  # of a scene that no recipe can express
             write_text(target / "recipe.toml", recipe(target), overwrite=True)
-    if fit.layer_test is None:
-        for name, table in nk_csvs(fit).items():
-            write_text(target / name, table, overwrite=True)
-    from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
-
-    if profiles := fitted_profiles(fit):
-        write_text(target / "profile.csv", profile_csv(fit, profiles), overwrite=True)
     save_figure(draw_fit(fit), target / "figure.png", overwrite=True)
-    pictures = {}
-    if posterior is not None:
-        from pellicle.reporting.netcdf import write_netcdf
-        from pellicle.reporting.posterior import corner_figure
-
-        predictions = posterior.predictions()
-        write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)
-        save_figure(corner_figure(posterior), target / "corner.png", overwrite=True, bbox_inches="tight")
-        save_figure(draw_predictions(predictions), target / "predictive.png", overwrite=True)
-        pictures = {name: (target / f"{name}.png").read_bytes() for name in ("corner", "predictive")}
+    pictures = {} if posterior is None else _write_posterior(target, posterior)
     image = (target / "figure.png").read_bytes()
     text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe))
     write_text(target / PAGE, text, overwrite=True)
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
     return target
+
+
+def _write_tables(target: Path, fit: Fit) -> None:
+    """Write fit.csv, n and k of films, and profiles of graded layers."""
+    from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
+    from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
+
+    tables = {"fit.csv": fit_csv(fit)} | (nk_csvs(fit) if fit.layer_test is None else {})
+    if profiles := fitted_profiles(fit):
+        tables["profile.csv"] = profile_csv(fit, profiles)
+    for name, table in tables.items():
+        write_text(target / name, table, overwrite=True)
+
+
+def _write_posterior(target: Path, posterior: Posterior) -> dict[str, bytes]:
+    """Write the draws and the figures of a posterior, and return the PNG images by name."""
+    from pellicle.reporting.figures import draw_predictions
+    from pellicle.reporting.matplotlib_figure import save_figure
+    from pellicle.reporting.posterior import corner_figure, write_netcdf
+
+    predictions = posterior.predictions()
+    write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)
+    save_figure(corner_figure(posterior), target / "corner.png", overwrite=True, bbox_inches="tight")
+    save_figure(draw_predictions(predictions), target / "predictive.png", overwrite=True)
+    return {name: (target / f"{name}.png").read_bytes() for name in ("corner", "predictive")}
 
 
 def chain_file(folder: str | os.PathLike[str]) -> Path:

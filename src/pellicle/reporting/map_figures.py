@@ -13,7 +13,6 @@ import numpy as np
 
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.pixels.results import CODES, NO_DATA
-from pellicle.reporting import map_blocks
 from pellicle.reporting.map_axes import MapAxes
 from pellicle.reporting.map_panels import (
     COLOURS,
@@ -23,6 +22,7 @@ from pellicle.reporting.map_panels import (
     errors_panel,
     hatched,
     histogram_panel,
+    limits,
     paint,
     ratio,
     read,
@@ -212,7 +212,7 @@ def _series(sheet: Sheet, variable: str) -> Figure:
     figure, panels, (curve,) = _page(sheet, 2, len(frames), wide=1, between=0.1, tallest=3.5)
     codes = [sheet.codes(i) for i in frames]
     values = [read(sheet, variable, i, is_decided(own)) for i, own in zip(frames, codes, strict=True)]
-    low, high, extend = map_blocks.limits(np.concatenate([own.ravel() for own in values]))
+    low, high, extend = limits(np.concatenate([own.ravel() for own in values]))
     for i, frame in enumerate(frames):
         drawn = paint(sheet, panels[0, i], values[i], codes[i], VALUES, vmin=low, vmax=high)
         status_panel(sheet, panels[1, i], codes[i], legend=i == len(frames) - 1)

@@ -1,4 +1,7 @@
-"""Panels of the figures of a map: values in colours, hatching by status, statuses, histograms."""
+"""Panels of the figures of a map: values in colours, hatching by status, statuses, histograms.
+
+Pixels of a large map are drawn in blocks.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES
-from pellicle.reporting import map_blocks
 from pellicle.reporting.map_axes import MapAxes
 from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of
 from pellicle.reporting.map_text import share
@@ -64,7 +66,7 @@ class Sheet:
     @property
     def side(self) -> int:
         """Side of the blocks of pixels that are one point of an image."""
-        return map_blocks.block(self.axes)
+        return block(self.axes)
 
     @property
     def frames(self) -> list[int]:
@@ -113,7 +115,7 @@ def _to_scale(axes: MapAxes) -> float | None:
 
 def overlay(codes: np.ndarray) -> np.ndarray:
     """Hatching (height, width, 4) of points that should not be used, transparent elsewhere."""
-    scale = max(round(map_blocks.MOST_POINTS / max(codes.shape)), 1)
+    scale = max(round(MOST_POINTS / max(codes.shape)), 1)
     fine = codes.repeat(scale, axis=0).repeat(scale, axis=1)
     rows, columns = np.ogrid[: fine.shape[0], : fine.shape[1]]
     period, width = 14, 3
@@ -176,7 +178,7 @@ def read(sheet: Sheet, variable: str, frame: int, used: np.ndarray) -> np.ndarra
     """A variable at the used pixels of a frame, reduced to the points of an image; NaN elsewhere."""
     array = sheet.frame(variable, frame)
     if sheet.axes.kind == "image":
-        return map_blocks.block_means(array, used, sheet.side)
+        return block_means(array, used, sheet.side)
     return np.where(used, np.asarray(array, dtype=float), np.nan)
 
 
@@ -184,7 +186,7 @@ def values_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     """Draw the decided values of a variable, with their colour bar."""
     codes = sheet.codes(0)
     values = read(sheet, variable, 0, is_decided(codes))
-    low, high, extend = map_blocks.limits(values)
+    low, high, extend = limits(values)
     drawn = paint(sheet, panel, values, codes, VALUES, vmin=low, vmax=high)
     colour_bar(panel, drawn, sheet.label(variable), extend)
 
@@ -195,7 +197,7 @@ def errors_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
 
     codes = sheet.codes(0)
     values = read(sheet, f"{variable}_stderr", 0, is_decided(codes))
-    low, high, extend = map_blocks.limits(values)
+    low, high, extend = limits(values)
     known = values[values > 0]
     style: dict[str, Any] = {"vmin": low, "vmax": high}
     if known.size and np.percentile(known, 98) > WIDE * np.percentile(known, 2):
@@ -219,10 +221,10 @@ def paint(
             "interpolation": "nearest",
             "origin": "upper",
         }
-        drawn = panel.imshow(map_blocks.evenly(values, axes, sheet.side), cmap=cmap, **place, **style)
+        drawn = panel.imshow(evenly(values, axes, sheet.side), cmap=cmap, **place, **style)
         if codes is not None:
-            reduced = map_blocks.block_codes(codes, sheet.side)
-            layer = overlay(map_blocks.evenly(reduced, axes, sheet.side))
+            reduced = block_codes(codes, sheet.side)
+            layer = overlay(evenly(reduced, axes, sheet.side))
             panel.imshow(layer, **{**place, "interpolation": "antialiased"})
     label_axes(panel, axes)
     return drawn
@@ -263,7 +265,7 @@ def status_panel(sheet: Sheet, panel: Axes, codes: np.ndarray, legend: bool) -> 
 
     colours = ListedColormap([COLOURS[word] for word in STATUSES])
     style = {"vmin": -0.5, "vmax": len(STATUSES) - 0.5}
-    shown = map_blocks.block_codes(codes, sheet.side) if sheet.axes.kind == "image" else codes
+    shown = block_codes(codes, sheet.side) if sheet.axes.kind == "image" else codes
     paint(sheet, panel, shown.astype(float), None, colours, **style)
     if not legend:
         return
@@ -300,7 +302,7 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
             transform=panel.transAxes,
         )
         return
-    low, high, _ = map_blocks.limits(values)
+    low, high, _ = limits(values)
     bins = int(np.clip(2 * values.size ** (1 / 3), 10, 80))
     weights = np.full(values.size, float(sheet.made.sampled ** (2 if sheet.axes.kind == "image" else 1)))
     panel.locator_params(axis="x", nbins=5)  # labels of an index have six digits
@@ -314,3 +316,85 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     outside = int(np.sum((values < low) | (values > high)))
     if outside:
         panel.set_xlabel(f"{sheet.label(variable)}\n(the outermost bars contain all beyond them)")
+
+
+MOST_POINTS = 800
+"""Most points of an image in each direction: more than a printed panel shows."""
+SLAB = 2**22
+"""Most pixels that are read at once."""
+
+
+def block(axes: MapAxes) -> int:
+    """Side of the blocks of pixels that are one point of an image."""
+    return int(np.ceil(max(axes.shape[-2:]) / MOST_POINTS)) if axes.kind == "image" else 1
+
+
+def block_codes(codes: np.ndarray, side: int) -> np.ndarray:
+    """Most frequent status of each block of an image."""
+    if side == 1:
+        return codes
+    found, most = None, None
+    for code in np.unique(codes):
+        count = _sums((codes == code).astype(np.int32), side)
+        if found is None or most is None:
+            found, most = np.full(count.shape, code, codes.dtype), count
+            continue
+        found[count > most] = code
+        most = np.maximum(most, count)
+    assert found is not None
+    return found
+
+
+def block_means(array: Any, used: np.ndarray, side: int) -> np.ndarray:
+    """Means of an image over the used pixels of each block, NaN where there are none.
+
+    The array is read in slabs of whole rows of blocks: it may be larger than memory.
+    """
+    rows = max(SLAB // max(used.shape[1] * side, 1), 1) * side
+    means = []
+    for start in range(0, used.shape[0], rows):
+        values = np.asarray(array[start : start + rows], dtype=float)
+        own = used[start : start + rows] & np.isfinite(values)
+        count = _sums(own.astype(np.int32), side)
+        total = _sums(np.where(own, values, 0.0), side)
+        means.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return np.concatenate(means)
+
+
+def _sums(array: np.ndarray, side: int) -> np.ndarray:
+    """Sums over blocks; those at the end may be smaller."""
+    for along in (0, 1):
+        array = np.add.reduceat(array, np.arange(0, array.shape[along], side), axis=along)
+    return array
+
+
+def evenly(array: np.ndarray, axes: MapAxes, side: int) -> np.ndarray:
+    """Repeat rows and columns of an image whose coordinates are uneven, so that all points have one size."""
+    assert axes.y is not None
+    for along, axis in enumerate((axes.y, axes.x)):
+        if axis.is_even:
+            continue
+        edges = np.append(axis.edges()[:-1:side], axis.edges()[-1])
+        points = np.linspace(edges[0], edges[-1], 2 * MOST_POINTS + 1)[1::2]
+        flip = edges[0] > edges[-1]
+        index = np.searchsorted(edges[::-1] if flip else edges, np.sort(points) if flip else points) - 1
+        index = (len(edges) - 2 - index)[::-1] if flip else index
+        array = np.take(array, np.clip(index, 0, array.shape[along] - 1), axis=along)
+    return array
+
+
+def limits(values: np.ndarray) -> tuple[float, float, str]:
+    """Limits of the colours that outliers do not set, and the ends at which a colour bar is extended."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return 0.0, 1.0, "neither"
+    low, high = np.percentile(known, [1, 99])
+    least, largest = known.min(), known.max()
+    room = 0.25 * (high - low)
+    low, high = (least if least >= low - room else low), (largest if largest <= high + room else high)
+    if high - low <= 1e-9 * max(abs(high), abs(low), 1e-300):
+        middle = (high + low) / 2
+        half = 0.01 * abs(middle) or 0.5
+        return middle - half, middle + half, "neither"
+    ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    return float(low), float(high), ends[bool(least < low), bool(largest > high)]

@@ -37,19 +37,18 @@ _TEXT, _AXIS, _GAP = 0.2, 0.55, 0.1
 """Heights in inches: a line of text, an axis with numbers and label, a gap."""
 _NUMBERS = 0.22
 """Height in inches of the numbers of an axis without label."""
-_RIGHT = 0.02
-"""Share of the width right of the panels."""
+_RIGHT, _KEY = 0.02, 0.24
+"""Shares of the width right of the panels, without and with a key of their notes."""
 _STYLES = {"solid": "-", "dashed": "--", "dotted": ":"}
 _MARKERS = {"point": ".", "circle": "o", "ring": "o", "cross": "x", "diamond": "D"}
 _NOTE: dict[str, Any] = {
-    "rotation": 90,
     "xytext": (0, 6),
     "textcoords": "offset points",
     "ha": "center",
     "va": "bottom",
     "fontsize": "small",
-    "bbox": {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.5},
 }
+_BOX = {"facecolor": "white", "alpha": 0.8, "edgecolor": "none", "pad": 0.5}
 
 
 def new_figure(width: float, height: float, constrained: bool = True) -> Figure:
@@ -148,8 +147,13 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         _line(axes, line, points, listed)
     if panel.zero:
         axes.axhline(0, color=GREY, linewidth=0.6)
+    upright = {} if panel.key else {"rotation": 90, "bbox": _BOX}
     for x, y, text in panel.notes:
-        axes.annotate(text, (x, y), **_NOTE)
+        axes.annotate(text, (x, y), **_NOTE, **upright)
+    if panel.key:
+        names = plain("\n".join(panel.key))
+        axes.text(1.02, 1.0, names, transform=axes.transAxes, va="top", fontsize="small")
+        axes.grid(alpha=0.2)
     axes.margins(x=0.02 if panel.title else 0.01)
     _scale(axes, panel)
     if panel.empty:
@@ -172,7 +176,7 @@ def _line(axes: Axes, line: Line, points: int, listed: set[str]) -> None:
         axes.plot(line.x, line.y, _STYLES[line.style], linewidth=line.width, **style)
         return
     size = marker_size(points) if line.style == "point" or points > 100 else 6.0
-    size = {"diamond": 4.0, "cross": 5.0}.get(line.style, size)
+    size = {"diamond": 5.0, "cross": 5.0}.get(line.style, size)
     style |= {"markersize": size} | ({"markerfacecolor": "none"} if line.style == "ring" else {})
     axes.plot(line.x, line.y, _MARKERS[line.style], **style)
 
@@ -203,6 +207,8 @@ def _patches(axes: Axes, panel: Panel) -> None:
 
 
 def _scale(axes: Axes, panel: Panel) -> None:
+    if panel.abscissa == "log":
+        _decades(axes)
     if panel.scale == "log":
         axes.set_yscale("log")
     if panel.limits is not None:
@@ -220,6 +226,17 @@ def _scale(axes: Axes, panel: Panel) -> None:
         axes.set_xlim(panel.span)
     if panel.ticks:
         axes.set_xticks(np.arange(len(panel.ticks)) + 1.0, list(panel.ticks))
+
+
+def _decades(axes: Axes) -> None:
+    """Set a logarithmic abscissa with plain numbers at 1, 2 and 5 of each decade."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.margins(x=0.05, y=0.1)
 
 
 def _legend(axes: Axes, last: Axes, panel: Panel) -> None:
@@ -264,8 +281,9 @@ def _arrange(figure: Figure, grid: list[list[Axes]], rows: list[Sequence[Panel]]
 
     left = max(room(axes_row[0]) for axes_row in grid) + 0.01
     between = max((room(axes) for axes_row in grid for axes in axes_row[1:]), default=0.0) + 0.015
+    right = _KEY if any(panel.key for row in rows for panel in row) else _RIGHT
     for axes_row, bottom, own in zip(grid, bottoms, heights, strict=True):
-        each = (1 - left - _RIGHT - between * (len(axes_row) - 1)) / len(axes_row)
+        each = (1 - left - right - between * (len(axes_row) - 1)) / len(axes_row)
         for j, axes in enumerate(axes_row):
             axes.set_position((left + j * (each + between), bottom, each, own / height))
 

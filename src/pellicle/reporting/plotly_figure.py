@@ -162,7 +162,7 @@ def _listed(traces: list[Trace]) -> list[Trace]:
 def _rival(label: str, panels: Sequence[Panel]) -> list[Trace]:
     """The lines of a model in the colour of rivals, dashed or with open markers, listed once."""
     shown = [panel for panel in panels if panel.image is None]
-    traces = [
+    traces: list[Trace] = [
         _line(line, panel) | {"xaxis": "x", "yaxis": _numbered("y", number)}
         for number, panel in enumerate(shown, start=1)
         for line in panel.lines
@@ -172,7 +172,7 @@ def _rival(label: str, panels: Sequence[Panel]) -> list[Trace]:
         {
             **trace,
             "line": {"color": "var(--rival)", "width": 2, "dash": "dash"},
-            "marker": {**trace.get("marker", {}), "color": "var(--rival)", "symbol": "diamond-open"},
+            "marker": dict(trace.get("marker", {})) | {"color": "var(--rival)", "symbol": "diamond-open"},
             "name": escape(label),
             "showlegend": not i,
         }

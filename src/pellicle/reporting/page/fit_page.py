@@ -6,13 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from pellicle.fitting.curves import ColourCurve
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import budget_text, fit_text, fitted_colours, parameter_text
+from pellicle.reporting import fit_text, fitted_colours, parameter_text
+from pellicle.reporting.drawable import Line, Panel, Section
 from pellicle.reporting.fit_panels import file_names
-from pellicle.reporting.page import citations, figures
+from pellicle.reporting.page import figures, repetition
 from pellicle.reporting.page.document import Table, page, picture
+from pellicle.reporting.plotly_figure import figure
+from pellicle.sampling.result import verdict
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
@@ -51,9 +56,7 @@ def fit_page(
     shown = [*of_data, *(each for each in (misfit, index) if each)]
     about = None
     if posterior is not None:
-        from pellicle.reporting.page.posterior_section import section
-
-        about = section(posterior, pictures or {})
+        about = posterior_section(posterior, pictures or {})
         shown.append(about["trace"])
     surface = None
     if fit.layer_test is not None:
@@ -63,33 +66,40 @@ def fit_page(
         shown.append(surface["lobes"])
     names = " and ".join(name for name in file_names(fit) if name) or "fit"
     content = {
+        **_tables(fit),
+        "data_figures": of_data,
+        "image": picture(image, f"Figure of the fit: {fit.verdict}"),
+        "misfit": misfit,
+        "index": index,
+        "surface": surface,
+        "posterior": about,
+        "again": [
+            {"name": f"again-{i}", "about": about, "text": text} for i, (about, text) in enumerate(again)
+        ],
+        "sources": repetition.sources(fit, posterior),
+        "bibtex": repetition.bibtex(),
+    }
+    return page("fit.html", names, shown, sections=_sections(content), **content)
+
+
+def _tables(fit: Fit) -> dict[str, Any]:
+    """What the template takes of a fit beside its figures: words, tables and swatches."""
+    return {
         "tone": TONES[fit.status],
         "status": str(fit.status),
         "verdict": fit.verdict,
         "advice": fit_text.ADVICE[fit.status],
         "warnings": fit.warnings,
-        "data_figures": of_data,
         "swatches": [_swatches(part) for part in fit.parts if isinstance(part.curve, ColourCurve)],
-        "image": picture(image, f"Figure of the fit: {fit.verdict}"),
-        "misfit": misfit,
         "rivals": _rivals(fit),
-        "index": index,
         "parameters": _parameters(fit),
         "matrix": _matrix(fit),
         "budget": _budget(fit),
-        "together": budget_text.together(fit.free[0]) if fit.budget and fit.free else "",
+        "together": parameter_text.together(fit.free[0]) if fit.budget and fit.free else "",
         "layer": Table("Error on samples that were held out", (), fit_text.layer_test_rows(fit)),
-        "surface": surface,
-        "posterior": about,
         "plans": [_plan(part) for part in fit.parts],
         "statistics": _statistics(fit),
-        "again": [
-            {"name": f"again-{i}", "about": about, "text": text} for i, (about, text) in enumerate(again)
-        ],
-        "sources": citations.sources(fit, posterior),
-        "bibtex": citations.bibtex(),
     }
-    return page("fit.html", names, shown, sections=_sections(content), **content)
 
 
 def _sections(content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -164,7 +174,7 @@ def _matrix(fit: Fit) -> dict[str, Any]:
 def _budget(fit: Fit) -> Table:
     lead = next(iter(fit.free), None)
     caption = f"Standard uncertainties, and what each alone would change {lead.name}" if lead else ""
-    return Table(caption, ("effect", "uncertainty", "change"), budget_text.rows(fit))
+    return Table(caption, ("effect", "uncertainty", "change"), parameter_text.rows(fit))
 
 
 def _plan(part: Part) -> Table:
@@ -208,3 +218,58 @@ def _swatches(part: Part) -> dict[str, Any]:
 
 def _hex(rgb: Any) -> str:
     return "#" + "".join(f"{round(255 * min(max(float(x), 0.0), 1.0)):02x}" for x in rgb)
+
+
+_STEPS, _WALKERS, _PARAMETERS = 300, 8, 8
+"""Steps, walkers and parameters of the trace that are drawn."""
+_PICTURES = {
+    "corner": "Marginals of all parameters and joint densities of all pairs,"
+    " with quantiles of 2.5, 50 and 97.5 %.",
+    "predictive": "Data over the bands of 95 % of the model's curves and of repeated measurements.",
+}
+
+
+def posterior_section(posterior: Posterior, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+    """Figures and tables of a posterior, as the template takes them."""
+    checks = posterior.checks
+    rows = [
+        (m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975, m.mean)), f"{m.sd:.2g}", m.unit)
+        for m in posterior.parameters.values()
+    ]
+    about = [
+        ("walkers", str(posterior.draws.shape[1])),
+        ("steps, of them burn-in", f"{checks.steps}, {checks.discard}"),
+        ("autocorrelation times", f"{checks.n_over_tau:.0f}"),
+        ("independent draws", f"about {checks.independent}"),
+        ("split R̂", f"{checks.rhat:.3f}"),
+        ("accepted moves", f"{100 * checks.acceptance:.0f} %"),
+        ("minima that matter, visited", f"{checks.minima_visited} of {checks.minima_found}"),
+    ]
+    return {
+        "verdict": verdict(posterior),
+        "marginals": Table(
+            "Marginal of each parameter",
+            ("parameter", "median", "2.5 %", "97.5 %", "mean", "sd", "unit"),
+            rows,
+        ),
+        "checks": Table("Checks of the chain", (), about),
+        "trace": _trace(posterior),
+        "pictures": [picture(pictures[name], text) for name, text in _PICTURES.items() if name in pictures],
+    }
+
+
+def _trace(posterior: Posterior) -> dict[str, Any]:
+    """Steps of some walkers, one panel for each parameter."""
+    draws = posterior.draws[:: -(-len(posterior.draws) // _STEPS) or 1, :_WALKERS]
+    steps, walkers, _ = draws.shape
+    step = np.tile([*np.arange(steps) * (len(posterior.draws) / max(steps, 1)), np.nan], walkers)
+    panels = []
+    for i, name in enumerate(posterior.names[:_PARAMETERS]):
+        unit = posterior.fit.parameters[name].unit
+        title = f"{name} ({unit})" if unit else name
+        values = np.pad(draws[:, :, i], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()
+        panels.append([Panel(title, [Line(step, values, title, "index-n", width=0.8, listed=False)])])
+    caption = f"Trace of {walkers} of {posterior.draws.shape[1]} walkers after the burn-in."
+    drawn = figure("trace", caption, Section("step after the burn-in", panels))
+    drawn["layout"]["hovermode"] = False
+    return drawn
