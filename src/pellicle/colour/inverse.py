@@ -241,20 +241,32 @@ def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.nd
     order = np.cumsum(np.isin(np.arange(len(row)), first)) - 1
     best = np.lexsort((-log_p, order))[np.searchsorted(order, np.arange(len(first)))]
 
-    ranking = np.lexsort((-probability, owner))
-    rank = np.arange(len(owner)) - np.searchsorted(owner, owner[ranking])
-    ranking, rank = ranking[rank < most], rank[rank < most]
     exposure = gain[best] ** (1 / model.space.power)
-    columns = [mean, spread, probability, _delta_e(colours[owner], model, at[best], gain[best])]
-    result = []
-    for column in (*columns, exposure, chi2[best]):
-        filled = np.full((len(each), most), np.nan)
-        filled[owner[ranking], rank] = column[ranking]
-        result.append(filled)
+    shown = _delta_e(colours[owner], model, at[best], gain[best])
+    columns = (mean, spread, probability, shown, exposure, chi2[best])
+    ranking, result = _ranked(columns, owner, len(each), most)
     last = len(model.thickness) - 1
     ends = (at[best] == last) | ((at[best] == 0) & (model.thickness[0] > 0))
-    ended = ends[ranking[rank == 0]]
-    return *result, _status(result[1:], ended, colours.shape[1], model)
+    return *result, _status(result[1:], ends[ranking], colours.shape[1], model)
+
+
+def _ranked(
+    columns: tuple[np.ndarray, ...], owner: np.ndarray, colours: int, most: int
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The most probable order of each colour, and columns of orders as (colours, most), NaN beyond the last.
+
+    `columns` begin with mean, spread and probability; `owner` is the colour of each order.
+    """
+    ranking = np.lexsort((-columns[2], owner))
+    rank = np.arange(len(owner)) - np.searchsorted(owner, owner[ranking])
+    first = ranking[rank == 0]
+    ranking, rank = ranking[rank < most], rank[rank < most]
+    tables = []
+    for column in columns:
+        table = np.full((colours, most), np.nan)
+        table[owner[ranking], rank] = column[ranking]
+        tables.append(table)
+    return first, tables
 
 
 def _boundaries(row: np.ndarray, at: np.ndarray, log_p: np.ndarray) -> np.ndarray:

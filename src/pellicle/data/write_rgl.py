@@ -59,12 +59,35 @@ def tabulate(
 
     **Returns:** arrays by name, for `write_rgl` and `brdf_of`.
     """
+    table, density = _empty_table(brdf, size, wavelengths)
+    values = _values(brdf, table, size.side)
+    luminance = np.abs(values).mean(axis=2)
+    floor = _DARKEST * luminance.max(axis=(2, 3), keepdims=True)
+    text = f"{description or 'BRDF'}, written by pellicle {version('pellicle')}".encode()
+    single: dict[str, np.ndarray | None] = {
+        "phi_i": table.phi_i,
+        "theta_i": table.theta_i,
+        "ndf": table.ndf,
+        "sigma": table.sigma,
+        "vndf": density,
+        "luminance": np.maximum(luminance, np.maximum(floor, 1e-30)),
+        "rgb" if wavelengths is None else "spectra": values,
+        **({} if wavelengths is None else {"wavelengths": np.asarray(wavelengths)}),
+    }
+    return {
+        "description": np.frombuffer(text, np.uint8),
+        "jacobian": np.array([1], np.uint8),
+        **{name: np.asarray(array, np.float32) for name, array in single.items()},
+    }
+
+
+def _empty_table(brdf: Brdf, size: TableSize, wavelengths: np.ndarray | None) -> tuple[RglBrdf, np.ndarray]:
+    """The table without values, and the density of half vectors, (azimuths, thetas, rows, columns)."""
     x = np.linspace(0, 1, _PROFILE)
     profile = _profile(brdf, x)
     theta = np.linspace(0, _GRAZING, size.thetas)
     phi = np.zeros(1) if size.azimuths == 1 else np.linspace(-np.pi, np.pi, size.azimuths)
-    sigma_x = np.linspace(0, 1, 256)
-    sigma = _projected_area(profile, x, unit_to_theta(sigma_x))
+    sigma = _projected_area(profile, x, unit_to_theta(np.linspace(0, 1, 256)))
     rows, columns = size.density
     grid_x, grid_y = np.linspace(0, 1, columns), np.linspace(0, 1, rows)
     # half vectors around a light at azimuth 0; without symmetry the grid keeps its own azimuth
@@ -84,25 +107,7 @@ def tabulate(
         sigma=np.stack([sigma, sigma]).astype(np.float32).astype(float),
         warp=BilinearWarp(density.reshape(-1, rows, columns)),
     )
-    values = _values(brdf, table, size.side)
-    luminance = np.abs(values).mean(axis=2)
-    floor = _DARKEST * luminance.max(axis=(2, 3), keepdims=True)
-    text = f"{description or 'BRDF'}, written by pellicle {version('pellicle')}".encode()
-    single: dict[str, np.ndarray | None] = {
-        "phi_i": table.phi_i,
-        "theta_i": table.theta_i,
-        "ndf": table.ndf,
-        "sigma": table.sigma,
-        "vndf": density.reshape(*shape, rows, columns),
-        "luminance": np.maximum(luminance, np.maximum(floor, 1e-30)),
-        "rgb" if wavelengths is None else "spectra": values,
-        **({} if wavelengths is None else {"wavelengths": np.asarray(wavelengths)}),
-    }
-    return {
-        "description": np.frombuffer(text, np.uint8),
-        "jacobian": np.array([1], np.uint8),
-        **{name: np.asarray(array, np.float32) for name, array in single.items()},
-    }
+    return table, density.reshape(*shape, rows, columns)
 
 
 def write_rgl(
