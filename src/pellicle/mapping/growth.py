@@ -87,32 +87,43 @@ def growth(
     if not names or any(f"{name}_stderr_noise" not in dataset for name in names):
         raise UsageError("a rate needs a free thickness with its standard error, and this map has none")
     time, unit = _times(dataset[TIME], unit)
-    axis = dataset["status"].dims.index(TIME)
-    rest = tuple(dim for dim in dataset["status"].dims if dim != TIME)
-    dims = rest if window is None else (TIME, *rest)
     made = dataset.copy()
     for name in names:
-        keys = ("status", name, f"{name}_stderr", f"{name}_stderr_noise")
-        arrays = [np.moveaxis(np.asarray(dataset[key]), axis, 0) for key in keys]
-        shape = arrays[0].shape[1:]
-        state, value, stderr, noise = (array.reshape(len(time), -1) for array in arrays)
-        parts = [slice(i, i + _PIXELS) for i in range(0, max(state.shape[1], 1), _PIXELS)]
-        columns = [_rates(time, state[:, p], value[:, p], stderr[:, p], noise[:, p], window) for p in parts]
-        whole = {key: np.concatenate([column[key] for column in columns], axis=-1) for key in columns[0]}
-        of = f"{dataset[name].attrs.get('units', 'nm')}/{unit}"
-        for key, (words, units) in {
-            "rate": ("rate of change", of),
-            "rate_stderr": ("standard error of the rate, of noise, model and scatter", of),
-            "rate_stderr_noise": ("standard error of the rate, of the noise alone", of),
-            "rate_chi2_reduced": ("reduced chi-square of a constant rate", "1"),
-            "rate_points": ("number of times of the rate", "1"),
-        }.items():
-            array = whole[key].reshape((*([] if window is None else [len(time)]), *shape))
-            made[f"{name}_{key}"] = (dims, array, {"long_name": f"{words} of {name}", "units": units})
-        array = whole["rate_status"].reshape(made[f"{name}_rate"].shape)
-        flags = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": " ".join(RATES)}
-        made[f"{name}_rate_status"] = (dims, array, flags)
+        for key, variable in _rate_variables(dataset, name, time, unit, window).items():
+            made[f"{name}_{key}"] = variable
     return made
+
+
+def _rate_variables(
+    dataset: Any, name: str, time: np.ndarray, unit: str, window: int | None
+) -> dict[str, tuple[Any, np.ndarray, dict[str, Any]]]:
+    """Variables of the rate of one parameter: axes, values and attributes by name."""
+    dims = dataset["status"].dims
+    rest = tuple(dim for dim in dims if dim != TIME)
+    keys = ("status", name, f"{name}_stderr", f"{name}_stderr_noise")
+    arrays = [np.moveaxis(np.asarray(dataset[key]), dims.index(TIME), 0) for key in keys]
+    shape = arrays[0].shape if window is not None else arrays[0].shape[1:]
+    state, value, stderr, noise = (array.reshape(len(time), -1) for array in arrays)
+    parts = [slice(i, i + _PIXELS) for i in range(0, max(state.shape[1], 1), _PIXELS)]
+    columns = [_rates(time, state[:, p], value[:, p], stderr[:, p], noise[:, p], window) for p in parts]
+    of = f"{dataset[name].attrs.get('units', 'nm')}/{unit}"
+    attributes: dict[str, dict[str, Any]] = {
+        key: {"long_name": f"{words} of {name}", "units": units}
+        for key, words, units in (
+            ("rate", "rate of change", of),
+            ("rate_stderr", "standard error of the rate, of noise, model and scatter", of),
+            ("rate_stderr_noise", "standard error of the rate, of the noise alone", of),
+            ("rate_chi2_reduced", "reduced chi-square of a constant rate", "1"),
+            ("rate_points", "number of times of the rate", "1"),
+        )
+    }
+    words = " ".join(RATES)
+    attributes["rate_status"] = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": words}
+    axes = rest if window is None else (TIME, *rest)
+    return {
+        key: (axes, np.concatenate([column[key] for column in columns], axis=-1).reshape(shape), about)
+        for key, about in attributes.items()
+    }
 
 
 def straight_line(
@@ -206,9 +217,9 @@ def _times(array: Any, unit: str | None) -> tuple[np.ndarray, str]:
         seconds = (stamps - stamps[0]) / np.timedelta64(1, "s")
     else:
         given = str(array.attrs.get("units", "")).split(" since ")[0].strip()
-        own = {"seconds": "s", "second": "s", "sec": "s", "minutes": "min", "minute": "min", "hours": "h"}
-        own |= {"hour": "h", "days": "d", "day": "d"}
-        given = own.get(given, given)
+        spelled = {"seconds": "s", "second": "s", "sec": "s", "minutes": "min", "minute": "min", "hours": "h"}
+        spelled |= {"hour": "h", "days": "d", "day": "d"}
+        given = spelled.get(given, given)
         if not given:
             raise UsageError(
                 "times are numbers without a unit: give the coordinate `time` `units`, such as s"

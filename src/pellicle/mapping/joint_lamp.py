@@ -171,8 +171,8 @@ def _step(
     signal, gain = found.signal[good], found.gain[good]
     count, points, _ = found.slope[good].shape
     scale: Any = scene.instrument.scale
-    own = scale.degree + 1 if isinstance(scale, Drift) else 0  # terms of the scale
-    terms = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], max(own - 1, 0))[:, :own]
+    free = scale.degree + 1 if isinstance(scale, Drift) else 0  # terms of the scale
+    terms = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], max(free - 1, 0))[:, :free]
     columns = [signal[..., None] * terms, gain[..., None] * found.slope[good]]
     drift = scene.instrument.offset
     if isinstance(drift, Drift):
@@ -186,29 +186,45 @@ def _step(
     left = left - np.einsum("npk,nk->np", basis, np.einsum("npk,np->nk", basis, left))
     # weights by what is left, as the noise of a pixel is not always known
     noise = np.sqrt((left**2).sum(axis=1) / max(points - basis.shape[2], 1))[:, None]
-    steep = weight * (model - offset) / noise
-    left = left / noise
+    step = _eliminated(weight * (model - offset) / noise, left / noise, basis, angles, free)
+    if free > 1:
+        # of the pixels' own slow scales, the mean is the lamp's: weights by their errors
+        inverse = np.linalg.pinv(triangle)[:, :free] / length[:, 0, :free, None]
+        error = np.einsum("pt,ntk->npk", terms, inverse)
+        relative = (error**2).sum(axis=2) * noise**2 / gain**2
+        mean, variance = _mean_scale(gain, relative, angles)
+        step = step._replace(change=step.change + mean, variance=step.variance + variance)
+    return step
+
+
+def _eliminated(steep: np.ndarray, left: np.ndarray, basis: np.ndarray, angles: int, free: int) -> _Step:
+    """The Schur complement of the parameters of all pixels, solved for log g.
+
+    **Arguments:** `steep` (pixels, points), ∂ residual / ∂ log g; `left` (pixels, points), residuals without
+    what the parameters of the pixel explain; `basis` (pixels, points, parameters), the span of these; `free`,
+    terms of the scale of each pixel, which no shape of g may contain.
+    """
+    count, points = steep.shape
     bands = points // angles
     known = (steep**2).reshape(count, bands, angles).sum(axis=(0, 2))
     shared = (steep[..., None] * basis).reshape(count, bands, angles, -1).sum(axis=2)
     shared = shared.transpose(1, 0, 2).reshape(bands, -1)
     unit = 1 / np.sqrt(known)
     share, shapes = np.linalg.eigh((np.diag(known) - shared @ shared.T) * unit * unit[:, None])
-    share, shapes = share[own:], unit[:, None] * shapes[:, own:]  # the others are the pixels' own scales
+    share, shapes = share[free:], unit[:, None] * shapes[:, free:]
     separation = float(share[0])
     share = np.where(share < _SEPARATE, np.inf, share)  # refused in the end; no large steps before
     change = shapes @ ((shapes.T @ (steep * left).reshape(count, bands, angles).sum(axis=(0, 2))) / share)
-    variance = (shapes**2 / share).sum(axis=1)
-    if own > 1:
-        # of the pixels' own slow scales, the mean is the lamp's: weights by their errors
-        inverse = np.linalg.pinv(triangle)[:, :own] / length[:, 0, :own, None]
-        error = np.einsum("pt,ntk->npk", terms, inverse)
-        relative = (error**2).sum(axis=2) * noise**2 / gain**2
-        curve = np.log(np.maximum(gain, 1e-12)).reshape(count, bands, angles).mean(axis=2)
-        heavy = 1 / relative.mean(axis=1)
-        heavy = heavy[:, None] / heavy.sum()
-        mean = (heavy * curve).sum(axis=0)
-        away = curve - mean
-        away = away - away.mean(axis=1, keepdims=True)
-        change, variance = change + mean, variance + (heavy**2 * away**2).sum(axis=0)
-    return _Step(change, variance, separation)
+    return _Step(change, (shapes**2 / share).sum(axis=1), separation)
+
+
+def _mean_scale(gain: np.ndarray, relative: np.ndarray, angles: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean over the pixels of log gain (pixels, points) by its relative variance, and the mean's variance."""
+    count, points = gain.shape
+    curve = np.log(np.maximum(gain, 1e-12)).reshape(count, points // angles, angles).mean(axis=2)
+    heavy = 1 / relative.mean(axis=1)
+    heavy = heavy[:, None] / heavy.sum()
+    mean = (heavy * curve).sum(axis=0)
+    away = curve - mean
+    away = away - away.mean(axis=1, keepdims=True)
+    return mean, (heavy**2 * away**2).sum(axis=0)

@@ -13,7 +13,8 @@ from pellicle.colour.observers import Sensor
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
 from pellicle.data.photograph_colours import check_photograph, white_reference
-from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph, strip
+from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph
+from pellicle.data.photographs import strip as strip_of
 from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
@@ -71,112 +72,67 @@ def map_photograph(
     noise: float | None = None,
 ) -> ThicknessMap:
     """Compute the thickness at each pixel of a photograph; arguments as of `pellicle.map`."""
-    paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
-    transmitted = scene.light.signal == "T"
-    eye = Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted)
-    pixels = read_photograph(data)
-    space = check_photograph(pixels, space)
-    return thickness_map(
-        pixels,
-        scene,
-        sight(eye, space),
-        space,
-        gamma=gamma,
-        along=strip,
-        region=region,
-        white=white,
-        layer=layer,
-        noise=noise,
-    )
-
-
-def thickness_map(
-    photograph: Photograph,
-    scene: Scene,
-    seen: Sight,
-    space: str = "srgb",
-    *,
-    gamma: float = 1.0,
-    along: Any = None,
-    region: Any = None,
-    white: Any = None,
-    layer: str | None = None,
-    noise: float | None = None,
-) -> ThicknessMap:
-    """Compute the thickness at each pixel of a region, of the whole photograph, or along a strip.
-
-    Each position is inverted by itself (`pellicle.colour.ColourInverse`), between the bounds of the free
-    thickness. A free scale of the instrument is a free exposure of each position.
-
-    **Arguments:**
-
-    - `seen`: what sees the colours, without a chart; `space` "srgb" or "rgb" with its `gamma`.
-    - `along`: "x0,y0,x1,y1", the ends of a strip 5 pixels wide; `region`: "x,y,width,height".
-    - `white`: region of a perfect reflector.
-    - `layer` whose thickness is sought, the free one by default; other free parameters take their start
-      values.
-    - `noise`: standard deviation of the coded channels, 1.5/255 of sRGB and 0.01 of "rgb" by default.
-
-    **Raises:** UsageError for a chart, a thickness that is not free and pixels outside the photograph.
-    """
-    if seen.matrix is not None:
-        raise UsageError("a map needs `sensitivities` or sRGB; a `chart` is for colours of regions")
-    if along is not None and region is not None:
+    if strip is not None and region is not None:
         raise UsageError("`strip` and `region` exclude each other")
     bounds: Any = getattr(scene.layers[varied_layer(scene, layer)], "thickness", None)
     if not isinstance(bounds, Free):
         raise UsageError("the thickness of the map must be free, between two bounds")
+    photograph = read_photograph(data)
+    space = check_photograph(photograph, space)
+    paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
+    transmitted = scene.light.signal == "T"
+    seen = sight(Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted), space)
     reference, notes = white_reference(photograph, seen.coding, white)
-    position = None
-    if along is not None:
-        taken = strip(photograph, along)
-        position, where = taken.position, along if isinstance(along, str) else ",".join(map(str, along))
-        linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
-        step = f"strip {where}: {len(position)} positions, means of {taken.pixels.shape[1]} pixels"
-    else:
-        box = Region(0, 0, *photograph.size) if region is None else _only(parse_regions(region))
-        pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
-        linear, where = seen.coding.decoded(pixels), str(box)
-        step = f"region {where}: {box.width * box.height} pixels"
-    exposed = linear / reference
+    chosen = _along(photograph, seen, strip) if strip is not None else _inside(photograph, seen, region)
+    exposed = chosen.linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise
-    told = [*photograph.notes, *seen.notes, *notes, step, f"noise {sigma:.2g} of each channel"]
+    told = [*photograph.notes, *seen.notes, *notes, chosen.note, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
         told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
-    inverse = _inverse(scene, seen.sensor, space, bounds, layer, sigma, gamma, linear)
+    spread = np.full(3, sigma)
+    if space == "rgb":  # a camera's channels are linear, with the σ of their median
+        middle = np.maximum(np.median(chosen.linear.reshape(-1, 3), axis=0), 1e-3)
+        spread = sigma * gamma * middle ** (1 - 1 / gamma)
+    inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread)
     found = inverse(coded if space == "srgb" else exposed, ORDERS)
-    return ThicknessMap(
-        coded,
-        _fitted(inverse, found, seen),
-        found,
-        position,
-        where,
-        space,
-        tuple(told),
-        photograph.path,
-        photograph.sha256,
-    )
+    about = chosen.where, space, tuple(told), photograph.path, photograph.sha256
+    return ThicknessMap(coded, _fitted(inverse, found, seen), found, chosen.position, *about)
 
 
-def _only(regions: list[Region]) -> Region:
-    if len(regions) > 1:
+class _Chosen(NamedTuple):
+    """Linear channels of the chosen positions, where they are, and a note on them."""
+
+    linear: np.ndarray
+    position: np.ndarray | None
+    where: str
+    note: str
+
+
+def _along(photograph: Photograph, seen: Sight, ends: Any) -> _Chosen:
+    """Means across a strip. Raises UsageError for ends outside the photograph."""
+    taken = strip_of(photograph, ends)
+    where = ends if isinstance(ends, str) else ",".join(map(str, ends))
+    linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
+    note = f"strip {where}: {len(linear)} positions, means of {taken.pixels.shape[1]} pixels"
+    return _Chosen(linear, taken.position, where, note)
+
+
+def _inside(photograph: Photograph, seen: Sight, region: Any) -> _Chosen:
+    """Pixels of a rectangle, by default the whole photograph. Raises UsageError for one outside."""
+    box, *others = [Region(0, 0, *photograph.size)] if region is None else parse_regions(region)
+    if others:
         raise UsageError("`region` of a map must be one rectangle")
-    return regions[0]
+    pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
+    note = f"region {box}: {box.width * box.height} pixels"
+    return _Chosen(seen.coding.decoded(pixels), None, str(box), note)
 
 
 def _inverse(
-    scene: Scene,
-    eye: Sensor,
-    space: str,
-    bounds: Free,
-    layer: str | None,
-    sigma: float,
-    gamma: float,
-    linear: np.ndarray,
+    scene: Scene, eye: Sensor, space: str, bounds: Free, layer: str | None, spread: np.ndarray
 ) -> ColourInverse:
-    """The inverse of the film's colours; a camera's channels are linear, with the σ of their median."""
+    """The inverse of the film's colours, whose channels have the standard deviations `spread`."""
     light: Any = scene.light.angle
     if np.ndim(light):
         raise UsageError("a photograph has one angle of incidence: give the scene one number as `angle`")
@@ -184,18 +140,9 @@ def _inverse(
     low = max(angle - 1.0, 0.0)  # a table needs a range of angles
     table = colour_table(scene, (bounds.lower, bounds.upper), (low, low + 1.0), layer, eye=eye)
     scale = scene.instrument.scale
-    known = None if isinstance(scale, Drift) else float(getattr(scale, "start", scale))
-    spread = np.full(3, sigma)
-    if space == "rgb":
-        middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
-        spread = sigma * gamma * middle ** (1 - 1 / gamma)
-    return ColourInverse.build(
-        table,
-        angle,
-        space="srgb" if space == "srgb" else "xyz",
-        sigma=spread,
-        exposure=EXPOSURE if known is None else known,
-    )
+    exposure = EXPOSURE if isinstance(scale, Drift) else float(getattr(scale, "start", scale))
+    coding = "srgb" if space == "srgb" else "xyz"
+    return ColourInverse.build(table, angle, space=coding, sigma=spread, exposure=exposure)
 
 
 def _fitted(inverse: ColourInverse, found: ColourThickness, seen: Sight) -> np.ndarray:

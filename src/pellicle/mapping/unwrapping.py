@@ -182,17 +182,8 @@ def grow(
         if stale.size:
             plane = predict(field, near, pixels[stale])
             spread = plane.variance + stderr[pixels[stale]] ** 2
-            away = (minima[stale] - plane.thickness[:, None]) ** 2 / spread[:, None]
-            energy = delta_chi2[stale] + np.minimum(np.where(np.isfinite(away), away, 0.0), most)
-            energy = np.where(np.isfinite(delta_chi2[stale]), energy, np.inf)
-            ranked = np.sort(energy, axis=1)
-            choice = np.argmin(energy, axis=1)
-            with np.errstate(invalid="ignore"):
-                lead = ranked[:, 1] - ranked[:, 0]
-            clear = np.isfinite(spread) & np.isfinite(ranked[:, 0]) & (lead >= RIVAL)
-            clear &= away[np.arange(len(stale)), choice] <= _OUTLIER**2
-            best[stale], seen[stale] = choice, plane.number
-            quality[stale] = np.where(clear, spread, np.inf)
+            best[stale], clear = _least(plane, spread, minima[stale], delta_chi2[stale], most)
+            seen[stale], quality[stale] = plane.number, np.where(clear, spread, np.inf)
         ready = np.flatnonzero(np.isfinite(quality) & (order < 0))
         if not ready.size:
             if complete:
@@ -207,3 +198,17 @@ def grow(
         touched = row[np.unique(around.pixel[around.linked])]
         touched = touched[touched >= 0]
         stale, complete = touched[order[touched] < 0], False
+
+
+def _least(
+    plane: Prediction, spread: np.ndarray, minima: np.ndarray, delta_chi2: np.ndarray, most: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The order of least energy of each pixel, and whether it is clear."""
+    away = (minima - plane.thickness[:, None]) ** 2 / spread[:, None]
+    energy = delta_chi2 + np.minimum(np.where(np.isfinite(away), away, 0.0), most)
+    energy = np.where(np.isfinite(delta_chi2), energy, np.inf)
+    ranked, choice = np.sort(energy, axis=1), np.argmin(energy, axis=1)
+    with np.errstate(invalid="ignore"):
+        lead = ranked[:, 1] - ranked[:, 0]
+    clear = np.isfinite(spread) & np.isfinite(ranked[:, 0]) & (lead >= RIVAL)
+    return choice, clear & (away[np.arange(len(choice)), choice] <= _OUTLIER**2)
