@@ -1,4 +1,4 @@
-"""Flags that describe how a cube of spectra is read, and its reading by them."""
+"""Flags that describe how a cube of spectra is read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pellicle.cli.flags import READING, Flags, flag
 from pellicle.data.options import parse_range
 
 if TYPE_CHECKING:
-    from pellicle.data.cube import Cube
     from pellicle.recipes.film import FilmRecipe
 
 FRAMES = Group("Camera frames", sort_key=6)
@@ -93,19 +92,14 @@ def merged(flags: CubeFlags, recipe: FilmRecipe) -> CubeFlags:
     return replace(flags, **{name: getattr(recipe.tables.data, name, None) for name in absent})
 
 
-def read(path: str, flags: CubeFlags, *, free_scale: bool = False) -> Cube:
-    """Read the cube of a file or folder; with a `free_scale` any level is acceptable.
-
-    Raises DataError or UsageError.
-    """
-    from pellicle.data.read_cube import read_cube
-
-    options: dict[str, Any] = {name: value for name, value in vars(flags).items() if value is not None}
+def reading(flags: CubeFlags) -> dict[str, Any]:
+    """Arguments of `read_cube` that are given. Raises UsageError."""
+    options = {name: value for name, value in vars(flags).items() if value is not None}
     if isinstance(flags.range, str):
         options["range"] = parse_range(flags.range, "`range`")
     if isinstance(flags.white_reflectance, str):
         options["white_reflectance"] = _reflectance(flags.white_reflectance, flags)
-    return read_cube(path, calibrated=False if free_scale else None, **options)
+    return options
 
 
 def _reflectance(white: str, flags: CubeFlags) -> Any:

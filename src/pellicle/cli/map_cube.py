@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
 from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
-from pellicle.cli.cube_flags import CubeFlags, merged
+from pellicle.cli.cube_flags import CubeFlags, merged, reading
 from pellicle.cli.flags import OUTPUT, Flags, flag
 from pellicle.cli.messages import as_flags
 from pellicle.cli.progress import PixelProgress
 from pellicle.cli.session import check_folder, say, show, start
-from pellicle.data.options import parse_range
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -72,18 +71,15 @@ def map_cube(
     path: str, described: FilmRecipe, run: RunFlags, cube: CubeFlags, out: str | None, json: bool
 ) -> int:
     """Map a cube, print the report, write the folder, and return the exit code."""
-    if run.workers is not None and run.workers < 1:
-        raise UsageError(f"--workers must be at least 1, got {run.workers}")
-    if run.workers is not None and run.scheduler is not None:
-        raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
-    if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
-        raise UsageError(f"{idle[0]} needs --out, the folder of the map")
+    _check(run, out)
     folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
     if folder is not None:
         check_folder(str(folder))
     scene = described.scene()
     reference = None if run.lamp_reference is None else _known(run.lamp_reference)
     start()
+    from pellicle.reporting.json_record import one_line
+    from pellicle.reporting.map_text import cube_json, cube_report
     from pellicle.scene.free import free_leaves
 
     if not free_leaves(scene):
@@ -91,21 +87,42 @@ def map_cube(
             f"{described.path}: nothing is free to fit: give the thickness bounds, as in"
             " thickness = { lower = 10, upper = 3000 }"
         )
-    from pellicle.api import maps
-    from pellicle.reporting.json_record import one_line
-    from pellicle.reporting.map_text import cube_json, cube_report
+    text = Path(described.path).read_text(encoding="utf-8")
+    options = {**reading(merged(cube, described)), "lamp_reference": reference, "recipe": text}
+    made = _fitted(path, scene, run, folder, options)
+    if made is None:
+        return INTERRUPTED
+    if made.run is not None and made.run.earlier:
+        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
+    show(one_line(cube_json(made)) if json else as_flags(cube_report(made)), folder is not None)
+    if folder is not None:
+        _write(folder, made)
+    return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
 
-    flags = merged(cube, described)
-    reading = {name: value for name, value in vars(flags).items() if value is not None}
-    if isinstance(flags.range, str):
-        reading["range"] = parse_range(flags.range, "`range`")
+
+def _check(run: RunFlags, out: str | None) -> None:
+    """Refuse flags that contradict one another. Raises UsageError."""
+    if run.workers is not None and run.workers < 1:
+        raise UsageError(f"--workers must be at least 1, got {run.workers}")
+    if run.workers is not None and run.scheduler is not None:
+        raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
+    if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
+        raise UsageError(f"{idle[0]} needs --out, the folder of the map")
+
+
+def _fitted(
+    path: str, scene: Scene, run: RunFlags, folder: Path | None, options: dict[str, Any]
+) -> Map | None:
+    """The map of a cube in its folder; None where it was interrupted, which is stated."""
+    from pellicle.api import maps
+
     remains = set() if folder is None or not folder.exists() else {folder, *folder.iterdir()}
     if folder is not None:
         _mark(folder)
     progress = PixelProgress(path)
     try:
         with progress:
-            made = maps.map(
+            return maps.map(
                 path,
                 scene,
                 out=None if folder is None else folder / STORE,
@@ -116,27 +133,17 @@ def map_cube(
                 preview=bool(run.preview),
                 neighbours=bool(run.neighbours),
                 lamp_curve=run.lamp_curve,
-                lamp_reference=reference,
-                recipe=Path(described.path).read_text(encoding="utf-8"),
                 progress=progress,
-                **reading,
+                **options,
             )
     except KeyboardInterrupt:
-        kept = (
-            "" if folder is None else f"; they are kept in {folder}, and the same command goes on from there"
-        )
+        kept = f"; they are kept in {folder}, and the same command goes on from there" if folder else ""
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
-        return INTERRUPTED
+        return None
     except ValueError:  # a cube that cannot be read leaves no folder
         if folder is not None and not progress.done:
             _remove(folder, remains)
         raise
-    if made.run is not None and made.run.earlier:
-        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    show(one_line(cube_json(made)) if json else as_flags(cube_report(made)), folder is not None)
-    if folder is not None:
-        _write(folder, made)
-    return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
 
 
 def _known(path: str) -> Scene:

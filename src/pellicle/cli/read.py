@@ -113,7 +113,8 @@ def _is_hdf5(path: str) -> bool:
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
     """The cube of a file; flags of other files are refused."""
-    from pellicle.cli.cube_flags import CubeFlags, read
+    from pellicle.cli.cube_flags import CubeFlags, reading
+    from pellicle.data.read_cube import read_cube
 
     shared = options.given()
     known = {field.name for field in fields(CubeFlags)}
@@ -121,7 +122,7 @@ def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
         raise UsageError(
             f"{path}: is a cube of spectra, which {named(wrong[:1])[0]} does not apply to: leave it out"
         )
-    return read(path, CubeFlags(**{**vars(of_cube), **shared}))
+    return read_cube(path, **reading(CubeFlags(**{**vars(of_cube), **shared})))
 
 
 def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
