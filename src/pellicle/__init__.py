@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle import dispersion as dispersion
     from pellicle import fitting as fitting
-    from pellicle.api.explorer import explore as explore
-    from pellicle.api.export import export as export
+    from pellicle.api.appearance import explore as explore
+    from pellicle.api.appearance import export as export
     from pellicle.api.fits import compare as compare
     from pellicle.api.fits import fit as fit
     from pellicle.api.fits import sample as sample
@@ -82,8 +82,7 @@ _NAMES = {
         "compare",
     ),
     "pellicle.api.maps": ("map",),
-    "pellicle.api.export": ("export",),
-    "pellicle.api.explorer": ("explore",),
+    "pellicle.api.appearance": ("explore", "export"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.cube": ("Cube",),

@@ -6,7 +6,6 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pellicle.api.arguments import refuse
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.errors import UsageError
@@ -23,7 +22,7 @@ from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene
+from pellicle.scene.kinds import check_scene, refuse
 from pellicle.scene.surface import Surface
 
 

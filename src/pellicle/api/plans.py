@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.api.arguments import refuse, viewed
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.film_plan import plan as film_plan
 from pellicle.effects.surface_plan import plan as surface_plan
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene
-from pellicle.scene.surface import Surface
-from pellicle.simulation.brdf import Directions
+from pellicle.scene.kinds import check_scene, refuse
+from pellicle.scene.surface import Surface, SurfaceView, surface_view
+from pellicle.simulation.brdf import Directions, default_directions
 from pellicle.simulation.spectra import default_wavelengths
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def plan(
     """
     check_scene(scene)
     if isinstance(scene, Surface):
-        return surface_plan(viewed(scene, directions), tolerance, keep)
+        return surface_plan(_viewed(scene, directions), tolerance, keep)
     refuse("a Scene", directions=directions)
     return film_plan(scene, tolerance, keep)
 
@@ -141,7 +140,7 @@ def cost(
     colours = (*COLOUR_METHODS, *RENDERER_METHODS)
     if isinstance(scene, Surface):
         refuse("a Surface", wavelength=wavelength, noise=noise, space=space, angle=angle)
-        view = viewed(scene, directions)
+        view = _viewed(scene, directions)
         return surface_cost(view, tolerance=tolerance, colours=colours, progress=progress)
     refuse("a Scene", directions=directions)
     if space is not None:
@@ -162,3 +161,8 @@ def cost(
         interval_methods=(*INTERVAL_METHODS, *SAMPLED_INTERVALS),
         progress=progress,
     )
+
+
+def _viewed(surface: Surface, directions: Directions | BrdfSamples | None) -> SurfaceView:
+    """A surface seen in `directions`, by default those of `pellicle.simulate`."""
+    return surface_view(surface, default_directions() if directions is None else directions)

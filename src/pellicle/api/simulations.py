@@ -8,13 +8,12 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.api.arguments import refuse
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene
+from pellicle.scene.kinds import check_scene, refuse
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
 from pellicle.simulation.colours import simulate_colours

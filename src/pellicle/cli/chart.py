@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from pellicle.cli.flags import Flags
 from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
@@ -18,6 +20,19 @@ if TYPE_CHECKING:
 View = Literal["chart", "balls", "bubble", "methods"]
 COUNT = 5
 """Thicknesses of a row of objects."""
+
+
+@dataclass(frozen=True)
+class SphereFlags(Flags):
+    """Flags of the sphere of a surface."""
+
+    light: Annotated[
+        float, Parameter(help="Surfaces: angle between the main lamp and the line of sight in degrees.")
+    ] = 35.0
+    environment: Annotated[
+        Literal["studio", "lamp"],
+        Parameter(help="Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."),
+    ] = "studio"
 
 
 def chart(
@@ -43,13 +58,7 @@ def chart(
             " computing the colour, side by side with ΔE2000 and time."
         ),
     ] = "chart",
-    light: Annotated[
-        float, Parameter(help="Surfaces: angle between the main lamp and the line of sight in degrees.")
-    ] = 35.0,
-    environment: Annotated[
-        Literal["studio", "lamp"],
-        Parameter(help="Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."),
-    ] = "studio",
+    sphere: Annotated[SphereFlags, Parameter(name="*")] = SphereFlags(),
 ) -> int:
     """Draw the interference colours of a recipe's film, objects under it, or a sphere of a recipe's surface.
 
@@ -67,7 +76,7 @@ def chart(
             raise UsageError(
                 "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
             )
-        return _surface(described, out, light, environment)
+        return _surface(described, out, sphere)
     scene = described.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
@@ -76,17 +85,28 @@ def chart(
         if invert is not None:
             raise UsageError("--invert belongs to a chart: leave out --view")
         return _objects(scene, view, out, nm, layer, Path(recipe).stem, eye)
+    _chart(scene, Path(recipe), out, (nm, angles), invert, {"layer": layer, **eye})
+    return 0
+
+
+def _chart(
+    scene: Scene,
+    recipe: Path,
+    out: str,
+    ranges: tuple[tuple[float, float], tuple[float, float]],
+    invert: str | None,
+    how: dict[str, Any],
+) -> None:
+    """Draw the colours over ranges of thickness and angle, and write their inverse into the file `invert`."""
     start()
     from pellicle.reporting import colour_figures
 
-    inverse = None
+    inverse, (nm, angles) = None, ranges
     if invert is not None:
         from pellicle.reporting.colour_figures import invert_chart
 
-        inverse = invert_chart(scene, invert, nm, angles[0], layer, **eye, source=Path(recipe).name)
-    outside = colour_figures.chart(
-        scene, out, nm, angles, layer, **eye, title=Path(recipe).stem, inverse=inverse
-    )
+        inverse = invert_chart(scene, invert, nm, angles[0], **how, source=recipe.name)
+    outside = colour_figures.chart(scene, out, nm, angles, **how, title=recipe.stem, inverse=inverse)
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
     if outside > 0.005:
         say(f"{100 * outside:.0f} % of the colours are outside sRGB and are shown by the nearest ones")
@@ -96,7 +116,6 @@ def chart(
             f"{invert}: thicknesses of {len(inverse.source)} colours at {angles[0]:g} degrees;"
             f" {ambiguous:.0f} % of the colours have more than one"
         )
-    return 0
 
 
 def _objects(
@@ -137,15 +156,15 @@ def _objects(
     return 0
 
 
-def _surface(recipe: SurfaceRecipe, out: str, light: float, environment: str) -> int:
-    if not 0 <= light <= 180:
-        raise UsageError(f"--light must lie in 0 to 180 degrees, got {light:g}")
+def _surface(recipe: SurfaceRecipe, out: str, flags: SphereFlags) -> int:
+    if not 0 <= flags.light <= 180:
+        raise UsageError(f"--light must lie in 0 to 180 degrees, got {flags.light:g}")
     surface = recipe.scene()
     start()
     from pellicle.reporting.sphere_figures import sphere
 
-    sphere(surface, out, light, Path(recipe.path).stem, environment=environment)
-    say(f"{out}: a sphere of {surface.model}, the main lamp {light:g} degrees from the line of sight")
+    sphere(surface, out, flags.light, Path(recipe.path).stem, environment=flags.environment)
+    say(f"{out}: a sphere of {surface.model}, the main lamp {flags.light:g} degrees from the line of sight")
     return 0
 
 

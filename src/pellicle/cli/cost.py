@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.flags import Flags
 from pellicle.cli.progress import Progress
 from pellicle.cli.reading import recipe_angles
 from pellicle.cli.session import check_folder, say, show, start
@@ -18,22 +20,45 @@ USUAL_EYE = (("observer", "1931"), ("illuminant", "D65"))
 """Keys of [camera] under which the methods for colours are compared."""
 
 
-def cost(
-    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
-    *,
+@dataclass(frozen=True)
+class CostFlags(Flags):
+    """Flags of the methods that are compared."""
+
     reference: Annotated[
         str, Parameter(help="Reference of the errors: float64, or mpmath with 50 digits.")
-    ] = "float64",
+    ] = "float64"
     tolerance: Annotated[
         float | None,
         Parameter(help="Error that is small enough: in R, T, degrees or, of colours, ΔE2000."),
-    ] = None,
+    ] = None
     datasets: Annotated[
         int, Parameter(help="Number of simulated spectra that every solver fits; 0 for no solvers.")
-    ] = 20,
+    ] = 20
     time_limit: Annotated[
         float, Parameter(help="Seconds after which no further simulated spectrum is fitted.")
-    ] = 120.0,
+    ] = 120.0
+
+    def check(self) -> None:
+        """Raise UsageError for an impossible number."""
+        if self.tolerance is not None and not 0 < self.tolerance < inf:
+            raise UsageError(
+                f"--tolerance must be above zero, got {self.tolerance:g}: give the largest error"
+            )
+        if self.datasets < 0:
+            raise UsageError(f"--datasets must not be negative, got {self.datasets}")
+        if not self.time_limit > 0:
+            raise UsageError(f"--time-limit must be above zero, got {self.time_limit:g} s")
+
+    def refuse_reference(self, what: str) -> None:
+        """Raise UsageError for a reference that is for spectra of films only."""
+        if self.reference != "float64":
+            raise UsageError(f"--reference is for {what} measured against steps of 1 nm in float64")
+
+
+def cost(
+    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
+    *,
+    methods: Annotated[CostFlags, Parameter(name="*")] = CostFlags(),
     out: Annotated[str | None, Parameter(help="Folder for report, figure and tables.")] = None,
     json: Annotated[bool, Parameter(help="Print one JSON object.", negative="")] = False,
 ) -> int:
@@ -44,25 +69,14 @@ def cost(
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
 
-    if tolerance is not None and not 0 < tolerance < inf:
-        raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")
-    if datasets < 0:
-        raise UsageError(f"--datasets must not be negative, got {datasets}")
-    if not time_limit > 0:
-        raise UsageError(f"--time-limit must be above zero, got {time_limit:g} s")
+    methods.check()
     described = read_recipe(recipe)
     options: dict[str, Any]
     if isinstance(described, SurfaceRecipe):
-        if reference != "float64":
-            raise UsageError(
-                "--reference is for films: a surface is measured against steps of 1 nm in float64"
-            )
+        methods.refuse_reference("films: a surface is")
         scene, options = described.scene(), {"directions": directions(described)}
     elif described.tables.data.signal in SPACES:
-        if reference != "float64":
-            raise UsageError(
-                "--reference is for spectra: colours are measured against steps of 1 nm in float64"
-            )
+        methods.refuse_reference("spectra: colours are")
         space, angle = described.tables.data.signal, recipe_angles(described)
         scene, options = described.scene(), {"space": space, "angle": angle}
         if any(item not in USUAL_EYE for item in described.camera.items()):
@@ -70,13 +84,7 @@ def cost(
     else:
         scene, nm = measured_scene(described)
         noise = described.tables.data.noise
-        options = {
-            "wavelength": nm,
-            "reference": reference,
-            "noise": noise,
-            "datasets": datasets,
-            "time_limit": time_limit,
-        }
+        options = vars(methods) | {"wavelength": nm, "noise": noise}
     if out is not None:
         check_folder(out)
     start(keep=False)
@@ -86,7 +94,7 @@ def cost(
     from pellicle.reporting.json_record import one_line
 
     with Progress(recipe) as progress:
-        result = plans.cost(scene, tolerance=tolerance, progress=progress, **options)
+        result = plans.cost(scene, **{"tolerance": methods.tolerance, **options}, progress=progress)
     show(one_line(to_json(result, recipe)) if json else text(result, recipe), out is not None)
     if out is not None:
         say(f"{write_cost(out, result, recipe)}: report, figure and tables written")

@@ -29,3 +29,10 @@ def check_scene(scene: Any, several: bool = False) -> None:
         elif callable(getattr(each, "scene", None)):
             remedy = "its .scene() is one"
         raise UsageError(f"`scene` must be {kinds}, not {name}: {remedy}")
+
+
+def refuse(kind: str, **arguments: Any) -> None:
+    """Raise TypeError where an argument of the other kind of scene is given."""
+    for name, value in arguments.items():
+        if value is not None:
+            raise TypeError(f"`{name}` has no meaning for {kind}")
