@@ -1,7 +1,5 @@
 """ENVI headers as cameras and remote sensing write them, and their files of numbers."""
 
-import struct
-
 import numpy as np
 import pytest
 
@@ -28,53 +26,31 @@ wavelength = {{
  550.0, 600.0, 650.0,
  700.0, 750.0, 800.0}}
 """
-PLACES = {
-    "bsq": lambda y, x, band: (band * 7 + y) * 5 + x,
-    "bil": lambda y, x, band: (y * 9 + band) * 5 + x,
-    "bip": lambda y, x, band: (y * 5 + x) * 9 + band,
-}
-"""Place of a number in the file by the definition of each interleave."""
 
 
 @pytest.fixture
 def envi(tmp_path, values):
-    """Write a header and a file of numbers, number by number; returns the header."""
+    """Write a header and a file of numbers; returns the header."""
 
-    def write(
-        interleave="bip", order=0, code=4, kind="f", offset=0, more="", scale=1.0, suffix=".dat", header=None
-    ):
-        size = struct.calcsize(kind)
-        content = bytearray(offset + 7 * 5 * 9 * size)
-        for y, x, band in np.ndindex(7, 5, 9):
-            number = float(values[y, x, band]) * scale
-            packed = struct.pack("<>"[order] + kind, number if kind in "fd" else round(number))
-            at = offset + PLACES[interleave](y, x, band) * size
-            content[at : at + size] = packed
-        (tmp_path / f"cube{suffix}").write_bytes(content)
-        path = tmp_path / (header or "cube.hdr")
-        path.write_text(
-            HEADER.format(offset=offset, code=code, interleave=interleave, order=order, more=more)
-        )
+    def write(interleave="bip", code=4, kind="f4", more="", scale=1.0, suffix=".dat", header="cube.hdr"):
+        order = {"bsq": (2, 0, 1), "bil": (0, 2, 1), "bip": (0, 1, 2)}[interleave]
+        content = values.transpose(order) * scale
+        content = (content if kind[0] == "f" else np.round(content)).astype(f"<{kind}")
+        (tmp_path / f"cube{suffix}").write_bytes(content.tobytes())
+        path = tmp_path / header
+        path.write_text(HEADER.format(offset=0, code=code, interleave=interleave, order=0, more=more))
         return path
 
     return write
 
 
-@pytest.mark.parametrize("interleave", ["bsq", "bil", "bip"])
-@pytest.mark.parametrize("order", [0, 1])
-def test_interleave_and_byte_order(envi, same, interleave, order):
-    header = envi(interleave, order, offset=12)
-    same(header)
-    same(header.with_suffix(".dat"))
-
-
 @pytest.mark.parametrize(
     ("code", "kind"),
-    [(1, "B"), (2, "h"), (3, "i"), (5, "d"), (12, "H"), (13, "I"), (14, "q"), (15, "Q")],
+    [(1, "u1"), (2, "i2"), (3, "i4"), (5, "f8"), (12, "u2"), (13, "u4"), (14, "i8"), (15, "u8")],
 )
 def test_data_types(envi, values, code, kind):
-    scale = 200.0 if kind == "B" else 10000.0
-    header = envi("bil", 0, code, kind, scale=scale, more=f"reflectance scale factor = {scale}\n")
+    scale = 200.0 if kind == "u1" else 10000.0
+    header = envi("bil", code, kind, scale=scale, more=f"reflectance scale factor = {scale}\n")
     cube = read_cube(header)
     assert cube.signal == "R"
     np.testing.assert_allclose(np.asarray(cube.arrays["values"]), values, atol=0.51 / scale)
@@ -155,4 +131,4 @@ def test_without_wavelengths_or_data(envi, refused, same):
 
 
 def test_whole_numbers_without_a_scale_are_counts(envi, refused):
-    refused(envi(code=12, kind="H", scale=4000.0), "uint16", "counts", "`white_frame`", error=DataError)
+    refused(envi(code=12, kind="u2", scale=4000.0), "uint16", "counts", "`white_frame`", error=DataError)

@@ -9,24 +9,6 @@ from pellicle.errors import DataError, UsageError
 NM = np.linspace(400.0, 800.0, 9)
 
 
-@pytest.mark.parametrize("order", ["C", "F"])
-@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (0, 2, 1)])
-def test_npy(values, same, tmp_path, order, axes):
-    np.save(tmp_path / "a.npy", np.array(values.transpose(axes), order=order))
-    assert same(tmp_path / "a.npy", wavelengths=NM).dims == ("y", "x")
-
-
-def test_array_in_memory(values, same):
-    same(values, wavelengths=NM)
-
-
-@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
-def test_npz_with_wavelengths_and_errors(values, same, tmp_path, save):
-    save(tmp_path / "a.npz", R=values, sigma=values * 0 + 0.01, wavelength_um=NM / 1000)
-    cube = same(tmp_path / "a.npz")
-    np.testing.assert_allclose(np.asarray(cube.arrays["sigma"]), 0.01, rtol=1e-6)
-
-
 def test_sites_and_time(values, tmp_path):
     np.save(tmp_path / "sites.npy", values.reshape(35, 9))
     assert read_cube(tmp_path / "sites.npy", wavelengths=NM).dims == ("site",)
@@ -69,8 +51,6 @@ def test_refusals(values, refused, tmp_path):
     refused(tmp_path / "flat.npy", "no array of pixels", error=DataError, wavelengths=NM)
     np.save(tmp_path / "objects.npy", np.array([{}]), allow_pickle=True)
     refused(tmp_path / "objects.npy", "damaged", error=DataError, wavelengths=NM)
-    (tmp_path / "short.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-4])
-    refused(tmp_path / "short.npy", "ends before", error=DataError, wavelengths=NM)
     (tmp_path / "text.md").write_text("# notes\n")
     refused(tmp_path / "text.md", "is no cube", "zarr, NetCDF, ENVI", error=DataError)
     refused(tmp_path / "absent.npy", "no such file", error=DataError)

@@ -1,7 +1,6 @@
 """TIFF stacks in the layouts that cameras, ImageJ and OME write."""
 
 import numpy as np
-import pytest
 import tifffile
 
 from pellicle.data.cubes.detect import is_photograph
@@ -9,31 +8,6 @@ from pellicle.data.read_cube import read_cube
 from pellicle.errors import DataError, UsageError
 
 NM = np.linspace(400.0, 800.0, 9)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"byteorder": ">"},
-        {"bigtiff": True},
-        {"imagej": True},
-        {"compression": "zlib", "rowsperstrip": 3},
-        {"compression": "zlib", "tile": (16, 16)},
-    ],
-)
-def test_one_page_a_wavelength(values, same, tmp_path, options):
-    path = tmp_path / "stack.tif"
-    kind = {} if "imagej" in options else {"photometric": "minisblack"}
-    tifffile.imwrite(path, values.transpose(2, 0, 1), **kind, **options)
-    assert same(path, wavelengths="400:800:50").dims == ("y", "x")
-
-
-def test_pages_that_were_written_one_by_one(values, same, tmp_path):
-    with tifffile.TiffWriter(tmp_path / "pages.tif") as writer:
-        for page in values.transpose(2, 0, 1):
-            writer.write(page, contiguous=False)
-    same(tmp_path / "pages.tif", wavelengths=NM)
 
 
 def test_larger_tiles_than_blocks(same, tmp_path):
@@ -44,13 +18,6 @@ def test_larger_tiles_than_blocks(same, tmp_path):
     cube = same(path, expected=large.transpose(1, 2, 0), wavelengths=NM)
     block = cube.pixels((slice(15, 40, 3), slice(30, 66)))["values"]
     np.testing.assert_array_equal(block, large[:, 15:40:3, 30:66].transpose(1, 2, 0).reshape(-1, 9))
-
-
-@pytest.mark.parametrize("compression", [None, "zlib"])
-def test_one_sample_a_wavelength(values, same, tmp_path, compression):
-    path = tmp_path / "samples.tif"
-    tifffile.imwrite(path, values, planarconfig="contig", photometric="minisblack", compression=compression)
-    same(path, wavelengths=NM)
 
 
 def test_a_series_in_time(values, tmp_path):
@@ -99,10 +66,3 @@ def test_a_compression_that_needs_another_package(values, refused, tmp_path):
         content[at : at + 2] = (34887).to_bytes(2, "little")  # LERC
     path.write_bytes(content)
     refused(path, str(path), "without compression", error=DataError, wavelengths=NM, signal_unit=4000)
-
-
-def test_damaged(values, refused, tmp_path):
-    path = tmp_path / "damaged.tif"
-    tifffile.imwrite(path, values.transpose(2, 0, 1), photometric="minisblack")
-    path.write_bytes(path.read_bytes()[:20])
-    refused(path, str(path), "save it again", error=DataError, wavelengths=NM)

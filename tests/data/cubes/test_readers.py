@@ -1,0 +1,165 @@
+"""Readers of cubes on the same cube: axes in any order, blocks, errors, copies, and damaged files."""
+
+import itertools
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import xarray as xr
+import zarr
+
+from pellicle.errors import DataError
+
+NM = np.linspace(400.0, 800.0, 9)
+GIVEN = {"wavelengths": NM}
+ORDERS = list(itertools.permutations(("y", "x", "wavelength")))
+
+
+def array(values, order=ORDERS[0], name="R"):
+    coords = {"wavelength": NM, "y": ("y", np.arange(7) * 0.1, {"units": "mm"})}
+    return xr.DataArray(values, coords, ORDERS[0], name=name).transpose(*order)
+
+
+def place(order):
+    return [ORDERS[0].index(axis) for axis in order]
+
+
+def npy(values, folder, *, order=ORDERS[0], memory="C"):
+    np.save(folder / "a.npy", np.array(values.transpose(place(order)), order=memory))
+    return folder / "a.npy"
+
+
+def npz(values, folder, save):
+    save(folder / "a.npz", R=values, sigma=values * 0 + 0.01, wavelength_um=NM / 1000)
+    return folder / "a.npz"
+
+
+def netcdf(values, folder, engine):
+    both = xr.Dataset({"R": array(values), "R_sigma": array(values * 0 + 0.01)})
+    both.to_netcdf(folder / "a.nc", engine=engine)
+    return folder / "a.nc"
+
+
+def group(values, folder, version, consolidated):
+    both = xr.Dataset({"R": array(values), "uncertainty": array(values * 0 + 0.01)})
+    both.to_zarr(folder / "a.zarr", zarr_format=version, consolidated=consolidated)
+    return folder / "a.zarr"
+
+
+def zarr_array(values, folder, names=None):
+    order = place(names) if names else [0, 1, 2]
+    zarr.create_array(folder / "a.zarr", data=values.transpose(order), dimension_names=names)
+    return folder / "a.zarr"
+
+
+def envi(values, folder, interleave, byte_order, *, data=False):
+    order = {"bsq": (2, 0, 1), "bil": (0, 2, 1), "bip": (0, 1, 2)}[interleave]
+    content = values.transpose(order).astype("<>"[byte_order] + "f4").tobytes()
+    (folder / "a.dat").write_bytes(bytes(12) + content)
+    (folder / "a.hdr").write_text(
+        "ENVI\nsamples = 5\nlines = 7\nbands = 9\nheader offset = 12\ndata type = 4\n"
+        f"interleave = {interleave}\nbyte order = {byte_order}\nwavelength units = Nanometers\n"
+        f"wavelength = {{\n {', '.join(map(str, NM))}}}\n"
+    )
+    return folder / ("a.dat" if data else "a.hdr")
+
+
+def stack(values, folder, **options):
+    kind = {} if "imagej" in options else {"photometric": "minisblack"}
+    tifffile.imwrite(folder / "a.tif", values.transpose(2, 0, 1), **kind, **options)
+    return folder / "a.tif"
+
+
+def pages(values, folder):
+    with tifffile.TiffWriter(folder / "a.tif") as writer:
+        for page in values.transpose(2, 0, 1):
+            writer.write(page, contiguous=False)
+    return folder / "a.tif"
+
+
+def samples(values, folder, compression):
+    contiguous = {"planarconfig": "contig", "photometric": "minisblack"}
+    tifffile.imwrite(folder / "a.tif", values, compression=compression, **contiguous)
+    return folder / "a.tif"
+
+
+def case(name, write, *more, given=False, **options):
+    return pytest.param(lambda v, folder: write(v, folder, *more, **options), GIVEN if given else {}, id=name)
+
+
+FILES = [
+    *(
+        case(f"npy {'-'.join(o)} {m}", npy, given=True, order=o, memory=m)
+        for o in ORDERS
+        if o.index("y") < o.index("x")
+        for m in "CF"
+    ),
+    case("npz", npz, np.savez),
+    case("npz, compressed", npz, np.savez_compressed),
+    *(case(f"NetCDF by {engine}", netcdf, engine) for engine in ("h5netcdf", "scipy")),
+    *(case(f"zarr {v}, {c}", group, v, c) for v in (2, 3) for c in (False, True)),
+    case("zarr array", zarr_array, given=True),
+    case("zarr array with names", zarr_array, ["wavelength", "y", "x"], given=True),
+    *(case(f"ENVI {i} {o}", envi, i, o) for i in ("bsq", "bil", "bip") for o in (0, 1)),
+    case("ENVI by its data", envi, "bsq", 0, data=True),
+    case("TIFF", stack, given=True),
+    case("TIFF, big-endian", stack, given=True, byteorder=">"),
+    case("BigTIFF", stack, given=True, bigtiff=True),
+    case("ImageJ", stack, given=True, imagej=True),
+    case("TIFF in strips", stack, given=True, compression="zlib", rowsperstrip=3),
+    case("TIFF in tiles", stack, given=True, compression="zlib", tile=(16, 16)),
+    case("TIFF page by page", pages, given=True),
+    *(case(f"TIFF of samples, {c}", samples, c, given=True) for c in (None, "zlib")),
+]
+WITH_ERRORS = ("npz", "NetCDF", "zarr 2", "zarr 3")
+
+
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")  # zarr 3 has no specification of it yet
+@pytest.mark.parametrize(("write", "options"), FILES)
+def test_a_file_is_read_to_the_same_cube(write, options, values, same, tmp_path, request):
+    cube = same(write(values, tmp_path), **options)
+    assert (cube.dims, cube.signal) == (("y", "x"), "R")
+    if request.node.callspec.id.startswith(WITH_ERRORS):
+        np.testing.assert_allclose(cube.pixels((slice(0, 3), slice(1, 2)))["sigma"], 0.01, rtol=1e-6)
+    copy = pickle.loads(pickle.dumps(cube))  # as it is sent to another process
+    where = slice(1, 6, 2), slice(3, None)
+    np.testing.assert_allclose(copy.pixels(where)["values"], values[where].reshape(-1, 9), rtol=1e-6)
+    part = cube.coarse(2)
+    np.testing.assert_allclose(np.asarray(part.arrays["values"]), values[1::2, 1::2], rtol=1e-6)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_arrays_of_xarray(order, values, same):
+    for source in (array(values, order), array(values, order).chunk({"y": 3}), array(values, order, None)):
+        cube = same(source)
+        np.testing.assert_allclose(cube.coords["y"], np.arange(7) * 0.1)
+        assert cube.units == {"y": "mm"}
+    same(values, **GIVEN)
+
+
+def _cut(path: Path, length: int) -> Path:
+    path.write_bytes(path.read_bytes()[:length])
+    return path
+
+
+@pytest.mark.parametrize(
+    ("write", "words"),
+    [
+        (lambda v, p: _cut(npy(v, p), -4), "ends before"),
+        (lambda v, p: _cut(npz(v, p, np.savez), 200), "damaged"),
+        (lambda v, p: _cut(netcdf(v, p, "h5netcdf"), 100), "cannot be opened"),
+        (lambda v, p: _cut(envi(v, p, "bsq", 0, data=True), -4), "incomplete"),
+        (lambda v, p: _cut(stack(v, p), 20), "save it again"),
+        (lambda v, p: _cut(group(v, p, 3, False) / "zarr.json", 20).parent, "damaged"),
+    ],
+)
+def test_damaged_files_are_named(write, words, values, refused, tmp_path):
+    path = write(values, tmp_path)
+    refused(path, str(tmp_path), words, error=DataError, **GIVEN)
+
+
+@pytest.mark.parametrize("shape", [(0, 5, 9), (4, 0, 9)])
+def test_a_cube_without_pixels(shape, refused):
+    refused(np.zeros(shape), "no pixels", f"y {shape[0]}, x {shape[1]}", error=DataError, **GIVEN)
