@@ -23,6 +23,20 @@ def widget(session: Session) -> Any:
     return _widget_class()(session)
 
 
+def _answered(session: Session, request: str, body: Mapping[str, Any]) -> dict[str, Any]:
+    """Answer of a session. Raises ValueError where it is an error."""
+    answer = session.answer(request, body)
+    if "error" in answer:
+        raise ValueError(answer["error"])
+    return answer
+
+
+def _defaults(session: Session, angles: list[float]) -> dict[str, float]:
+    """The scene's own values of the sliders at these angles. Raises ValueError for wrong ones."""
+    controls = _answered(session, "scene", {"angles": angles or None})["controls"]
+    return {control["name"]: control["value"] for control in controls}
+
+
 @cache
 def _widget_class() -> Any:
     try:
@@ -45,20 +59,13 @@ def _widget_class() -> Any:
 
         def __init__(self, session: Session) -> None:
             self._session = session
-            super().__init__(values=self._defaults([]))
+            super().__init__(values=_defaults(session, []))
             self.on_msg(self._receive)
-
-        def _defaults(self, angles: list[float]) -> dict[str, float]:
-            """The scene's own values of the sliders at these angles. Raises ValueError for wrong ones."""
-            answer = self._session.answer("scene", {"angles": angles or None})
-            if "error" in answer:
-                raise ValueError(answer["error"])
-            return {control["name"]: control["value"] for control in answer["controls"]}
 
         @traitlets.validate("angles")
         def _with_sliders(self, proposal: Any) -> list[float]:
             """Keep the values of the sliders that there are at these angles."""
-            defaults = self._defaults(proposal["value"])
+            defaults = _defaults(self._session, proposal["value"])
             self.values = {name: self.values.get(name, value) for name, value in defaults.items()}
             return proposal["value"]
 
@@ -67,10 +74,8 @@ def _widget_class() -> Any:
 
             **Raises:** ValueError for a film that no recipe expresses.
             """
-            answer = self._session.answer("recipe", {"values": self.values, "angles": self.angles or None})
-            if "error" in answer:
-                raise ValueError(answer["error"])
-            return answer["toml"]
+            body = {"values": self.values, "angles": self.angles or None}
+            return _answered(self._session, "recipe", body)["toml"]
 
         def _receive(self, _: Any, message: Any, buffers: Any) -> None:
             """Answer a message `{id, request, body}` by `{id, answer}`."""

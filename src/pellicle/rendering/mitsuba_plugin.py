@@ -54,101 +54,119 @@ def register() -> None:
     mi.register_bsdf(NAME, _film())
 
 
+def _init(film: Any, props: Any) -> None:
+    mi.BSDF.__init__(film, props)
+    with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
+        film.span = [float(x) for x in table["thickness"]]
+        own = float(table["default_thickness"])
+        values = table["spectra" if mi.is_spectral else "rgb"]
+        film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
+    film.shape = values.shape  # thicknesses, cosines, channels or wavelengths
+    film.texture = table_texture(values[..., None] if mi.is_spectral else values)
+    film.alpha = float(props.get("alpha", 0.1))
+    film.low = float(props.get("thickness_min", 0.0))
+    film.high = float(props.get("thickness_max", film.span[1]))
+    film.thickness = props.get("thickness", own)
+    lobe = mi.BSDFFlags.GlossyReflection if film.alpha > 0 else mi.BSDFFlags.DeltaReflection
+    varies = 0 if isinstance(film.thickness, float) else mi.BSDFFlags.SpatiallyVarying
+    film.m_components = [lobe | mi.BSDFFlags.FrontSide | varies]
+    film.m_flags = film.m_components[0]
+    film.flag = lobe
+
+
+def _reflectance(film: Any, si: Any, cosine: Any, active: Any) -> Any:
+    """Reflectance of the film at a cosine of the angle of incidence."""
+    nm = film.thickness
+    if not isinstance(nm, float):
+        nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
+    across = node(cosine, film.shape[1])
+    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), film.shape[0])
+    if not mi.is_spectral:
+        rgb = film.texture.eval(mi.Point2f(across, down), active)
+        return mi.Color3f(rgb[0], rgb[1], rgb[2])
+    first, last = film.wavelength
+    found = dr.zeros(mi.UnpolarizedSpectrum)
+    for channel in range(len(found)):
+        share = (si.wavelengths[channel] - first) / (last - first)
+        at = mi.Point3f(node(share, film.shape[2]), across, down)
+        found[channel] = film.texture.eval(at, active)[0]
+    return found
+
+
+def _facets(film: Any) -> Any:
+    return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, film.alpha)
+
+
+def _sample(film: Any, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+    bs = mi.BSDFSample3f()
+    cosine = mi.Frame3f.cos_theta(si.wi)
+    active = active & (cosine > 0)
+    bs.eta = 1.0
+    bs.sampled_component = mi.UInt32(0)
+    bs.sampled_type = mi.UInt32(+film.flag)
+    if film.alpha == 0:
+        bs.wo = mi.reflect(si.wi)
+        bs.pdf = mi.Float(1.0)
+        return bs, _reflectance(film, si, cosine, active) & active
+    facets = _facets(film)
+    m, pdf = facets.sample(si.wi, sample2)
+    bs.wo = mi.reflect(si.wi, m)
+    active = active & (pdf > 0) & (mi.Frame3f.cos_theta(bs.wo) > 0)
+    bs.pdf = pdf / (4 * dr.dot(bs.wo, m))
+    weight = facets.smith_g1(bs.wo, m)
+    return bs, (_reflectance(film, si, dr.dot(si.wi, m), active) * weight) & active
+
+
+def _eval(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+    return _eval_pdf(film, ctx, si, wo, active)[0]
+
+
+def _pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+    if film.alpha == 0:
+        return mi.Float(0.0)
+    cosine, active = _above(film, si, wo, active)
+    m = dr.normalize(si.wi + wo)
+    facets = _facets(film)
+    return dr.select(active, facets.eval(m) * facets.smith_g1(si.wi, m) / (4 * cosine), 0)
+
+
+def _eval_pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+    if film.alpha == 0:
+        return dr.zeros(mi.UnpolarizedSpectrum), mi.Float(0.0)
+    cosine, active = _above(film, si, wo, active)
+    m = dr.normalize(si.wi + wo)
+    facets = _facets(film)
+    density = facets.eval(m) / (4 * cosine)
+    shadowed, masked = facets.smith_g1(wo, m), facets.smith_g1(si.wi, m)
+    colour = _reflectance(film, si, dr.dot(si.wi, m), active)
+    value = colour * (density * shadowed * masked)
+    return value & active, dr.select(active, density * masked, 0)
+
+
+def _above(film: Any, si: Any, wo: Any, active: Any) -> Any:
+    cosine = mi.Frame3f.cos_theta(si.wi)
+    return cosine, active & (cosine > 0) & (mi.Frame3f.cos_theta(wo) > 0)
+
+
+def _traverse(film: Any, callback: Any) -> None:
+    if not isinstance(film.thickness, float):
+        callback.put("thickness", film.thickness, mi.ParamFlags.Differentiable)
+
+
+def _to_string(film: Any) -> str:
+    return f"{NAME}[alpha = {film.alpha:g}]"
+
+
 def _film() -> Any:
     """The class of the BSDF, made for the current variant."""
 
     class PellicleFilm(mi.BSDF):
-        def __init__(self, props: Any) -> None:
-            mi.BSDF.__init__(self, props)
-            with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
-                self.span = [float(x) for x in table["thickness"]]
-                own = float(table["default_thickness"])
-                values = table["spectra" if mi.is_spectral else "rgb"]
-                self.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
-            self.shape = values.shape  # thicknesses, cosines, channels or wavelengths
-            self.texture = table_texture(values[..., None] if mi.is_spectral else values)
-            self.alpha = float(props.get("alpha", 0.1))
-            self.low = float(props.get("thickness_min", 0.0))
-            self.high = float(props.get("thickness_max", self.span[1]))
-            self.thickness: Any = props.get("thickness", own)
-            lobe = mi.BSDFFlags.GlossyReflection if self.alpha > 0 else mi.BSDFFlags.DeltaReflection
-            varies = 0 if isinstance(self.thickness, float) else mi.BSDFFlags.SpatiallyVarying
-            self.m_components = [lobe | mi.BSDFFlags.FrontSide | varies]
-            self.m_flags = self.m_components[0]
-            self.flag = lobe
-
-        def reflectance(self, si: Any, cosine: Any, active: Any) -> Any:
-            """Reflectance of the film at a cosine of the angle of incidence."""
-            nm = self.thickness
-            if not isinstance(nm, float):
-                nm = self.low + (self.high - self.low) * nm.eval_1(si, active)
-            across = node(cosine, self.shape[1])
-            down = node((nm - self.span[0]) / (self.span[1] - self.span[0]), self.shape[0])
-            if not mi.is_spectral:
-                rgb = self.texture.eval(mi.Point2f(across, down), active)
-                return mi.Color3f(rgb[0], rgb[1], rgb[2])
-            first, last = self.wavelength
-            found = dr.zeros(mi.UnpolarizedSpectrum)
-            for channel in range(len(found)):
-                share = (si.wavelengths[channel] - first) / (last - first)
-                at = mi.Point3f(node(share, self.shape[2]), across, down)
-                found[channel] = self.texture.eval(at, active)[0]
-            return found
-
-        def facets(self) -> Any:
-            return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha)
-
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            bs = mi.BSDFSample3f()
-            cosine = mi.Frame3f.cos_theta(si.wi)
-            active = active & (cosine > 0)
-            bs.eta = 1.0
-            bs.sampled_component = mi.UInt32(0)
-            bs.sampled_type = mi.UInt32(+self.flag)
-            if self.alpha == 0:
-                bs.wo = mi.reflect(si.wi)
-                bs.pdf = mi.Float(1.0)
-                return bs, self.reflectance(si, cosine, active) & active
-            facets = self.facets()
-            m, pdf = facets.sample(si.wi, sample2)
-            bs.wo = mi.reflect(si.wi, m)
-            active = active & (pdf > 0) & (mi.Frame3f.cos_theta(bs.wo) > 0)
-            bs.pdf = pdf / (4 * dr.dot(bs.wo, m))
-            weight = facets.smith_g1(bs.wo, m)
-            return bs, (self.reflectance(si, dr.dot(si.wi, m), active) * weight) & active
-
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.eval_pdf(ctx, si, wo, active)[0]
-
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            if self.alpha == 0:
-                return mi.Float(0.0)
-            cosine, active = self._above(si, wo, active)
-            m = dr.normalize(si.wi + wo)
-            facets = self.facets()
-            return dr.select(active, facets.eval(m) * facets.smith_g1(si.wi, m) / (4 * cosine), 0)
-
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            if self.alpha == 0:
-                return dr.zeros(mi.UnpolarizedSpectrum), mi.Float(0.0)
-            cosine, active = self._above(si, wo, active)
-            m = dr.normalize(si.wi + wo)
-            facets = self.facets()
-            density = facets.eval(m) / (4 * cosine)
-            shadowed, masked = facets.smith_g1(wo, m), facets.smith_g1(si.wi, m)
-            colour = self.reflectance(si, dr.dot(si.wi, m), active)
-            value = colour * (density * shadowed * masked)
-            return value & active, dr.select(active, density * masked, 0)
-
-        def _above(self, si: Any, wo: Any, active: Any) -> Any:
-            cosine = mi.Frame3f.cos_theta(si.wi)
-            return cosine, active & (cosine > 0) & (mi.Frame3f.cos_theta(wo) > 0)
-
-        def traverse(self, callback: Any) -> None:
-            if not isinstance(self.thickness, float):
-                callback.put("thickness", self.thickness, mi.ParamFlags.Differentiable)
-
-        def to_string(self) -> str:
-            return f"{NAME}[alpha = {self.alpha:g}]"
+        __init__ = _init
+        sample = _sample
+        eval = _eval
+        pdf = _pdf
+        eval_pdf = _eval_pdf
+        traverse = _traverse
+        to_string = _to_string
 
     return PellicleFilm

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, TypeVar, cast
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 
@@ -24,7 +24,8 @@ from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_targets import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.progress import Progress, quiet
-from pellicle.fitting.result import Status
+from pellicle.fitting.result import Fit, Status
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.density import fingerprint, log_density, systematics
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
 from pellicle.sampling.modes import modes, sandwich_stretch
@@ -68,58 +69,90 @@ def sample(
     """
     began = time.perf_counter()
     installed()
-    assumption = ""
     if isinstance(scene, Surface):
-        measurements = measured((BrdfSamples,), data)
-        fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
-        unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
-        assumption = "there is a layer" if unsure else ""
-        rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
-        columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in rows]
-        compared = fit.layer_test.residual if fit.layer_test else ""
-        of = partial(BrdfMeasurements, rows, scene)
-        numbers = dict(scene.numbers), tuple(scene.bands), scene.media
-        identity = fingerprint([*columns, numbers], scene.model, compared, tolerance)
+        fitted = _of_surface(data, scene, tolerance, residual, progress)
     elif joint.of_both_kinds(scene):
-        every: Any = data
-        fit, ranked = joint.fitted(every, cast(Any, scene), tolerance, progress, residual=residual)
-        with jax.enable_x64(True):
-            own = joint.apart(every, cast(Any, scene))
-            columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in own.samples]
-            surface = dict(own.surface.numbers), tuple(own.surface.bands), own.surface.media
-            targets = spectra.measurements(own.films, own.scenes)
-            known = [*map(arrays, targets), *columns, surface]
-            identity = fingerprint(known, own.surface.model, residual, tolerance)
-        of = partial(joint.together, own, targets)
+        fitted = _of_both_kinds(data, scene, tolerance, residual, progress)
     else:
-        measurements, own_scene = measured(OF_A_FILM, data), cast(Any, scene)
-        fit, ranked = spectra.fitted(measurements, own_scene, tolerance, progress)
-        with jax.enable_x64(True):
-            targets = spectra.measurements(measurements, own_scene)
-            identity = fingerprint([arrays(target) for target in targets], tolerance)
-        of = partial(FilmMeasurements, spectra.listed(measurements), targets)
+        fitted = _of_film(data, scene, tolerance, progress)
     with jax.enable_x64(True):
-        ranked = ranked.counted
-        jacobian, covariance = linearised(ranked)
-        residuals, problem = of(ranked).evidence(jacobian), ranked.problem.affine()
-        shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
-        channels = [view.channels for view in problem.views]
-        effects = systematics(residuals, shares, channels, len(problem.parameters))
-        found_modes = modes(ranked, effects)
-        slope = problem.coordinates.slope(problem.box, found_modes.centre[0])
-        subject = Subject(
-            fit,
-            tuple(p.name for p in problem.parameters),
-            log_density(problem, effects),
-            found_modes,
-            lambda units: problem.values_near(units, ranked.values),
-            identity,
-            max(view.independent for view in problem.views),
-            lambda units, seed: predictions(problem, fit.parts, units, seed),
-            assumption,
-            sandwich_stretch(covariance, slope, found_modes),
-        )
+        subject = _subject(fitted)
     return sampled(subject, walkers, steps, seed, chain, progress, began)
+
+
+class _Fitted(NamedTuple):
+    """A fit with its minima, the function from them to its measurements, the hash that identifies its
+    posterior, and what the posterior assumes beyond the fit."""
+
+    fit: Fit
+    ranked: RankedMinima
+    measurements: Callable[[RankedMinima], Any]
+    identity: str
+    assumption: str = ""
+
+
+def _of_surface(
+    data: Any, scene: Surface, tolerance: float, residual: str | None, progress: Progress
+) -> _Fitted:
+    measurements = measured((BrdfSamples,), data)
+    fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
+    unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
+    rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
+    compared = fit.layer_test.residual if fit.layer_test else ""
+    numbers = dict(scene.numbers), tuple(scene.bands), scene.media
+    identity = fingerprint([*_columns(rows), numbers], scene.model, compared, tolerance)
+    assumption = "there is a layer" if unsure else ""
+    return _Fitted(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
+
+
+def _of_both_kinds(
+    data: Any, scene: Any, tolerance: float, residual: str | None, progress: Progress
+) -> _Fitted:
+    fit, ranked = joint.fitted(data, scene, tolerance, progress, residual=residual)
+    with jax.enable_x64(True):
+        own = joint.apart(data, scene)
+        surface = dict(own.surface.numbers), tuple(own.surface.bands), own.surface.media
+        targets = spectra.measurements(own.films, own.scenes)
+        known = [*map(arrays, targets), *_columns(own.samples), surface]
+        identity = fingerprint(known, own.surface.model, residual, tolerance)
+    return _Fitted(fit, ranked, partial(joint.together, own, targets), identity)
+
+
+def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> _Fitted:
+    measurements = measured(OF_A_FILM, data)
+    fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
+    with jax.enable_x64(True):
+        targets = spectra.measurements(measurements, scene)
+        identity = fingerprint([arrays(target) for target in targets], tolerance)
+    return _Fitted(fit, ranked, partial(FilmMeasurements, spectra.listed(measurements), targets), identity)
+
+
+def _columns(samples: Sequence[BrdfSamples]) -> list[tuple[Any, ...]]:
+    return [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in samples]
+
+
+def _subject(fitted: _Fitted) -> Subject:
+    """What is sampled: the log posterior with its systematic effects, its minima and its predictions."""
+    fit, ranked = fitted.fit, fitted.ranked.counted
+    jacobian, covariance = linearised(ranked)
+    residuals, problem = fitted.measurements(ranked).evidence(jacobian), ranked.problem.affine()
+    shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
+    channels = [view.channels for view in problem.views]
+    effects = systematics(residuals, shares, channels, len(problem.parameters))
+    mixture = modes(ranked, effects)
+    slope = problem.coordinates.slope(problem.box, mixture.centre[0])
+    return Subject(
+        fit,
+        tuple(p.name for p in problem.parameters),
+        log_density(problem, effects),
+        mixture,
+        lambda units: problem.values_near(units, ranked.values),
+        fitted.identity,
+        max(view.independent for view in problem.views),
+        lambda units, seed: predictions(problem, fit.parts, units, seed),
+        fitted.assumption,
+        sandwich_stretch(covariance, slope, mixture),
+    )
 
 
 OF_A_FILM = (Spectrum, Colours)
