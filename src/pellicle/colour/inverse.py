@@ -92,8 +92,8 @@ class ColourInverse:
         gain = limits**code.power
         cosine = np.cos(np.deg2rad(angles))
 
-        def exposed(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            channels = code.channels(table.evaluate(at[:, None], cosine))
+        def exposed(nm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            channels = code.channels(table.evaluate(nm[:, None], cosine))
             return channels, code.roots(channels)
 
         trial = np.linspace(low, high, 4096)
@@ -128,13 +128,13 @@ class ColourInverse:
         if len(flat) > _MANY:  # 8-bit images repeat their colours
             flat, where = np.unique(flat, axis=0, return_inverse=True)
         chunk = max(1, _CHUNK // len(self.thickness))
-        found = [_orders(flat[i : i + chunk], self, orders) for i in range(0, len(flat), chunk)]
-        columns = [np.concatenate(column)[where] for column in zip(*found, strict=True)]
+        chunks = [_orders(flat[i : i + chunk], self, orders) for i in range(0, len(flat), chunk)]
+        columns = [np.concatenate(column)[where] for column in zip(*chunks, strict=True)]
         return ColourThickness(*(x.reshape((*shape, *x.shape[1:])) for x in columns))
 
-    def missed(self, colours: np.ndarray, at: np.ndarray, gain: np.ndarray) -> np.ndarray:
-        """Residuals over σ (N, channels) of colours (N, channels) at points `at` of the grid."""
-        shown = self.space.encode(self.channels[at], self.roots[at], gain[:, None])
+    def missed(self, colours: np.ndarray, node: np.ndarray, gain: np.ndarray) -> np.ndarray:
+        """Residuals over σ (N, channels) of colours (N, channels) at nodes of the grid."""
+        shown = self.space.encode(self.channels[node], self.roots[node], gain[:, None])
         return (shown.reshape(colours.shape) - colours) / self.sigma
 
 
@@ -195,9 +195,9 @@ def _screened(colours: np.ndarray, model: ColourInverse) -> tuple[np.ndarray, np
     value = ((colours - np.tile(space.base, angles)) / model.sigma).astype(np.float32)
     inside = ((colours > 0) & (colours < 1) if space.clips else np.ones_like(colours)).astype(np.float32)
     h = model.homogeneous.astype(np.float32)
-    along, own = (value * inside) @ h.T, inside @ (h * h).T
-    gain = np.clip(along / np.maximum(own, 1e-20), *np.array(model.gain, np.float32))
-    chi2 = np.sum(value * value * inside, axis=1)[:, None] + gain * (gain * own - 2 * along)
+    along, square = (value * inside) @ h.T, inside @ (h * h).T
+    gain = np.clip(along / np.maximum(square, 1e-20), *np.array(model.gain, np.float32))
+    chi2 = np.sum(value * value * inside, axis=1)[:, None] + gain * (gain * square - 2 * along)
     return chi2, gain
 
 
@@ -205,33 +205,35 @@ def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.nd
     """The columns of `ColourThickness` of colours (colours, channels)."""
     each = np.arange(len(colours))
     chi2, gain = _screened(colours, model)
-    row, at = np.nonzero(chi2 < chi2.min(axis=1, keepdims=True) + _SCREENED)
-    gain = gain[row, at].astype(float)
-    missed = model.missed(colours[row], at, gain)
+    row, node = np.nonzero(chi2 < chi2.min(axis=1, keepdims=True) + _SCREENED)
+    gain = gain[row, node].astype(float)
+    missed = model.missed(colours[row], node, gain)
     log_volume: Any = 0.0
     if model.gain[1] > model.gain[0]:  # one step of Gauss and Newton in ln(gain), exact for dark channels
-        slope = (model.missed(colours[row], at, gain * _STEP) - missed) / np.log(_STEP)
-        own = np.sum(slope * slope, axis=1)
-        gain = gain * np.exp(np.clip(-np.sum(slope * missed, axis=1) / np.maximum(own, 1e-9), -0.2, 0.2))
+        slope = (model.missed(colours[row], node, gain * _STEP) - missed) / np.log(_STEP)
+        curvature = np.sum(slope * slope, axis=1)
+        gain = gain * np.exp(
+            np.clip(-np.sum(slope * missed, axis=1) / np.maximum(curvature, 1e-9), -0.2, 0.2)
+        )
         gain = np.clip(gain, *model.gain)
-        missed = model.missed(colours[row], at, gain)
+        missed = model.missed(colours[row], node, gain)
         # width of the likelihood in ln(gain), at most that of the prior
-        log_volume = -0.5 * np.log(own / (2 * np.pi) + np.log(model.gain[1] / model.gain[0]) ** -2)
+        log_volume = -0.5 * np.log(curvature / (2 * np.pi) + np.log(model.gain[1] / model.gain[0]) ** -2)
     chi2 = np.sum(missed * missed, axis=1)
     log_p = log_volume - 0.5 * chi2
     peak = np.maximum.reduceat(log_p, np.searchsorted(row, each))
     kept = log_p > (peak - _PRUNED)[row]
-    row, at, chi2, gain, log_p = (x[kept] for x in (row, at, chi2, gain, log_p))
-    mass = np.exp(log_p - peak[row]) * model.width[at]
+    row, node, chi2, gain, log_p = (x[kept] for x in (row, node, chi2, gain, log_p))
+    mass = np.exp(log_p - peak[row]) * model.width[node]
 
     def summed(first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mass, mean and standard deviation of the thicknesses from each of these to the next."""
-        nm = model.thickness[at]
+        nm = model.thickness[node]
         part, mean, square = (np.add.reduceat(mass * x, first) for x in (np.ones_like(nm), nm, nm * nm))
         mean, square = mean / part, square / part
-        return part, mean, np.sqrt(np.clip(square - mean**2, 0.0, None) + model.width[at[first]] ** 2 / 12)
+        return part, mean, np.sqrt(np.clip(square - mean**2, 0.0, None) + model.width[node[first]] ** 2 / 12)
 
-    first = _boundaries(row, at, log_p)
+    first = _boundaries(row, node, log_p)
     _, mean, spread = summed(first)
     near = np.diff(mean) < _APART * (spread[1:] + spread[:-1])
     first = first[np.concatenate([[True], (np.diff(row[first]) != 0) | ~near])]
@@ -242,11 +244,11 @@ def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.nd
     best = np.lexsort((-log_p, order))[np.searchsorted(order, np.arange(len(first)))]
 
     exposure = gain[best] ** (1 / model.space.power)
-    shown = _delta_e(colours[owner], model, at[best], gain[best])
+    shown = _delta_e(colours[owner], model, node[best], gain[best])
     columns = (mean, spread, probability, shown, exposure, chi2[best])
     ranking, result = _ranked(columns, owner, len(each), most)
     last = len(model.thickness) - 1
-    ends = (at[best] == last) | ((at[best] == 0) & (model.thickness[0] > 0))
+    ends = (node[best] == last) | ((node[best] == 0) & (model.thickness[0] > 0))
     return *result, _status(result[1:], ends[ranking], colours.shape[1], model)
 
 
@@ -269,17 +271,17 @@ def _ranked(
     return first, tables
 
 
-def _boundaries(row: np.ndarray, at: np.ndarray, log_p: np.ndarray) -> np.ndarray:
+def _boundaries(row: np.ndarray, node: np.ndarray, log_p: np.ndarray) -> np.ndarray:
     """First position of every order: a new colour, a gap in the grid or a minimum of the posterior."""
-    follows = (np.diff(row) == 0) & (np.diff(at) == 1)
+    follows = (np.diff(row) == 0) & (np.diff(node) == 1)
     falls, rises = np.diff(log_p) < 0, np.diff(log_p) >= 0
     minimum = np.concatenate([[False], (follows & falls)[:-1] & (follows & rises)[1:], [False]])
     return np.flatnonzero(np.concatenate([[True], ~follows]) | minimum)
 
 
-def _delta_e(colours: np.ndarray, model: ColourInverse, at: np.ndarray, gain: np.ndarray) -> np.ndarray:
+def _delta_e(colours: np.ndarray, model: ColourInverse, node: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Mean ΔE*ab over the angles between measured colours and those of the film."""
-    shown = model.space.encode(model.channels[at], model.roots[at], gain[:, None])
+    shown = model.space.encode(model.channels[node], model.roots[node], gain[:, None])
     one, other = (
         np.asarray(lab(model.space.decode(x), model.white)) for x in (shown, colours.reshape(shown.shape))
     )
@@ -287,12 +289,12 @@ def _delta_e(colours: np.ndarray, model: ColourInverse, at: np.ndarray, gain: np
 
 
 def _status(
-    found: Sequence[np.ndarray], ended: np.ndarray, channels: int, model: ColourInverse
+    columns: Sequence[np.ndarray], ended: np.ndarray, channels: int, model: ColourInverse
 ) -> np.ndarray:
     """Status of each colour from the columns of its orders, `stderr` to `chi2`."""
     from scipy.special import chdtri  # slow to import
 
-    stderr, probability, *_, chi2 = found
+    stderr, probability, *_, chi2 = columns
     freedom = max(channels - 1 - (model.gain[1] > model.gain[0]), 1)
     unlike = np.nanmin(chi2, axis=1) > chdtri(freedom, MISFIT_LEVEL)
     blind = stderr[:, 0] > 0.2 * np.ptp(model.thickness)  # a uniform posterior has 0.29

@@ -92,27 +92,27 @@ def camera_sensor(
     >>> camera_sensor(nm, bands, [300.0, 800.0], [1.0, 1.0]).white.round(6).tolist()
     [1.0, 1.0, 1.0]
     """
-    at, seen = _increasing("wavelength", wavelength), np.asarray(sensitivities, float)
+    seen_at, seen = _increasing("wavelength", wavelength), np.asarray(sensitivities, float)
     lit_at, power = _increasing("lamp_wavelength", lamp_wavelength), np.asarray(lamp, float)
-    if seen.shape != (at.size, 3) or power.shape != lit_at.shape:
+    if seen.shape != (seen_at.size, 3) or power.shape != lit_at.shape:
         raise ValueError(
             f"expected the shapes (N, 3) and (M,) of the tables, got {seen.shape}, {power.shape}"
         )
-    nm = np.arange(np.ceil(max(at[0], lit_at[0])), np.floor(min(at[-1], lit_at[-1])) + 1)
+    nm = np.arange(np.ceil(max(seen_at[0], lit_at[0])), np.floor(min(seen_at[-1], lit_at[-1])) + 1)
     if nm.size < 100:
         raise ValueError(
-            f"the camera is known from {at[0]:g} to {at[-1]:g} nm and the lamp from {lit_at[0]:g} to"
-            f" {lit_at[-1]:g} nm: they must share 100 nm"
+            f"the camera is known from {seen_at[0]:g} to {seen_at[-1]:g} nm and the lamp from {lit_at[0]:g}"
+            f" to {lit_at[-1]:g} nm: they must share 100 nm"
         )
     relative = seen / seen.max(axis=0)
-    beyond = np.max(np.abs(relative[(at <= nm[0]) | (at >= nm[-1])]), axis=0)
+    beyond = np.max(np.abs(relative[(seen_at <= nm[0]) | (seen_at >= nm[-1])]), axis=0)
     if np.any(beyond > _CUT):
         name, share = "RGB"[int(np.argmax(beyond))], 100 * beyond.max()
         raise ValueError(
             f"the channel {name} has {share:.0f} % of its sensitivity at or beyond {nm[0]:g} or {nm[-1]:g}"
             " nm, where the table of the camera or of the lamp ends: give tables of the whole range"
         )
-    both = _at(nm, at, seen) * np.interp(nm, lit_at, power)[:, None]
+    both = _at(nm, seen_at, seen) * np.interp(nm, lit_at, power)[:, None]
     white = both.sum(axis=0)
     if not np.all(white > 0):
         raise ValueError(f"the channel {'RGB'[int(np.argmin(white))]} receives no light from this lamp")
@@ -128,12 +128,13 @@ def observer_sensor(observer: str, lamp_wavelength: ArrayLike, lamp: ArrayLike) 
     **Raises:** ValueError for an unknown observer, a table that ends before that and one without light.
     """
     eye = sensor(observer, "E")
-    at, power = _increasing("lamp_wavelength", lamp_wavelength), np.asarray(lamp, float)
-    if at[0] > 390 or at[-1] < 720:
+    lit_at, power = _increasing("lamp_wavelength", lamp_wavelength), np.asarray(lamp, float)
+    if lit_at[0] > 390 or lit_at[-1] < 720:
         raise ValueError(
-            f"the lamp is known from {at[0]:g} to {at[-1]:g} nm: an observer needs it from 390 to 720 nm"
+            f"the lamp is known from {lit_at[0]:g} to {lit_at[-1]:g} nm: an observer needs it from 390 to"
+            " 720 nm"
         )
-    weights = eye.weights * np.interp(eye.wavelength, at, power)[:, None]
+    weights = eye.weights * np.interp(eye.wavelength, lit_at, power)[:, None]
     if not weights[:, 1].sum() > 0:
         raise ValueError("the lamp has no light that an observer sees")
     return Sensor(eye.wavelength, weights / weights[:, 1].sum())

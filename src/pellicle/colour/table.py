@@ -166,8 +166,8 @@ class FilmColourTable(eqx.Module):
 
     def xyz(self, thickness: Any, cosine: Any = 1.0) -> Float[Array, "... 3"]:
         """XYZ (..., 3) at thicknesses (nm) and cosines of the angle of incidence, which broadcast."""
-        at = jnp.broadcast_arrays(*(jnp.asarray(x, self.nodes.dtype) for x in (thickness, cosine)))
-        return _interpolated(self.nodes, _Grid(self.path, self.cosine, self.shear), *at)
+        films = jnp.broadcast_arrays(*(jnp.asarray(x, self.nodes.dtype) for x in (thickness, cosine)))
+        return _interpolated(self.nodes, _Grid(self.path, self.cosine, self.shear), *films)
 
     def __call__(self, thickness: Any, cosine: Any = 1.0) -> Colour:
         """Colour at thicknesses (nm) and cosines of the angle of incidence, which broadcast."""
@@ -175,8 +175,8 @@ class FilmColourTable(eqx.Module):
 
     def evaluate(self, thickness: np.ndarray, cosine: np.ndarray) -> np.ndarray:
         """XYZ (..., 3) as `xyz`, in NumPy: nothing is compiled."""
-        path, at, shear = (np.asarray(x) for x in (self.path, self.cosine, self.shear))
-        nodes, grid = np.asarray(self.nodes), _Grid(path, at, shear)
+        path, cosines, shear = (np.asarray(x) for x in (self.path, self.cosine, self.shear))
+        nodes, grid = np.asarray(self.nodes), _Grid(path, cosines, shear)
         return _interpolated(nodes, grid, *np.broadcast_arrays(thickness, cosine))
 
     @property
@@ -222,9 +222,9 @@ def _interpolated(nodes: Any, grid: _Grid, thickness: Any, cosine: Any) -> Any:
     return total
 
 
-def _cell(at: Any, span: Any, count: int, xp: Any) -> tuple[Any, tuple[Any, Any]]:
+def _cell(coordinate: Any, span: Any, count: int, xp: Any) -> tuple[Any, tuple[Any, Any]]:
     """Cell of a coordinate, and Hermite's weights of value and slope at its two nodes."""
-    position = xp.clip((at - span[0]) * ((count - 1) / (span[1] - span[0])), 0.0, count - 1.0)
+    position = xp.clip((coordinate - span[0]) * ((count - 1) / (span[1] - span[0])), 0.0, count - 1.0)
     cell = xp.minimum(position.astype("int32"), count - 2)
     f = position - cell
     g = 1.0 - f
@@ -271,28 +271,30 @@ class _Probes(NamedTuple):
 
         lab = [np.asarray(spaces.lab(x, white)) for x in (table(self.thickness, self.cosine), self.xyz)]
         missed = np.linalg.norm(lab[0] - lab[1], axis=-1)
-        found = _slopes(table, self.thickness, self.cosine, self.steps)
-        slopes = zip(found, self.slopes, strict=True)
+        slopes_of_table = _slopes(table, self.thickness, self.cosine, self.steps)
+        slopes = zip(slopes_of_table, self.slopes, strict=True)
         worst = max(np.max(np.abs(one - exact)) / np.max(np.abs(exact)) for one, exact in slopes)
         return TableError(missed.mean(), missed.max(), worst)
 
 
 def _probes(colours: Colours, thickness: tuple[float, float], cosine: tuple[float, float]) -> _Probes:
     draws = np.random.default_rng(0).uniform(0.001, 0.999, (2, _PROBES))
-    nm, at = (low + draw * (high - low) for draw, (low, high) in zip(draws, (thickness, cosine), strict=True))
+    nm, cosines = (
+        low + draw * (high - low) for draw, (low, high) in zip(draws, (thickness, cosine), strict=True)
+    )
     steps = (1e-4 * (thickness[1] - thickness[0]), 1e-4 * (cosine[1] - cosine[0]))
-    return _Probes(nm, at, colours(nm, at), _slopes(colours, nm, at, steps), steps)
+    return _Probes(nm, cosines, colours(nm, cosines), _slopes(colours, nm, cosines, steps), steps)
 
 
 def _slopes(
     colours: Colours, thickness: np.ndarray, cosine: np.ndarray, steps: tuple[float, float]
 ) -> list[np.ndarray]:
     """Derivatives of XYZ in thickness and in cosine, by central differences."""
-    found = []
+    slopes = []
     for nm, tilt in ((steps[0], 0.0), (0.0, steps[1])):
         above, below = (colours(thickness + s * nm, cosine + s * tilt) for s in (1, -1))
-        found.append((above - below) / (2 * (nm + tilt)))
-    return found
+        slopes.append((above - below) / (2 * (nm + tilt)))
+    return slopes
 
 
 @jax.jit

@@ -95,31 +95,33 @@ def read_colour_rows(
     """
     file = text_file(*read_bytes(path), path)
     names, rows, cells, delimiter = named_cells(file, columns)
-    found = _recognised(names, file.path)
-    space = _space(file, found.kind, space)
-    comma = delimiter != "," and any("," in row[i] for row in cells for i in found.channels)
+    chosen = _recognised(names, file.path)
+    space = _space(file, chosen.kind, space)
+    comma = delimiter != "," and any("," in row[i] for row in cells for i in chosen.channels)
     table = colour_table(file, names, rows, cells, comma)
-    numbers = table.numbers([*found.channels, *found.sigma, *([] if found.angle is None else [found.angle])])
+    numbers = table.numbers(
+        [*chosen.channels, *chosen.sigma, *([] if chosen.angle is None else [chosen.angle])]
+    )
     values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
-    sigma = np.stack((rest[: len(found.sigma)] * 3)[:3], axis=1) if found.sigma else None
-    angle = rest[-1] if found.angle is not None else None
-    if found.kind == "xyY":
-        values = _from_chromaticity(table, found.channels, values)
-    where = [table.places(position) for position in found.channels]
-    values, sigma, note = scaled(values, sigma, space, unit or found.unit, where, file.path)
-    shown = ", ".join(names[i].strip() for i in found.channels)
+    sigma = np.stack((rest[: len(chosen.sigma)] * 3)[:3], axis=1) if chosen.sigma else None
+    angle = rest[-1] if chosen.angle is not None else None
+    if chosen.kind == "xyY":
+        values = _from_chromaticity(table, chosen.channels, values)
+    where = [table.places(position) for position in chosen.channels]
+    values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
+    shown = ", ".join(names[i].strip() for i in chosen.channels)
     notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
-    notes += [f"ignored: {', '.join(found.ignored)}"] if found.ignored else []
-    films = np.array(["" if found.name is None else row[found.name] for row in cells])
+    notes += [f"ignored: {', '.join(chosen.ignored)}"] if chosen.ignored else []
+    films = np.array(["" if chosen.name is None else row[chosen.name] for row in cells])
     lines = np.array([row.number for row in rows])
     sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
     return [
         ColourRows(
             space,
-            values[own],
-            None if sigma is None else sigma[own],
-            None if angle is None else angle[own],
-            lines[own],
+            values[of_film],
+            None if sigma is None else sigma[of_film],
+            None if angle is None else angle[of_film],
+            lines[of_film],
             tuple(notes),
             film,
             file.path,
@@ -127,7 +129,7 @@ def read_colour_rows(
             sight,
         )
         for film in dict.fromkeys(films.tolist())
-        for own in [films == film]
+        for of_film in [films == film]
     ]
 
 
@@ -176,16 +178,16 @@ def _recognised(names: Sequence[str], path: str) -> _Columns:
 def _space(file: TextFile, kind: str, requested: str | None) -> str:
     """The space of the columns. Raises UsageError where it is not the requested one."""
     said = [match[1] for comment in file.comments if (match := _STATED.match(comment.text))]
-    own = {"rgb": ("srgb", "rgb"), "xyz": ("xyz",), "xyY": ("xyz",), "lab": ("lab",)}[kind]
-    stated = said[0] if said and said[0] in own else None
+    spaces = {"rgb": ("srgb", "rgb"), "xyz": ("xyz",), "xyY": ("xyz",), "lab": ("lab",)}[kind]
+    stated = said[0] if said and said[0] in spaces else None
     if requested is None:
-        return stated or own[0]
+        return stated or spaces[0]
     if requested not in SPACES:
         raise UsageError(f"`signal` of colours must be one of {', '.join(SPACES)}, not {requested!r}")
-    if requested not in own or (stated and requested != stated):
+    if requested not in spaces or (stated and requested != stated):
         raise UsageError(
-            f"{file.path}: has colours in {stated or own[0]}, not in {requested}: leave `signal` out, or give"
-            f" `signal={stated or own[0]!r}`"
+            f"{file.path}: has colours in {stated or spaces[0]}, not in {requested}: leave `signal` out, or"
+            f" give `signal={stated or spaces[0]!r}`"
         )
     return requested
 
@@ -273,14 +275,14 @@ def bare_name(name: str) -> tuple[str, str | None]:
 
 def channel_sets(names: Sequence[str]) -> dict[str, list[int]]:
     """Return the positions of the channels of every set that the names have: rgb, xyz, xyY and lab."""
-    found = {}
+    sets = {}
     for kind, channels in _SETS.items():
         bare = [bare_name(name)[0] for name in names]
-        own = [name.lower() for name in bare] if kind == "rgb" else bare
-        at = [next((i for i, name in enumerate(own) if name in known), -1) for known in channels]
-        if min(at) >= 0:
-            found[kind] = at
-    return found
+        spelt = [name.lower() for name in bare] if kind == "rgb" else bare
+        positions = [next((i for i, name in enumerate(spelt) if name in known), -1) for known in channels]
+        if min(positions) >= 0:
+            sets[kind] = positions
+    return sets
 
 
 def scaled(

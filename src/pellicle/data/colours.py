@@ -190,8 +190,8 @@ def write_colours(
     rows = []
     for film in films:
         angle = np.zeros(len(film)) if film.angle is None else film.angle
-        for at, values, sigma in zip(angle, film.values, film.noise, strict=True):
-            numbers = [*[at] * angled, *values, *(sigma if spread else ())]
+        for degrees, values, sigma in zip(angle, film.values, film.noise, strict=True):
+            numbers = [*[degrees] * angled, *values, *(sigma if spread else ())]
             rows.append(",".join([f'"{film.name}"'] * named + [f"{x:.8g}" for x in numbers]))
     light = "transmitted" if first.signal == "T" else "reflected"
     lines = [f"# signal {first.space}, {light}, {first.polarisation}", *(f"# {line}" for line in comments)]

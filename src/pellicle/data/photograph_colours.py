@@ -51,8 +51,8 @@ def photograph_colours(
     films = []
     for number, each in enumerate(regions):
         value, sigma, sentences = region_colour(each, photograph, seen.coding, reference)
-        own = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
-        films.append(ColourRows(space, value, sigma, own, None, (*told, *sentences), str(each)))
+        of_region = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
+        films.append(ColourRows(space, value, sigma, of_region, None, (*told, *sentences), str(each)))
     if angles is not None and angles.ndim:
         films = [_joined(films)]
     return [film._replace(path=photograph.path, sha256=photograph.sha256) for film in films], seen

@@ -232,7 +232,7 @@ def parse_points(
 ) -> list[Region]:
     """Return the squares of 5 by 5 pixels around points `x,y;x,y`, cut at the edges. Raises UsageError."""
     width, height = photograph.size
-    found = []
+    squares = []
     for x, y in whole_numbers(value, 2, "points", "x,y"):
         if not (0 <= x < width and 0 <= y < height):
             raise UsageError(
@@ -240,8 +240,8 @@ def parse_points(
             )
         left, top = max(x - POINT, 0), max(y - POINT, 0)
         right, bottom = min(x + POINT + 1, width), min(y + POINT + 1, height)
-        found.append(Region(left, top, right - left, bottom - top))
-    return found
+        squares.append(Region(left, top, right - left, bottom - top))
+    return squares
 
 
 class Strip(NamedTuple):
@@ -272,7 +272,10 @@ def strip(photograph: Photograph, value: str | Sequence[int]) -> Strip:
     across = np.arange(STRIP) - STRIP // 2
     x = x0 + along[:, None] * (x1 - x0) - across * (y1 - y0) / length
     y = y0 + along[:, None] * (y1 - y0) + across * (x1 - x0) / length
-    column, row = (np.clip(np.rint(at), 0, size - 1).astype(int) for at, size in ((x, width), (y, height)))
+    column, row = (
+        np.clip(np.rint(coordinate), 0, size - 1).astype(int)
+        for coordinate, size in ((x, width), (y, height))
+    )
     return Strip(along * length, photograph.pixels[row, column])
 
 

@@ -129,8 +129,8 @@ def _profile(brdf: Brdf, x: np.ndarray) -> np.ndarray:
             i, m = vectors(light, 0.0)[:, None], vectors(theta, azimuth)
             o = 2 * (i * m).sum(axis=0) * m - i
             seen = np.where(o[2] > 1e-3, o[2], 0.0)  # a light leaves the mean where its mirror light sets
-            at = np.where(seen > 0, o, np.array([[0.0], [0.0], [1.0]]))
-            strength = np.abs(brdf(np.broadcast_to(i, o.shape), at)).mean(axis=1)
+            viewer = np.where(seen > 0, o, np.array([[0.0], [0.0], [1.0]]))
+            strength = np.abs(brdf(np.broadcast_to(i, o.shape), viewer)).mean(axis=1)
             total += strength * 4 * i[2] * seen * seen
             weight += seen
     known = weight > 0
@@ -151,12 +151,12 @@ def _projected_area(profile: np.ndarray, x: np.ndarray, theta: np.ndarray) -> np
 def _values(brdf: Brdf, table: RglBrdf, side: int) -> np.ndarray:
     """Values of the nodes, (azimuths, thetas, channels, side, side)."""
     y, x = (part.ravel() / (side - 1) for part in np.mgrid[:side, :side])
-    found = []
+    slices = []
     for slice_, (azimuth, theta) in enumerate(np.ndindex(table.values.shape[:2])):
         around = Corners(np.full((1, x.size), slice_), np.ones((1, x.size)))
         i, o, factor = table.directions(azimuth, theta, *table.warp.sample(around, x, y))
         above = o[2] > 0
-        at = np.where(above, o, np.array([[0.0], [0.0], [1.0]]))
-        seen = brdf(np.broadcast_to(i[:, None], o.shape), at) / factor[:, None]
-        found.append(np.where(above[:, None], seen, 0.0).T.reshape(-1, side, side))
-    return np.reshape(found, (*table.values.shape[:2], -1, side, side))
+        viewer = np.where(above, o, np.array([[0.0], [0.0], [1.0]]))
+        seen = brdf(np.broadcast_to(i[:, None], o.shape), viewer) / factor[:, None]
+        slices.append(np.where(above[:, None], seen, 0.0).T.reshape(-1, side, side))
+    return np.reshape(slices, (*table.values.shape[:2], -1, side, side))

@@ -130,8 +130,8 @@ def _form(path: str) -> tuple[str, str, bool]:
     A form has a name of its own beside that of the book, as amorphous silicon in the book of silicon.
     """
     book, page = path.split("/")[-2:] if path.count("/") == 2 else ("", path)
-    own = next((entry.name for entry in names() if entry.page and entry.page.path == path), book)
-    return book, own if find_name(book) else book, page.endswith("-e")
+    form = next((entry.name for entry in names() if entry.page and entry.page.path == path), book)
+    return book, form if find_name(book) else book, page.endswith("-e")
 
 
 def known_words() -> list[str]:

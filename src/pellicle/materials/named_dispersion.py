@@ -68,19 +68,19 @@ class Material(AbstractDispersion):
 
     def check_range(self, wavelengths: Any) -> None:
         """Raise DataError (a ValueError) if any of the concrete `wavelengths` (nm) is outside the range."""
-        at = np.atleast_1d(np.asarray(wavelengths, dtype=float))
+        nm = np.atleast_1d(np.asarray(wavelengths, dtype=float))
         low, high = self.wavelength_range
-        outside = at[~((at >= low) & (at <= high))]
+        outside = nm[~((nm >= low) & (nm <= high))]
         if not outside.size:
-            self._check_clear(at)
+            self._check_clear(nm)
             return
         first, last = float(outside.min()), float(outside.max())
         which = f"{first:g} nm" if not last > first else f"{first:g} to {last:g} nm"
         source = "" if self.page == self.name else f" ({self.page})"
         remedies = []
-        if at.min() < high and at.max() > low:
-            remedies.append(f"cut the data with `range=({max(low, at.min()):g}, {min(high, at.max()):g})`")
-        others = covering(self.page, float(at.min()), float(at.max()))
+        if nm.min() < high and nm.max() > low:
+            remedies.append(f"cut the data with `range=({max(low, nm.min()):g}, {min(high, nm.max()):g})`")
+        others = covering(self.page, float(nm.min()), float(nm.max()))
         remedies.append(
             f"use a page that covers them all ({', '.join(others)})"
             if others
@@ -91,16 +91,16 @@ class Material(AbstractDispersion):
             f"{' or '.join(remedies)}"
         )
 
-    def _check_clear(self, at: np.ndarray) -> None:
-        k = self._extinction(at) if self.clear else np.zeros(1)
+    def _check_clear(self, nm: np.ndarray) -> None:
+        k = self._extinction(nm) if self.clear else np.zeros(1)
         if k.max() > CLEAR:
             raise DataError(
-                f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {at[k.argmax()]:g} nm, "
+                f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {nm[k.argmax()]:g} nm, "
                 f"and up to {CLEAR:g} is left out: cut the data with `range`, or give it a real index"
             )
 
-    def _extinction(self, at: np.ndarray) -> np.ndarray:
-        return np.asarray(imag(known_index(self.dispersion, at)))
+    def _extinction(self, nm: np.ndarray) -> np.ndarray:
+        return np.asarray(imag(known_index(self.dispersion, nm)))
 
     def as_ambient(self) -> Material:
         """Without its k, if that is small somewhere; elsewhere `check_range` refuses it."""
@@ -128,8 +128,8 @@ class Material(AbstractDispersion):
 def materials_in(tree: Any) -> list[Material]:
     """Every Material inside a pytree (a scene, a layer, a mixture), each once."""
     leaves = jax.tree.leaves(tree, is_leaf=lambda node: isinstance(node, Material))
-    found: dict[tuple[str, str, bool], Material] = {}
+    materials: dict[tuple[str, str, bool], Material] = {}
     for leaf in leaves:
         if isinstance(leaf, Material):
-            found.setdefault((leaf.name, leaf.page, leaf.clear), leaf)
-    return list(found.values())
+            materials.setdefault((leaf.name, leaf.page, leaf.clear), leaf)
+    return list(materials.values())

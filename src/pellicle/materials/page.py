@@ -62,13 +62,13 @@ def table(nm: Any, n: Any, k: Any = None) -> Quantity:
         keep = columns[1] >= -NOISE_IN_K
         nm, columns = nm[keep], [column[keep] for column in columns]
         columns[1] = np.maximum(columns[1], 0.0)
-    at, where, count = np.unique(nm, return_inverse=True, return_counts=True)
+    distinct, where, count = np.unique(nm, return_inverse=True, return_counts=True)
     columns = [np.bincount(where, column) / count for column in columns]
     if len(columns) == 2 and not columns[1].any():
         columns.pop()
-    for array in (at, *columns):
+    for array in (distinct, *columns):
         array.flags.writeable = False
-    return Quantity(Table(at, *columns), float(at[0]), float(at[-1]))
+    return Quantity(Table(distinct, *columns), float(distinct[0]), float(distinct[-1]))
 
 
 def extinction(nm: Any, k: Any) -> Quantity:
@@ -135,8 +135,8 @@ def contents(page: dict[str, Any]) -> Contents:
 def csv_contents(text: str) -> Contents:
     """The dispersion in a vendored table: `wavelength_nm,n,k` under a header, comments marked by #."""
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-    found = table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
-    return Contents(found.dispersion, (found.low, found.high), True)
+    made = table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
+    return Contents(made.dispersion, (made.low, made.high), True)
 
 
 def _link(match: re.Match[str]) -> str:
@@ -214,10 +214,10 @@ def entry_contents(entry: Any) -> Contents:
         return combine(_n(entry.n), None)
     if type(entry.n).__name__ == "Tabulated":
         nm, n = _columns(entry.n)
-        at, k = _columns(entry.k)
-        if np.array_equal(nm, at):
-            found = table(nm, n, k)
-            return Contents(found.dispersion, (found.low, found.high), True)
+        nm_k, k = _columns(entry.k)
+        if np.array_equal(nm, nm_k):
+            made = table(nm, n, k)
+            return Contents(made.dispersion, (made.low, made.high), True)
     return combine(_n(entry.n), extinction(*_columns(entry.k)))
 
 

@@ -36,12 +36,12 @@ def layout(file: TextFile, spot: int | None = None) -> Layout | None:
     """
     lines, path = file.lines, file.path
     headings = [comment.text.split("\t") for comment in file.comments]
-    at = next((i for i, names in enumerate(headings) if set(_UNITS) <= set(names)), None)
-    if at is None or not lines:
+    heading = next((i for i, names in enumerate(headings) if set(_UNITS) <= set(names)), None)
+    if heading is None or not lines:
         return None
-    names = headings[at]
+    names = headings[heading]
     columns = {name: names.index(name) for name in (*_UNITS, "Zone", "ROIidx", *_POSITION) if name in names}
-    _check_units(columns, headings[at + 1] if at + 1 < len(headings) else [], path)
+    _check_units(columns, headings[heading + 1] if heading + 1 < len(headings) else [], path)
     rows = [(line, [cell.strip() for cell in line.text.split("\t")]) for line in lines]
     short = next((line for line, cells in rows if len(cells) < len(names)), None)
     if short is not None:
@@ -54,7 +54,7 @@ def layout(file: TextFile, spot: int | None = None) -> Layout | None:
         zones = _zones(rows, columns["Zone"])
         notes.append(_zone_note(list(zones)))
         of_zones = [_select_spot(zone, columns, spot, path) for zone in zones.values()]
-        rows, spot_notes = _mean([found for found, _ in of_zones], columns), of_zones[0][1]
+        rows, spot_notes = _mean([spot_rows for spot_rows, _ in of_zones], columns), of_zones[0][1]
     else:
         rows, spot_notes = _select_spot(rows, columns, spot, path)
     notes += spot_notes
@@ -79,12 +79,12 @@ def _check_units(columns: dict[str, int], units: Sequence[str], path: str) -> No
 
 def _zones(rows: Rows, zone: int) -> dict[str, Rows]:
     """The rows of each zone to use: of the mean if the file has it, else of every zone measured."""
-    found: dict[str, Rows] = {}
+    zones: dict[str, Rows] = {}
     for row in rows:
-        found.setdefault(row[1][zone], []).append(row)
-    if MEAN_ZONE in found:
-        return {MEAN_ZONE: found[MEAN_ZONE]}
-    return {name: found[name] for name in sorted(found) if name != SPREAD_ZONE} or found
+        zones.setdefault(row[1][zone], []).append(row)
+    if MEAN_ZONE in zones:
+        return {MEAN_ZONE: zones[MEAN_ZONE]}
+    return {name: zones[name] for name in sorted(zones) if name != SPREAD_ZONE} or zones
 
 
 def _zone_note(zones: Sequence[str]) -> str:
@@ -107,7 +107,7 @@ def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
         return cells[columns["Lambda"]], cells[columns["AOI"]]
 
     others = [{point(cells): cells for _, cells in rows} for rows in zones[1:]]
-    found: Rows = []
+    means: Rows = []
     for line, cells in zones[0]:
         same = [cells, *(zone[point(cells)] for zone in others if point(cells) in zone)]
         mean = list(cells)
@@ -117,8 +117,8 @@ def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
                 len(values) == len(zones) and not set(values) & _UNMEASURED and all(map(is_number, values))
             )
             mean[columns[name]] = f"{_mean_angle([float(value) for value in values]):.6g}" if whole else "NaN"
-        found.append((line, mean))
-    return found
+        means.append((line, mean))
+    return means
 
 
 def _mean_angle(values: Sequence[float]) -> float:
@@ -181,8 +181,8 @@ def _labels(spots: list[Rows], columns: dict[str, int]) -> list[str]:
     places = any(_distance(heads[0][2], position) > DRIFT_MM for *_, position in heads)
     labels = []
     for line, region, position in heads:
-        at = f" at {', '.join(f'{x:g}' for x in position)} mm" if places else ""
-        labels.append((f" in region {region}" if regions else "") + at or f" from line {line.number}")
+        place = f" at {', '.join(f'{x:g}' for x in position)} mm" if places else ""
+        labels.append((f" in region {region}" if regions else "") + place or f" from line {line.number}")
     return labels
 
 

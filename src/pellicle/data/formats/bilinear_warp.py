@@ -22,13 +22,13 @@ class Corners(NamedTuple):
     weight: np.ndarray
 
 
-def corners(axes: Sequence[np.ndarray], at: Sequence[np.ndarray]) -> Corners:
-    """Return the nodes around points `at` (N,) of a grid, as indices into its flattened nodes.
+def corners(axes: Sequence[np.ndarray], points: Sequence[np.ndarray]) -> Corners:
+    """Return the nodes around `points` (N,) of a grid, as indices into its flattened nodes.
 
     Points outside take the edge; an axis of one node is constant.
     """
-    index, weight = np.zeros((1, np.size(at[0])), dtype=np.int64), np.ones((1, np.size(at[0])))
-    for axis, x in zip(axes, at, strict=True):
+    index, weight = np.zeros((1, np.size(points[0])), dtype=np.int64), np.ones((1, np.size(points[0])))
+    for axis, x in zip(axes, points, strict=True):
         nodes = np.asarray(axis, dtype=float)
         index = index * nodes.size
         if nodes.size == 1:
@@ -103,18 +103,18 @@ class BilinearWarp:
         return low + share * (high - low)
 
 
-def _mix(table: np.ndarray, around: Corners, *at: np.ndarray | int) -> np.ndarray:
+def _mix(table: np.ndarray, around: Corners, *entry: np.ndarray | int) -> np.ndarray:
     """Interpolate entries of a table over the parameters, (N, ...)."""
-    found = [(table[(node, *at)], weight) for node, weight in zip(*around, strict=True)]
-    return np.sum([one * w.reshape(-1, *(1,) * (one.ndim - 1)) for one, w in found], axis=0)
+    entries = [(table[(node, *entry)], weight) for node, weight in zip(*around, strict=True)]
+    return np.sum([one * w.reshape(-1, *(1,) * (one.ndim - 1)) for one, w in entries], axis=0)
 
 
 def _from_zero(steps: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((*steps.shape[:-1], 1)), np.cumsum(steps, axis=-1)], axis=-1)
 
 
-def _cell(at: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    position = np.clip(at, 0.0, 1.0) * (count - 1)
+def _cell(coordinate: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    position = np.clip(coordinate, 0.0, 1.0) * (count - 1)
     cell = np.minimum(position.astype(np.int64), count - 2)
     return cell, position - cell
 

@@ -45,26 +45,28 @@ def call(reader: str, content: bytes, path: str) -> list[Layout]:
     answered = json.loads(head)
     if "error" in answered:
         raise DataError(answered["error"])
-    found, values, at = [], np.frombuffer(numbers, dtype="<f8"), 0
+    layouts, values, start = [], np.frombuffer(numbers, dtype="<f8"), 0
     for table in answered["tables"]:
         rows, width = table["rows"], len(table["names"])
-        columns = list(values[at : at + rows * width].reshape(width, rows).copy())
+        columns = list(values[start : start + rows * width].reshape(width, rows).copy())
         facts = [(key, value) for key, value in table["facts"]]
-        found.append(array_columns(table["names"], columns, table["notes"], name=table["name"], facts=facts))
-        at += rows * width
-    return found
+        layouts.append(
+            array_columns(table["names"], columns, table["notes"], name=table["name"], facts=facts)
+        )
+        start += rows * width
+    return layouts
 
 
 def answer() -> None:
     """Answer a parent process: call the reader that the arguments name on the standard input."""
     module, _, function = sys.argv[1].partition(":")
     try:
-        found = getattr(importlib.import_module(module), function)(sys.stdin.buffer.read(), sys.argv[2])
+        layouts = getattr(importlib.import_module(module), function)(sys.stdin.buffer.read(), sys.argv[2])
     except DataError as error:
         sys.stdout.buffer.write(json.dumps({"error": str(error)}).encode())
         return
     tables, numbers = [], []
-    for layout in found:
+    for layout in layouts:
         columns = [np.asarray(column, dtype="<f8") for column in layout.cells.columns]
         numbers += [column.tobytes() for column in columns]
         tables.append(

@@ -130,18 +130,18 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
     paged = "NTUPLES" in block.records
     for table in block.tables:
         if paged:
-            found = _paged(block, table, path)
-            if found is None:
+            page = _paged(block, table, path)
+            if page is None:
                 continue
-            axis, quantity, scales = found
+            axis, quantity, scales = page
         else:
             axis, quantity = block.text("XUNITS"), block.text("YUNITS")
             scales = _scales(block, path)
         x, y = points_of(table, scales, path)
         names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
-            (line, (repr(float(at)), repr(value)))
-            for at, (value, line) in zip(x, y, strict=True)
+            (line, (repr(float(abscissa)), repr(value)))
+            for abscissa, (value, line) in zip(x, y, strict=True)
             if np.isfinite(value)
         ]
         unknown = len(y) - len(rows)
@@ -185,12 +185,12 @@ def _paged(block: _Block, table: Table, path: str) -> tuple[str, str, Scales] | 
         return None
     x, y = symbols.index(form[1].upper()), symbols.index(form[2].upper())
 
-    def part(label: str, at: int) -> str:
+    def part(label: str, place: int) -> str:
         parts = block.parts(label)
-        return parts[at] if at < len(parts) else ""
+        return parts[place] if place < len(parts) else ""
 
-    def number(label: str, at: int) -> float | None:
-        return _parsed(part(label, at), label, block, path) if part(label, at) else None
+    def number(label: str, place: int) -> float | None:
+        return _parsed(part(label, place), label, block, path) if part(label, place) else None
 
     scales = Scales(
         number("FIRST", x),
@@ -265,10 +265,10 @@ def _pairs(table: Table, scales: Scales, path: str) -> tuple[list[float], list[P
     _check_number(len(y), scales, table, path)
     step = abs(x[-1] - x[0]) / max(len(x) - 1, 1) if x else 0.0
     ends = ((scales.first, x[0], "FIRSTX"), (scales.last, x[-1], "LASTX")) if x else ()
-    for stated, found, label in ends:
-        if stated is not None and abs(stated - found) > step + 1e-3 * abs(found):
+    for stated, read, label in ends:
+        if stated is not None and abs(stated - read) > step + 1e-3 * abs(read):
             raise DataError(
-                f"{path}: {label} is {stated:g}, but the table has {found:g} there; check its decimal "
+                f"{path}: {label} is {stated:g}, but the table has {read:g} there; check its decimal "
                 "marks, or export it as CSV"
             )
     return x, y
@@ -303,8 +303,8 @@ def _check_starts(
 ) -> None:
     """Refuse a line whose abscissa is not where FIRSTX, LASTX and NPOINTS put it."""
     first, step = axis
-    for (line, _), (abscissa, at) in zip(table.rows, starts, strict=True):
-        expected = first + step * at
+    for (line, _), (abscissa, position) in zip(table.rows, starts, strict=True):
+        expected = first + step * position
         room = 0.3 * abs(step) + abs(factor) + 1e-6 * abs(expected)
         # some programs write the abscissae of a table without the factor
         if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
@@ -314,9 +314,9 @@ def _check_starts(
             )
 
 
-def _check_number(found: int, scales: Scales, table: Table, path: str) -> None:
-    if scales.points is not None and found != scales.points:
+def _check_number(count: int, scales: Scales, table: Table, path: str) -> None:
+    if scales.points is not None and count != scales.points:
         raise DataError(
-            f"{path}: the table from line {table.line.number} has {found} points where NPOINTS states "
+            f"{path}: the table from line {table.line.number} has {count} points where NPOINTS states "
             f"{scales.points}; the file is cut short or damaged, so export it again"
         )

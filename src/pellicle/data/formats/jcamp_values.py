@@ -56,28 +56,28 @@ def ordinates(
     differences = False
     for line, text in lines:
         if packed:
-            abscissa, found, ends_in_difference = _packed(line, text, most, path)
+            abscissa, read, ends_in_difference = _packed(line, text, most, path)
         else:
             numbers = plain_numbers(line, text, decimal, path)
             if not numbers:
                 raise _unreadable(line, text, path)
-            (abscissa, *found), ends_in_difference = numbers, False
-        if differences and found:
-            if not isclose(found[0], values[-1][0], rel_tol=1e-9, abs_tol=1e-9):
+            (abscissa, *read), ends_in_difference = numbers, False
+        if differences and read:
+            if not isclose(read[0], values[-1][0], rel_tol=1e-9, abs_tol=1e-9):
                 raise DataError(
-                    f"{path}: line {line.number} begins with {found[0]:g}, not with {values[-1][0]:g}, the "
+                    f"{path}: line {line.number} begins with {read[0]:g}, not with {values[-1][0]:g}, the "
                     "last value of the line before; the file is damaged, so export it again"
                 )
-            found = found[1:]
+            read = read[1:]
             starts.append((abscissa, len(values) - 1))
         else:
             starts.append((abscissa, len(values)))
-        if len(values) + len(found) > most:
+        if len(values) + len(read) > most:
             raise DataError(
                 f"{path}: line {line.number} goes beyond the {most} points that NPOINTS states; export it "
                 "again"
             )
-        values += [(value, line) for value in found]
+        values += [(value, line) for value in read]
         differences = ends_in_difference
     return values, starts
 
@@ -87,13 +87,13 @@ def _packed(line: Line, text: str, most: int, path: str) -> tuple[float, list[fl
     abscissa: float | None = None
     values: list[float] = []
     step: float | None = None
-    at = 0
+    position = 0
     text = text.rstrip()
-    while at < len(text):
-        match = _PACKED.match(text, at)
-        if match is None or match.end() == at:
-            raise _unreadable(line, text[at:], path)
-        at, digit = match.end(), match["digit"]
+    while position < len(text):
+        match = _PACKED.match(text, position)
+        if match is None or match.end() == position:
+            raise _unreadable(line, text[position:], path)
+        position, digit = match.end(), match["digit"]
         number = match["number"].replace(",", ".")
         if match["unknown"]:
             values.append(float("nan"))

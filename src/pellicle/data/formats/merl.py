@@ -105,12 +105,12 @@ def _valid(cells: np.ndarray, max_theta: float) -> tuple[np.ndarray, int, int]:
     lowest = max(float(np.cos(np.deg2rad(max_theta))), 0.0) if max_theta < 90 else 0.0
     keep, below, invalid = np.empty(SHAPE, dtype=bool), 0, 0
     theta_d, phi_d = np.meshgrid(THETA_D, PHI_D, indexing="ij")
-    for at, theta_h in enumerate(THETA_H):
+    for row, theta_h in enumerate(THETA_H):
         light, viewer = from_half_difference(theta_h, 0.0, theta_d, phi_d)
         above = (light[2] > lowest) & (viewer[2] > lowest)
-        piece = cells[:, at]
+        piece = cells[:, row]
         measured = ((piece >= 0) & (piece < np.inf)).all(axis=0)
-        keep[at] = above & measured
+        keep[row] = above & measured
         below += int(np.sum(~above))
         invalid += int(np.sum(above & ~measured))
     return np.flatnonzero(keep), below, invalid

@@ -51,7 +51,7 @@ def read_hdf5(content: bytes, path: str) -> list[Layout]:
 
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            found = list(_layouts(file, path))
+            layouts = list(_layouts(file, path))
     except DataError:
         raise
     except Exception as error:  # h5py raises OSError, KeyError, RuntimeError, ... on damaged files
@@ -59,12 +59,12 @@ def read_hdf5(content: bytes, path: str) -> list[Layout]:
             f"{path}: is an HDF5 (NeXus) file that cannot be read ({' '.join(str(error).split())[:200]}); "
             "export it as CSV"
         ) from None
-    if not found:
+    if not layouts:
         raise DataError(
             f"{path}: is an HDF5 (NeXus) file without a wavelength, energy or wavenumber beside a "
             "reflectance, a transmittance or psi and delta in a group NXdata; export the spectrum as CSV"
         )
-    return found if len(found) > 1 else [_alone(found[0])]
+    return layouts if len(layouts) > 1 else [_alone(layouts[0])]
 
 
 def _alone(layout: Layout) -> Layout:
@@ -83,8 +83,8 @@ def _layouts(file: Any, path: str) -> Iterator[Layout]:
             continue
         if columns:
             facts = [("format", "NeXus" if name != "/" else "NetCDF"), *_facts(file, path)]
-            found = [f"read as HDF5, group {name}", *notes]
-            yield array_columns(list(columns), list(columns.values()), found, name=name, facts=facts)
+            said = [f"read as HDF5, group {name}", *notes]
+            yield array_columns(list(columns), list(columns.values()), said, name=name, facts=facts)
 
 
 def _facts(file: Any, path: str) -> Iterator[tuple[str, str]]:
@@ -140,14 +140,14 @@ def _data(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list
     for child, role in names.items():
         if child in axes:
             continue
-        found, units = _dataset(group, child, path)
-        if found is not None and role == "angle" and found.size == sweeps and found.shape != values.shape:
-            found = np.repeat(found.reshape(-1), values.size)
-        if found is not None and found.size == sweeps * values.size and found.shape[-1:] == values.shape:
-            columns[_named(child, units)] = found.reshape(-1)
+        column, units = _dataset(group, child, path)
+        if column is not None and role == "angle" and column.size == sweeps and column.shape != values.shape:
+            column = np.repeat(column.reshape(-1), values.size)
+        if column is not None and column.size == sweeps * values.size and column.shape[-1:] == values.shape:
+            columns[_named(child, units)] = column.reshape(-1)
         elif role in _SIGNALS or role in ("angle", "azimuth"):
             raise DataError(
-                f"{path}: {name}/{child} has the shape {None if found is None else found.shape}, which "
+                f"{path}: {name}/{child} has the shape {None if column is None else column.shape}, which "
                 f"does not match {values.size} points of {axis}; export the spectrum as CSV"
             )
         else:
@@ -158,8 +158,8 @@ def _data(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list
 def _dataset(group: Any, name: str, path: str) -> tuple[np.ndarray | None, str]:
     """Numbers and unit of a dataset."""
     dataset = hdf5.member(group, name, path)
-    found = hdf5.numbers(dataset, f"{group.name}/{name}", path)
-    return found, "" if found is None else hdf5.attribute(dataset, "units")
+    values = hdf5.numbers(dataset, f"{group.name}/{name}", path)
+    return values, "" if values is None else hdf5.attribute(dataset, "units")
 
 
 def _ellipsometry(group: Any, name: str, path: str) -> tuple[dict[str, np.ndarray], list[str]]:
@@ -200,10 +200,10 @@ def _angles(group: Any, count: int, points: int, path: str) -> dict[str, np.ndar
     for place in ("angle_of_incidence", "instrument/angle_of_incidence"):
         for holder in (group, entry):
             dataset = hdf5.member(holder, place, path)
-            found = hdf5.numbers(dataset, place, path)
-            if found is not None and found.size == count:
+            angles = hdf5.numbers(dataset, place, path)
+            if angles is not None and angles.size == count:
                 units = hdf5.attribute(dataset, "units") or "not stated"
-                return {f"angle ({units})": np.repeat(found.reshape(-1), points)}
+                return {f"angle ({units})": np.repeat(angles.reshape(-1), points)}
     if count > 1:
         raise DataError(
             f"{path}: has {count} measurements in {group.name}, but not an angle of incidence for each; "

@@ -108,9 +108,9 @@ class RglBrdf:
         x, y = theta_to_unit(theta_m), phi_to_unit(phi_m - phi if self.isotropic else phi_m)
         around = corners((self.phi_i, self.theta_i), (phi, theta))
         u, v = self.warp.invert(around, x, y)
-        found = interpolated(np.moveaxis(self._flat(), 1, -1), around, u, v)
+        values = interpolated(np.moveaxis(self._flat(), 1, -1), around, u, v)
         scale = self._scale(x, y, theta, phi) / np.where(above, o[2], 1.0)
-        return np.where(above[:, None], found * scale[:, None], 0.0)
+        return np.where(above[:, None], values * scale[:, None], 0.0)
 
     def at_nodes(self, azimuth: int, theta: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return `i` (3,), `o` (3, N), the factor (N,) of `values` to the BRDF, and the nodes (N,).
@@ -120,8 +120,8 @@ class RglBrdf:
         rows, columns = self.values.shape[3:]
         y, x = (part.ravel() for part in np.mgrid[1 : rows - 1, 1 : columns - 1])
         here = np.full((1, x.size), azimuth * self.theta_i.size + theta)
-        at = self.warp.sample(Corners(here, np.ones(here.shape)), x / (columns - 1), y / (rows - 1))
-        return *self.directions(azimuth, theta, *at), y * columns + x
+        half_vectors = self.warp.sample(Corners(here, np.ones(here.shape)), x / (columns - 1), y / (rows - 1))
+        return *self.directions(azimuth, theta, *half_vectors), y * columns + x
 
     def directions(
         self, azimuth: int, theta: int, x: np.ndarray, y: np.ndarray

@@ -38,12 +38,12 @@ class _Scan(NamedTuple):
 def scans_side_by_side(file: TextFile) -> list[Layout] | None:
     """Return one layout for each scan, without baselines, or None for another format."""
     lines = file.lines
-    for at in range(min(_MOST_HEADING, len(lines))):
+    for header in range(min(_MOST_HEADING, len(lines))):
         for delimiter in ("\t", ";", ","):
-            groups = _groups(all_cells(lines[at].text, delimiter))
-            names = all_cells(lines[at - 1].text, delimiter) if at else []
-            if groups and (len(groups) > 1 or _names_scan(names, lines[at - 1].text)):
-                return _scans(file, at, delimiter, groups, names)
+            groups = _groups(all_cells(lines[header].text, delimiter))
+            names = all_cells(lines[header - 1].text, delimiter) if header else []
+            if groups and (len(groups) > 1 or _names_scan(names, lines[header - 1].text)):
+                return _scans(file, header, delimiter, groups, names)
     return None
 
 
@@ -69,9 +69,9 @@ def _names_scan(names: Sequence[str], text: str) -> bool:
 
 
 def _scans(
-    file: TextFile, at: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
+    file: TextFile, header: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
 ) -> list[Layout] | None:
-    body = [(line, all_cells(line.bare, delimiter)) for line in file.lines[at + 1 :]]
+    body = [(line, all_cells(line.bare, delimiter)) for line in file.lines[header + 1 :]]
     end = _rows_end(body, groups)
     if not end:
         return None
@@ -85,8 +85,8 @@ def _scans(
     notes = [f"{len(scans)} scans side by side"] if len(scans) > 1 else []
     notes += [f"left out as baselines or other quantities: {', '.join(left_out)}"] if left_out else []
     notes += [f"text from line {below[0].number} on, below the rows, read as the method"] if below else []
-    declared = declarations([*file.lines[:at], *file.comments])
-    found = []
+    declared = declarations([*file.lines[:header], *file.comments])
+    layouts = []
     for scan, name in zip(kept, told_apart([scan.name for scan in kept]), strict=True):
         index = scans.index(scan)
         date = collected[index] if len(collected) == len(scans) else ""
@@ -97,12 +97,12 @@ def _scans(
             scan.rows,
             notes,
             name=name if len(kept) > 1 else "",
-            facts=facts([*file.lines[:at], *below], **known),
+            facts=facts([*file.lines[:header], *below], **known),
             decimal="." if delimiter == "," else decimal_mark(scan.rows),
         )
         stated = dataclasses.replace(declared, facts=layout.declared.facts)
-        found.append(dataclasses.replace(layout, declared=stated))
-    return found
+        layouts.append(dataclasses.replace(layout, declared=stated))
+    return layouts
 
 
 def _rows_end(body: Rows, groups: Sequence[tuple[Column, ...]]) -> int:
@@ -110,8 +110,8 @@ def _rows_end(body: Rows, groups: Sequence[tuple[Column, ...]]) -> int:
     axes = [group[0].position for group in groups]
 
     def is_row(cells: Sequence[str], width: int) -> bool:
-        found = [cells[axis : axis + width] for axis in axes]
-        return any(len(part) == width and all(is_number(cell, ",") for cell in part) for part in found)
+        parts = [cells[axis : axis + width] for axis in axes]
+        return any(len(part) == width and all(is_number(cell, ",") for cell in part) for part in parts)
 
     last = next((i for i in range(len(body) - 1, -1, -1) if is_row(body[i][1], 2)), -1)
     while last >= 0 and last + 1 < len(body) and is_row(body[last + 1][1], 1):
@@ -123,9 +123,9 @@ def _rows(body: Rows, group: Sequence[Column]) -> Rows:
     """The rows of one scan, which may end before those of the others."""
     rows: Rows = []
     for line, cells in body:
-        own = [cells[column.position] if column.position < len(cells) else "" for column in group]
-        if any(own):
-            rows.append((line, own))
+        values = [cells[column.position] if column.position < len(cells) else "" for column in group]
+        if any(values):
+            rows.append((line, values))
     return rows
 
 
@@ -144,14 +144,14 @@ def stacked_tables(file: TextFile) -> list[Layout] | None:
     if len(headers) < 2:
         return None
     starts = [_title(lines, header, after) for header, after in zip(headers, [-1, *headers], strict=False)]
-    found = []
+    layouts = []
     for i, (start, header) in enumerate(zip(starts, headers, strict=True)):
         stop = starts[i + 1] if i + 1 < len(starts) else len(lines)
         layout = find_layout(TextFile(file.path, file.sha256, lines[start:stop]))
         title = lines[start].text.strip('"') if start < header else f"table {i + 1}"
         note = f"table {i + 1} of {len(headers)} in the file"
-        found.append(dataclasses.replace(layout, name=title, notes=(note, *layout.notes)))
-    return found
+        layouts.append(dataclasses.replace(layout, name=title, notes=(note, *layout.notes)))
+    return layouts
 
 
 def _names(line: Line) -> bool:

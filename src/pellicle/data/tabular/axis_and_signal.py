@@ -126,15 +126,15 @@ def read_axis(
             f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
             f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
-    found = Axis(to_nm(values, unit or "nm"), angles, azimuths)
-    if found.setting is None and one_way(values):
-        return found, read
-    if are_sweeps(values, found.setting, sweep_numbers(values, found.setting)):
-        return found, read
-    groups = np.zeros(values.size) if found.setting is None else found.setting
+    converted = Axis(to_nm(values, unit or "nm"), angles, azimuths)
+    if converted.setting is None and one_way(values):
+        return converted, read
+    if are_sweeps(values, converted.setting, sweep_numbers(values, converted.setting)):
+        return converted, read
+    groups = np.zeros(values.size) if converted.setting is None else converted.setting
     for group in np.unique(groups):
         _check_monotone(table, axis, values, np.flatnonzero(groups == group))
-    return found, read
+    return converted, read
 
 
 def _check_monotone(table: Table, axis: AxisColumns, values: np.ndarray, rows: np.ndarray) -> None:

@@ -43,9 +43,9 @@ class TextCells:
     @property
     def notes(self) -> tuple[str, ...]:
         """A sentence on how the cells are written."""
-        found = [f"columns separated by {DELIMITERS[self.delimiter]}"] if self.delimiter in DELIMITERS else []
-        found += ["decimal commas"] if self.decimal == "," else []
-        return (", ".join(found),) if found else ()
+        notes = [f"columns separated by {DELIMITERS[self.delimiter]}"] if self.delimiter in DELIMITERS else []
+        notes += ["decimal commas"] if self.decimal == "," else []
+        return (", ".join(notes),) if notes else ()
 
     @cached_property
     def lines(self) -> np.ndarray:
@@ -65,11 +65,11 @@ class TextCells:
             rows = [row.replace(",", ".") for row in rows]
         try:
             options = {"delimiter": delimiter, "comments": None, "quotechar": '"', "ndmin": 2}
-            found = np.loadtxt(rows, usecols=positions, **options).T
+            columns = np.loadtxt(rows, usecols=positions, **options).T
         except ValueError:  # a cell that is empty, missing or no number
             return self._by_cell(positions, path, where)
-        if found.shape[1] == len(rows) and np.isfinite(found).all():
-            return [np.ascontiguousarray(column) for column in found]
+        if columns.shape[1] == len(rows) and np.isfinite(columns).all():
+            return [np.ascontiguousarray(column) for column in columns]
         return self._by_cell(positions, path, where)
 
     def _by_cell(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
@@ -89,8 +89,8 @@ class TextCells:
                 )
             for column, position in zip(columns, positions, strict=True):
                 cell = cells[position] if position < len(cells) else ""
-                if not cell and (found := _SHEET_ERROR.search(line.text.removeprefix(line.bare))):
-                    cell = found[0]
+                if not cell and (error := _SHEET_ERROR.search(line.text.removeprefix(line.bare))):
+                    cell = error[0]
                 column.append(self._number(cell, where(row, position), lambda row=row: faulty_after(row)))
         return [np.array(column) for column in columns]
 
@@ -114,9 +114,9 @@ class TextCells:
 
     def _complete(self, line: Line, positions: Sequence[int]) -> bool:
         cells = split(line.bare, self.delimiter)
-        own = [cells[position] if position < len(cells) else "" for position in positions]
+        numbers = [cells[position] if position < len(cells) else "" for position in positions]
         return all(
-            is_number(cell, self.decimal) and np.isfinite(float(cell.replace(",", "."))) for cell in own
+            is_number(cell, self.decimal) and np.isfinite(float(cell.replace(",", "."))) for cell in numbers
         )
 
 
@@ -133,11 +133,11 @@ class ArrayCells:
 
     def numbers(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
         """Return the columns at `positions`. Raises DataError for a number that is not finite."""
-        found = [self.columns[position] for position in positions]
-        for position, column in zip(positions, found, strict=True):
+        columns = [self.columns[position] for position in positions]
+        for position, column in zip(positions, columns, strict=True):
             if not np.isfinite(column).all():
                 row = int(np.argmin(np.isfinite(column)))
                 raise DataError(
                     f"{where(row, position)}: {column[row]} is not a finite number; export it again"
                 )
-        return found
+        return columns

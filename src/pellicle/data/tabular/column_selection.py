@@ -41,10 +41,12 @@ class AxisColumns(NamedTuple):
     @property
     def notes(self) -> list[str]:
         """Sentences on the angle and the azimuth."""
-        found = [f"{listed([self.angle])} read as the angle of incidence in degrees"] if self.angle else []
+        sentences = (
+            [f"{listed([self.angle])} read as the angle of incidence in degrees"] if self.angle else []
+        )
         if self.azimuth:
-            found.append(f"{listed([self.azimuth])} read as the azimuth of the sample in degrees")
-        return found
+            sentences.append(f"{listed([self.azimuth])} read as the azimuth of the sample in degrees")
+        return sentences
 
 
 @dataclass(frozen=True)
@@ -333,24 +335,25 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
         return tuple(_with_unit_of_file(table, column) for column in parsed)
     if names is None:
         return _declared_columns(table)
-    found = recognise_all(names)
+    recognised = recognise_all(names)
     # x, y and Y are three quantities, R and r one
     alike = [
-        name if column.role == "other" else name.lower() for name, column in zip(names, found, strict=True)
+        name if column.role == "other" else name.lower()
+        for name, column in zip(names, recognised, strict=True)
     ]
     twice = next((name for i, name in enumerate(names) if name and alike[i] in alike[:i]), None)
     if twice is not None:
         raise DataError(
             f"{table.path}: the header names {twice!r} twice; rename one, or name the columns with `columns`"
         )
-    signals = [column for column in found if column.role in SIGNALS]
-    _refuse_optical_constants(table, found)
+    signals = [column for column in recognised if column.role in SIGNALS]
+    _refuse_optical_constants(table, recognised)
     open_roles = ("other", "intensity", "counts", "processed")
-    free = [c for c in found if c.role in open_roles and c.name.strip().lower() not in ("", *COUNTERS)]
+    free = [c for c in recognised if c.role in open_roles and c.name.strip().lower() not in ("", *COUNTERS)]
     foreign = declared.signal is not None and declared.signal.column.role == "foreign"
     processed = [] if foreign else [c for c in free if c.role == "processed"]
     unnamed = () if signals else processed or free
-    return tuple(_with_declared(table, column, declared, column in unnamed) for column in found)
+    return tuple(_with_declared(table, column, declared, column in unnamed) for column in recognised)
 
 
 def first_column(table: Table) -> Column:
@@ -386,21 +389,21 @@ def _with_unit_of_file(table: Table, column: Column) -> Column:
     if column.role not in ("wavelength", *SIGNALS) or column.unit or column.unknown_unit:
         return column
     names, declared = table.layout.names or (), table.layout.declared
-    own = recognise(names[column.position]) if column.position < len(names) else None
+    named = recognise(names[column.position]) if column.position < len(names) else None
     power = column.role in SIGNALS
     statement = declared.signal if power else declared.axis
     known = (*SIGNALS, "processed", "other") if power else ("wavelength",)
-    stated = [own] if own and own.role in known else []
+    stated = [named] if named and named.role in known else []
     stated += [statement.column] if statement else []
-    found = next((one for one in stated if one.unit or one.unknown_unit), None)
-    if found is None:
+    with_unit = next((one for one in stated if one.unit or one.unknown_unit), None)
+    if with_unit is None:
         return column
-    if power and found.unit == "absorbance":
+    if power and with_unit.unit == "absorbance":
         raise UsageError(
-            f"{table.path}: calls {found.name!r}, an absorbance, what `columns` calls {column.name!r}; name "
-            f"it absorbance there, or {column.name}_fraction if it is none"
+            f"{table.path}: calls {with_unit.name!r}, an absorbance, what `columns` calls {column.name!r}; "
+            f"name it absorbance there, or {column.name}_fraction if it is none"
         )
-    return dataclasses.replace(column, unit=found.unit, unknown_unit=found.unknown_unit)
+    return dataclasses.replace(column, unit=with_unit.unit, unknown_unit=with_unit.unknown_unit)
 
 
 def _declared_columns(table: Table) -> tuple[Column, ...] | None:

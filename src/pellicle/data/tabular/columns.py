@@ -298,8 +298,8 @@ def declarations(lines: Sequence[Line]) -> Declared:
         elif _ANGLE.fullmatch(key) and (degrees := _DEGREES.fullmatch(value)):
             angle = float(degrees[1].replace(",", ".")) if angle is None else angle
         elif _POLARISATION.fullmatch(key):
-            found = (name for name, words in _POLARISED.items() if words.fullmatch(value.lower()))
-            polarisation = polarisation or next(found, None)
+            stated = (name for name, words in _POLARISED.items() if words.fullmatch(value.lower()))
+            polarisation = polarisation or next(stated, None)
         else:
             fact = next((name for name, words in _FACTS.items() if re.fullmatch(words, key)), None)
             if fact:

@@ -197,7 +197,7 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
         return sum(n == cells >= 2 for n, cells in counted), sum(n >= 2 for n, cells in counted)
 
     delimiter = max(DELIMITERS, key=votes)
-    grouped = next((found[0] for line in sample if (found := _GROUPED.search(line.text))), None)
+    grouped = next((match[0] for line in sample if (match := _GROUPED.search(line.text))), None)
     if grouped is not None:
         raise DataError(f"{path}: writes {grouped!r}; export numbers without thousands separators")
     if delimiter == ",":

@@ -165,59 +165,62 @@ def nk_from_dielectric(eps1: np.ndarray, eps2: np.ndarray) -> tuple[np.ndarray, 
     return np.where(eps1 >= 0, larger, smaller), np.where(eps1 >= 0, smaller, larger)
 
 
-def material_file(found: OpticalConstants, kind: str, title: str = "", assumed: str = "") -> MaterialFile:
+def material_file(constants: OpticalConstants, kind: str, title: str = "", assumed: str = "") -> MaterialFile:
     """Check the columns of a file and make a dispersion of them.
 
     Raises DataError, one sentence with file, line, column and remedy.
     """
-    axis, first, second = found.names
-    _refuse(found, axis, found.axis, found.axis <= 0, "above 0", _ROW)
-    _check_order(found)
+    axis, first, second = constants.names
+    _refuse(constants, axis, constants.axis, constants.axis <= 0, "above 0", _ROW)
+    _check_order(constants)
     with np.errstate(over="ignore"):
-        nm = np.round(to_nm(found.axis, found.unit), 9)
-    _refuse(found, axis, found.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light", _ROW)
-    n, k = found.first, found.second
+        nm = np.round(to_nm(constants.axis, constants.unit), 9)
+    _refuse(
+        constants, axis, constants.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light", _ROW
+    )
+    n, k = constants.first, constants.second
     for name, values in ((first, n), (second, k)):
         if values is not None:
-            _refuse(found, name, values, np.abs(values) > LARGEST, f"up to {LARGEST:g}", _ROW)
+            _refuse(constants, name, values, np.abs(values) > LARGEST, f"up to {LARGEST:g}", _ROW)
     if k is not None:
-        _refuse(found, second, k, k < -NOISE_IN_K, "0 or above", _SIGN)
-    if found.dielectric:
+        _refuse(constants, second, k, k < -NOISE_IN_K, "0 or above", _SIGN)
+    if constants.dielectric:
         assert k is not None
         n, k = nk_from_dielectric(n, np.maximum(k, 0.0))
-        _refuse(found, first, found.first, n <= 0, "of an index n above 0", _ROW)
+        _refuse(constants, first, constants.first, n <= 0, "of an index n above 0", _ROW)
     else:
-        _refuse(found, first, n, n <= 0, "above 0", _ROW)
+        _refuse(constants, first, n, n <= 0, "above 0", _ROW)
     made = table(nm, n, k)
     return MaterialFile(
         made.dispersion,
         (made.low, made.high),
         k is not None,
         kind,
-        f"{axis} in {found.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows",
+        f"{axis} in {constants.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows",
         assumed,
         title,
     )
 
 
 def _refuse(
-    found: OpticalConstants, name: str, values: np.ndarray, wrong: np.ndarray, expected: str, remedy: str
+    constants: OpticalConstants, name: str, values: np.ndarray, wrong: np.ndarray, expected: str, remedy: str
 ) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
         raise DataError(
-            f"{found.where(row, name)}: expected {name} {expected}, found {values[row]:g}; {remedy}"
+            f"{constants.where(row, name)}: expected {name} {expected}, found {values[row]:g}; {remedy}"
         )
 
 
-def _check_order(found: OpticalConstants) -> None:
-    steps = np.diff(found.axis)
+def _check_order(constants: OpticalConstants) -> None:
+    steps = np.diff(constants.axis)
     if not steps.size:
-        raise DataError(f"{found.path}: expected at least two rows, found one; add the others")
+        raise DataError(f"{constants.path}: expected at least two rows, found one; add the others")
     wrong = steps * np.sign(steps[0]) <= 0
     if wrong.any():
         row = int(np.argmax(wrong)) + 1
         raise DataError(
-            f"{found.where(row, found.names[0])}: expected wavelengths that only rise or only fall, found "
-            f"{found.axis[row]:g} after {found.axis[row - 1]:g}; sort the rows and delete repeated ones"
+            f"{constants.where(row, constants.names[0])}: expected wavelengths that only rise or only fall, "
+            f"found {constants.axis[row]:g} after {constants.axis[row - 1]:g}; sort the rows and delete "
+            "repeated ones"
         )

@@ -68,8 +68,8 @@ def read(text: MaterialText) -> MaterialFile:
 
     Raises DataError, one sentence with file, line, column and remedy.
     """
-    found = read_table(text.path)
-    rows = set(map(int, found.text.lines))
+    table = read_table(text.path)
+    rows = set(map(int, table.text.lines))
     first_row = min(rows, default=0)
     strange = next(
         (line for line in text.lines if line.number >= first_row and line.number not in rows), None
@@ -78,10 +78,10 @@ def read(text: MaterialText) -> MaterialFile:
         raise DataError(
             f"{text.path}: line {strange.number} is no row of numbers: delete it, or put # before it"
         )
-    names = _header(text, found)
-    columns = _by_position(text, found) if names is None else _by_name(text, found, names)
+    names = _header(text, table)
+    columns = _by_position(text, table) if names is None else _by_name(text, table, names)
     order = list(columns)
-    values = dict(zip(order, found.numbers([columns[name].position for name in order]), strict=True))
+    values = dict(zip(order, table.numbers([columns[name].position for name in order]), strict=True))
     axis = columns["wavelength"]
 
     def label(what: str) -> str:
@@ -113,32 +113,32 @@ def read(text: MaterialText) -> MaterialFile:
         values.get(second),
         dielectric,
         ("wavelength", first, second),
-        lambda row, what: f"{text.path}: line {found.text.lines[row]}, {label(what)}",
+        lambda row, what: f"{text.path}: line {table.text.lines[row]}, {label(what)}",
     )
     return material_file(constants, "table", assumed=assumed)
 
 
-def _header(text: MaterialText, found: Table) -> Sequence[str] | None:
+def _header(text: MaterialText, table: Table) -> Sequence[str] | None:
     """Names of the columns, with their units where a row of units follows; None without a header.
 
     Separated by commas, a header may name more columns than the rows have.
     """
-    if found.layout.names and _is_header(found.layout.names):
-        return found.layout.names
-    delimiter = found.text.delimiter
-    above = [line.text for line in text.lines if line.number < found.text.lines[0]]
+    if table.layout.names and _is_header(table.layout.names):
+        return table.layout.names
+    delimiter = table.text.delimiter
+    above = [line.text for line in text.lines if line.number < table.text.lines[0]]
     names = split(above[-1], delimiter) if above else []
     if is_unit_row(names) and len(above) > 1:
         units = names
         names = split(above[-2], delimiter)
         units += [""] * (len(names) - len(units))
         names = [f"{n} ({u})" if wavelength_unit(u) else n for n, u in zip(names, units, strict=False)]
-    width = _cells_per_row(text, found)
+    width = _cells_per_row(text, table)
     if (len(names) == width or delimiter != " ") and _is_header(names):
         return names
-    if found.layout.names:
-        return found.layout.names
-    above = text.text.splitlines()[: int(found.text.lines[0]) - 1]
+    if table.layout.names:
+        return table.layout.names
+    above = text.text.splitlines()[: int(table.text.lines[0]) - 1]
     comments = [line.strip().lstrip("#% ") for line in above if line.strip()[:1] in ("#", "%")]
     commented = [header_cells(comment, delimiter, width) for comment in comments]
     return next((names for names in commented[::-1] if len(names) == width and _is_header(names)), None)
@@ -149,7 +149,7 @@ def _is_header(names: Sequence[str]) -> bool:
     return "wavelength" in roles and bool(roles & {"n", "eps1"})
 
 
-def _by_name(text: MaterialText, found: Table, names: Sequence[str]) -> dict[str, Column]:
+def _by_name(text: MaterialText, table: Table, names: Sequence[str]) -> dict[str, Column]:
     """The columns for wavelength and n, k or eps1, eps2; k may be absent."""
     columns: dict[str, Column] = {}
     for plain in recognise_all(names):
@@ -165,7 +165,7 @@ def _by_name(text: MaterialText, found: Table, names: Sequence[str]) -> dict[str
             raise DataError(
                 f"{text.path}: expected a column named {what}, found {', '.join(names)}; {_REMEDY}"
             )
-    if "k" in columns and columns["k"].position >= _cells_per_row(text, found):
+    if "k" in columns and columns["k"].position >= _cells_per_row(text, table):
         del columns["k"]  # named in the header, absent from every row, as refellips writes
     return {what: columns[what] for what in _NAMES if what in columns}
 
@@ -179,19 +179,19 @@ def _recognised(column: Column) -> tuple[str, Column]:
     return what, column
 
 
-def _cells_per_row(text: MaterialText, found: Table) -> int:
+def _cells_per_row(text: MaterialText, table: Table) -> int:
     """The largest number of cells in any row."""
-    rows = (line.text for line in text.lines if line.number >= found.text.lines[0])
-    return max(len(split(row, found.text.delimiter)) for row in rows)
+    rows = (line.text for line in text.lines if line.number >= table.text.lines[0])
+    return max(len(split(row, table.text.delimiter)) for row in rows)
 
 
-def _by_position(text: MaterialText, found: Table) -> dict[str, Column]:
-    if text.lines[0].number < found.text.lines[0]:
+def _by_position(text: MaterialText, table: Table) -> dict[str, Column]:
+    if text.lines[0].number < table.text.lines[0]:
         raise DataError(
             f"{text.path}: expected a header right above the rows, found none above line "
-            f"{found.text.lines[0]}; {_REMEDY}, other lines marked with #"
+            f"{table.text.lines[0]}; {_REMEDY}, other lines marked with #"
         )
-    width = _cells_per_row(text, found)
+    width = _cells_per_row(text, table)
     if width not in (2, 3):
         raise DataError(
             f"{text.path}: expected 2 or 3 columns where there is no header, found {width}; {_REMEDY}"

@@ -45,7 +45,7 @@ def read_yaml(text: MaterialText) -> MaterialFile | None:
 
     try:
         page = yaml.load(text.text, Loader)
-        found = contents(page)
+        source = contents(page)
         citation, comments = plain_text(page.get("REFERENCES")), plain_text(page.get("COMMENTS"))
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1} " if error.problem_mark else ""
@@ -59,17 +59,17 @@ def read_yaml(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: is not a complete page of refractiveindex.info, which has DATA with a table or a "
             "formula, and numbers in it; download the full database record again"
         ) from None
-    low, high = found.wavelength_range
-    at = np.linspace(low, high, 64)
-    if not (0 < low < high < np.inf) or not np.isfinite(found.dispersion(at)).all():
+    low, high = source.wavelength_range
+    nm = np.linspace(low, high, 64)
+    if not (0 < low < high < np.inf) or not np.isfinite(source.dispersion(nm)).all():
         raise DataError(
             f"{text.path}: gives no finite index over its range of {low:g} to {high:g} nm; download it again"
         )
     kinds = ", ".join(str(block["type"]) for block in page["DATA"])
     return MaterialFile(
-        found.dispersion,
-        found.wavelength_range,
-        found.has_extinction,
+        source.dispersion,
+        source.wavelength_range,
+        source.has_extinction,
         "refractiveindex.info page",
         f"wavelength in um; {kinds}",
         citation=citation,
@@ -96,9 +96,9 @@ def read_table(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: has the layout of refractiveindex.info, which is in µm, but begins at "
             f"{n.axis.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
         )
-    found = material_file(n, _CSV)
+    without_k = material_file(n, _CSV)
     if not others:
-        return found
+        return without_k
     k = others[0]
     both = np.array_equal(n.axis, k.axis)
     index = n.first if both else np.ones_like(k.first)
