@@ -113,11 +113,12 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured, monkeypatch):
         assert profile(end) - best == pytest.approx(3.84, abs=0.1)
     assert low < fit["thickness"].value < high
 
-    units = around.best + np.array([[0.0, 0.0], [0.05, -0.01]])
-    values = around.lower + units * (around.upper - around.lower)
+    values = around.best + np.array([[0.0, 0.0], [0.05, -0.01]]) * (around.upper - around.lower)
     named = [dict(zip(fit.correlation_names, row, strict=True)) for row in values]
     expected = [chi2(data, own["thickness"], own["n"]) / ranked.fits[0].variance for own in named]
-    assert np.diff(around.misfit(units)) == pytest.approx(np.diff(expected), rel=1e-9)
+    assert np.diff(around.misfit(np.zeros(1, int), values[None])[0]) == pytest.approx(
+        np.diff(expected), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(("rise", "status"), [(7.5, "not-identifiable"), (40.0, "converged")])

@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pellicle.fitting.covariance import UNSEEN, Errors
+from pellicle.fitting import profile_likelihood
+from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.noise import student
-from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, limits
+from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, flat_sides, limits
 from pellicle.fitting.result import Estimate, Profile, Rival
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL
@@ -44,8 +45,10 @@ def by_curvature(ranked: RankedMinima, errors: Errors) -> list[Limits]:
     For a fit whose numbers should not be used: profiles of it would mean nothing, and cost most where the
     model misses the data.
     """
-    pairs = zip(ranked.problem.parameters, errors.stderr.tolist(), strict=False)
-    return [Limits(sd if sd <= UNSEEN * (p.upper - p.lower) else math.inf) for p, sd in pairs]
+    parameters = ranked.problem.parameters
+    ends = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
+    bounded = profile_likelihood.by_curvature(errors.stderr[: len(parameters)], *ends)
+    return [Limits(sd) for sd in bounded.tolist()]
 
 
 def by_profile(
@@ -58,11 +61,16 @@ def by_profile(
     """
     close = [list(r.parameters.values()) for r in near[:_MOST_NEAR] if r.delta_chi2 < RIVAL]
     others = np.reshape(close, (-1, len(ranked.problem.parameters)))
-    found = limits(neighbourhood(ranked, errors.by_curvature, others), scans)
+    around = neighbourhood(ranked, errors.by_curvature, others)
+    flat = {
+        axis: flat_sides(scan.thickness, scan.delta_chi2[None], around.best[:, axis])
+        for axis, scan in scans.items()
+    }
+    bounded = limits(around, flat).of_fit(0)
     if errors.curvature is None:
-        return found
+        return bounded
     parameters, values = ranked.problem.parameters, ranked.values.tolist()
-    rows = zip(found, parameters, values, errors.widening.tolist(), strict=False)
+    rows = zip(bounded, parameters, values, errors.widening.tolist(), strict=False)
     return [_stretched(own, value, ratio, (p.lower, p.upper)) for own, p, value, ratio in rows]
 
 

@@ -51,8 +51,7 @@ class _Judged(NamedTuple):
 class PixelErrors:
     """Errors and status of pixels, as `pellicle.fit` has them of one spectrum.
 
-    Left out is what few pixels need: default bounds are not widened, a plan is not refined, and limits beside
-    a bound that physics sets are those of the covariance.
+    Left out is what few pixels need: default bounds are not widened, and a plan is not refined.
     """
 
     def __init__(self, problem: Problem, target: Measured, calibrated: bool):

@@ -11,8 +11,8 @@ from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import NoiseEstimate, student
 from pellicle.fitting.normal_equations import solve
 from pellicle.fitting.problem import Problem
+from pellicle.fitting.profile_likelihood import Neighbourhood, by_curvature, flat_sides, limits
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.pixels import profiles
 from pellicle.mapping.pixels.local_models import PixelArrays, deviances, in_lanes, locals_of, padded
 from pellicle.mapping.pixels.minima import PixelData, PixelMinima
 from pellicle.mapping.pixels.nuisances import Nuisances
@@ -30,10 +30,7 @@ _REFITS = 4
 
 
 class PixelLimits:
-    """Standard errors by the noise, of the pixels of a problem with one spectrum.
-
-    Limits beside a bound that physics sets are those of the covariance.
-    """
+    """Standard errors by the noise, of the pixels of a problem with one spectrum."""
 
     def __init__(self, problem: Problem, scene: Scene, nuisances: Nuisances):
         [self._view], self._parameters = problem.views, problem.parameters
@@ -42,7 +39,7 @@ class PixelLimits:
         self._upper = np.array([p.upper for p in self._parameters])
         self._prior_mean = np.asarray(problem.box.prior_mean)
         self._prior_weight = np.asarray(problem.box.prior_weight)
-        self._natural = profiles.natural_bounds([p.natural for p in self._parameters])
+        self._natural = np.reshape([p.natural for p in self._parameters], (-1, 2)).astype(bool)
         self._depth = problem.thickness_axis
         if self._depth is not None:
             p = self._parameters[self._depth]
@@ -74,17 +71,17 @@ class PixelLimits:
             return sides
         values = minima.values[which, 0]
         wider = student(noise.effective_freedom(self._view.noise), RIVAL)[:, None] ** 2
-        rise = profiles.resampled(self._grid, minima.thickness, minima.profile[which])
+        rise = _resampled(self._grid, minima.thickness, minima.profile[which])
         rise = rise * evidence_factor(noise, self._view)[:, None] / wider
         rise = rise - np.minimum(rise.min(axis=1), 0.0)[:, None]
-        sides = profiles.flat_sides(self._grid, rise, values[:, self._depth])
+        sides = flat_sides(self._grid, rise, values[:, self._depth])
         doubtful = np.flatnonzero(sides.any(axis=1) & usable)
         if len(self._parameters) == 1 and len(doubtful):
             arrays = self.arrays(data, which, noise)
             points = np.concatenate([np.tile(self._grid, (len(doubtful), 1)), values[doubtful]], axis=1)
             exact = self._deviance(arrays, doubtful, points[..., None])
             rise = (exact - exact.min(axis=1)[:, None])[:, :-1] / wider[doubtful]
-            sides[doubtful] = profiles.flat_sides(self._grid, rise, values[doubtful, 0])
+            sides[doubtful] = flat_sides(self._grid, rise, values[doubtful, 0])
         return sides
 
     def stderr(
@@ -101,21 +98,31 @@ class PixelLimits:
         `arrays` count points as the errors do, `covariance` (pixels, parameters, parameters) is that by the
         curvature. Pixels that are not `usable` have errors by the covariance alone.
         """
-        around = profiles.Around(
+
+        def profile(
+            which: np.ndarray, axis: np.ndarray, at: np.ndarray, starts: np.ndarray
+        ) -> tuple[np.ndarray, np.ndarray]:
+            points = starts[:, 0].copy()
+            points[np.arange(len(at)), axis] = at
+            return self._refitted(arrays, which, axis, points)
+
+        around = Neighbourhood(
             values,
             self._lower,
             self._upper,
             covariance,
             self._natural,
             lambda which, points: self._deviance(arrays, which, points),
-            lambda which, axis, points: self._refitted(arrays, which, axis, points),
+            profile,
+            np.zeros((len(values), 0, values.shape[1])),
         )
-        result = profiles.errors(around, {} if self._depth is None else {self._depth: sides}, usable)
+        flat = {} if self._depth is None else {self._depth: sides}
+        result = limits(around, flat, usable).stderr
         # on a plateau, as of an opaque film, a solver has no point to settle at
         depths = [i for i, p in enumerate(self._parameters) if p.key == "thickness"]
         converged = converged | (usable & np.isinf(result[:, depths]).any(axis=1))
         lost = ~converged & usable
-        result[lost] = profiles.by_curvature(around)[lost]
+        result[lost] = by_curvature(around.stderr, self._lower, self._upper)[lost]
         if drifts(self._scene) and len(self._scene.layers) == 1 and self._depth is not None:
             result[values[:, self._depth] < self._thinnest(arrays, values), self._depth] = np.inf
         return result, converged
@@ -168,3 +175,10 @@ class PixelLimits:
             step = np.where(better[:, None], step, 0.5 * (best_at - at) * ~held)
             at = np.clip(at + step, self._lower, self._upper)
         return best, best_at
+
+
+def _resampled(grid: np.ndarray, thickness: np.ndarray, profile: np.ndarray) -> np.ndarray:
+    """A scan (pixels, nodes) against thickness at the values of another grid, linearly."""
+    at = np.clip(np.searchsorted(thickness, grid) - 1, 0, len(thickness) - 2)
+    share = np.clip((grid - thickness[at]) / (thickness[at + 1] - thickness[at]), 0.0, 1.0)
+    return profile[:, at] * (1 - share) + profile[:, at + 1] * share
