@@ -381,8 +381,8 @@ def _in_chunk(
     if not block_info or not chunk.size:
         return chunk
     ends = np.array(block_info[0]["array-location"])[: len(where)]
-    at = np.stack(where, axis=-1)
-    inside = np.all((at >= ends[:, 0]) & (at < ends[:, 1]), axis=1)
+    place = np.stack(where, axis=-1)
+    inside = np.all((place >= ends[:, 0]) & (place < ends[:, 1]), axis=1)
     changed = chunk.copy()
-    changed[tuple((at[inside] - ends[:, 0]).T)] = rows[inside]
+    changed[tuple((place[inside] - ends[:, 0]).T)] = rows[inside]
     return changed

@@ -82,23 +82,23 @@ def joint_gain(cube: Cube, scene: Scene, pixels: int) -> JointGain:
         log_gain = _smooth(np.log(np.maximum(np.nanmean(sample["values"], axis=0), 1e-12)), angles)
     search, last = None, None
     with jax.enable_x64(True):
-        for own in rounds:
+        for trial in rounds:
             gain = np.repeat(np.exp(log_gain), angles)
             block = {name: values / gain for name, values in sample.items()}
-            if search is None or own is not last:
-                search, last = prepare(_in_memory(cube, block), own).search, own
+            if search is None or trial is not last:
+                search, last = prepare(_in_memory(cube, block), trial).search, trial
             data = pixel_data(block, search.problem.views[0].noise)
-            found = minima(search, data)
+            answers = minima(search, data)
             weight = data.weight if "sigma" in block else (data.weight > 0).astype(float)
-            good = _usable(found, weight, data.values)
+            good = _usable(answers, weight, data.values)
             used = int(good.sum())
             if used < _FEWEST:
                 raise DataError(
                     f"{cube.path or 'cube'}: {used} of {len(good)} pixels of the sample have a fit that can"
                     f" be used, and {_FEWEST} are needed: give a region of known reflectance"
                 )
-            step = _step(found, weight, data.values, good, search.view.data.position, angles, own)
-            if own is scene and step.separation < _SEPARATE:
+            step = _step(answers, weight, data.values, good, search.view.data.position, angles, trial)
+            if trial is scene and step.separation < _SEPARATE:
                 raise UsageError(
                     "the films of the pixels are too much alike to be told from the lamp curve: the free"
                     f" parameters take all but {100 * step.separation:.2g} % of what the pixels say on some"
@@ -107,7 +107,7 @@ def joint_gain(cube: Cube, scene: Scene, pixels: int) -> JointGain:
             change = step.change - (step.change.mean() if own_scale else 0.0)
             log_gain = log_gain + change
             log.info("lamp curve: %d pixels, largest change %.2g", used, np.abs(change).max())
-            if own is scene and np.all(np.abs(change) < _SETTLED * np.sqrt(step.variance)):
+            if trial is scene and np.all(np.abs(change) < _SETTLED * np.sqrt(step.variance)):
                 break
     assert step is not None
     gain = np.exp(log_gain).astype(np.float32).astype(float)  # the same in a later run, up to rounding
@@ -142,22 +142,22 @@ def _smooth(curve: np.ndarray, angles: int) -> np.ndarray:
     return np.polynomial.chebyshev.chebval(position, np.polynomial.chebyshev.chebfit(position, mean, 4))
 
 
-def _usable(found: PixelMinima, weight: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _usable(answers: PixelMinima, weight: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Pixels whose fit has settled and is as close as the others', and as far as possible without a rival."""
-    square = np.mean((weight * (values - found.model)) ** 2, axis=1)
-    good = found.converged[:, 0] & np.isfinite(square)
+    square = np.mean((weight * (values - answers.model)) ** 2, axis=1)
+    good = answers.converged[:, 0] & np.isfinite(square)
     if good.any():
         good &= square <= 9 * np.median(square[good])
-    variance = found.misfit[:, 0] / values.shape[1]
+    variance = answers.misfit[:, 0] / values.shape[1]
     with np.errstate(invalid="ignore"):
-        lead = (found.deviance[:, 1] - found.deviance[:, 0]) / variance
+        lead = (answers.deviance[:, 1] - answers.deviance[:, 0]) / variance
     clear = good & ~(lead < RIVAL)
     # while the curve is far off, all pixels may have rivals: wrong orders hardly agree on a curve
     return clear if clear.sum() >= max(_FEWEST, 0.2 * good.sum()) else good
 
 
 def _step(
-    found: PixelMinima,
+    answers: PixelMinima,
     weight: np.ndarray,
     values: np.ndarray,
     good: np.ndarray,
@@ -166,14 +166,14 @@ def _step(
     scene: Scene,
 ) -> _Step:
     """Solve for log g with the parameters of each pixel eliminated, from models around their answers."""
-    model, offset = found.model[good], found.offset[good]
+    model, offset = answers.model[good], answers.offset[good]
     weight, residual = weight[good], values[good] - model
-    signal, gain = found.signal[good], found.gain[good]
-    count, points, _ = found.slope[good].shape
+    signal, gain = answers.signal[good], answers.gain[good]
+    count, points, _ = answers.slope[good].shape
     scale: Any = scene.instrument.scale
     free = scale.degree + 1 if isinstance(scale, Drift) else 0  # terms of the scale
     terms = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], max(free - 1, 0))[:, :free]
-    columns = [signal[..., None] * terms, gain[..., None] * found.slope[good]]
+    columns = [signal[..., None] * terms, gain[..., None] * answers.slope[good]]
     drift = scene.instrument.offset
     if isinstance(drift, Drift):
         shifts = np.polynomial.chebyshev.chebvander(np.asarray(position)[:points], drift.degree)

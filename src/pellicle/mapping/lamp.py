@@ -91,8 +91,7 @@ def lamp_curve(
     if cube.signal == "psi-delta":
         raise UsageError("ellipsometry compares polarisations of the same light and has no lamp curve")
     if region is None:
-        found = joint_gain(cube, scene, pixels)
-        return LampCurve(cube.wavelength, *found)
+        return LampCurve(cube.wavelength, *joint_gain(cube, scene, pixels))
     bare = Scene(Layer(1.0, 0.0), scene.substrate, scene.ambient, scene.light, scene.instrument)
     return _of_region(cube, bare if reference is None else reference, region)
 

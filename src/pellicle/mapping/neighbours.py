@@ -59,12 +59,9 @@ class Neighbourhood:
         grid = [axis for axis in range(len(self.shape)) if axis != self.site_axis]
         step = np.zeros((len(self.offsets), len(self.shape)), int)
         step[:, grid] = self.offsets
-        at = where[:, None, :] + step
-        inside = np.all((at >= 0) & (at < self.shape), axis=-1)
-        at = np.clip(at, 0, np.array(self.shape) - 1)
-        index = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(at, -1, 0)), self.shape))
+        place, index, inside = self._index(where[:, None, :] + step)
         linked = inside & present[index]
-        found = {tuple(offset): i for i, offset in enumerate(self.offsets.tolist())}
+        column = {tuple(offset): i for i, offset in enumerate(self.offsets.tolist())}
         for i, offset in enumerate(self.offsets):
             if np.abs(offset).sum() == 1:
                 continue
@@ -72,10 +69,10 @@ class Neighbourhood:
             nearer = [
                 offset - np.sign(offset) * (np.arange(len(offset)) == a) for a in np.flatnonzero(offset)
             ]
-            linked[:, i] &= np.any([linked[:, found[tuple(o.tolist())]] for o in nearer], axis=0)
+            linked[:, i] &= np.any([linked[:, column[tuple(o.tolist())]] for o in nearer], axis=0)
         offset = np.zeros((*index.shape, self.axes))
         for a, (axis, position) in enumerate(zip(grid, self.positions, strict=True)):
-            offset[..., a] = position[at[..., axis]] - position[where[:, None, axis]]
+            offset[..., a] = position[place[..., axis]] - position[where[:, None, axis]]
         parts = [Near(index, offset, linked)]
         if self.site_axis is not None:
             one_step = step[np.abs(step).sum(axis=1) == 1]
@@ -87,20 +84,24 @@ class Neighbourhood:
         assert self.site_index is not None
         assert self.site_offset is not None
         site = where[:, self.site_axis]
-        at = np.repeat(where[:, None, :] + by, self.site_index.shape[1], axis=1)
-        at[..., self.site_axis] = self.site_index[site]
-        inside = np.all((at >= 0) & (at < self.shape), axis=-1)
-        at = np.clip(at, 0, np.array(self.shape) - 1)
-        index = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(at, -1, 0)), self.shape))
+        beside = np.repeat(where[:, None, :] + by, self.site_index.shape[1], axis=1)
+        beside[..., self.site_axis] = self.site_index[site]
+        place, index, inside = self._index(beside)
         others = [axis for axis in range(len(self.shape)) if axis != self.site_axis]
         along = [
             np.broadcast_to(
-                (position[at[..., axis]] - position[where[:, None, axis]])[..., None], (*index.shape, 1)
+                (position[place[..., axis]] - position[where[:, None, axis]])[..., None], (*index.shape, 1)
             )
             for axis, position in zip(others, self.positions, strict=True)
         ]
         offset = np.concatenate([*along, self.site_offset[site]], axis=-1)
         return Near(index, offset, inside & present[index])
+
+    def _index(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places (..., axes) moved into the map, their flat positions, and whether they were inside."""
+        inside = np.all((place >= 0) & (place < self.shape), axis=-1)
+        place = np.clip(place, 0, np.array(self.shape) - 1)
+        return place, np.asarray(np.ravel_multi_index(tuple(np.moveaxis(place, -1, 0)), self.shape)), inside
 
 
 def grid(shape: tuple[int, ...], positions: tuple[np.ndarray | None, ...] | None = None) -> Neighbourhood:
@@ -127,10 +128,10 @@ def scattered(
     count = min(_SITES + 1, len(coordinates))
     distance, index = KDTree(coordinates).query(coordinates, k=count)
     distance, index = np.reshape(distance, (-1, count)), np.reshape(index, (-1, count))
-    own = index == np.arange(len(index))[:, None]
-    apart = np.where(own | (distance == 0), np.inf, distance).min(axis=1, initial=np.inf)
+    itself = index == np.arange(len(index))[:, None]
+    apart = np.where(itself | (distance == 0), np.inf, distance).min(axis=1, initial=np.inf)
     usual = np.median(apart[np.isfinite(apart)]) if np.isfinite(apart).any() else 1.0
-    near = ~own & (distance <= _FAR * usual)
+    near = ~itself & (distance <= _FAR * usual)
     offset = (coordinates[index] - coordinates[:, None]) / usual
     rest = shape[:site_axis] + shape[site_axis + 1 :]
     given = positions or (None,) * len(rest)

@@ -221,11 +221,11 @@ def identity(cube: Cube, scene: Scene, options: Mapping[str, Any]) -> dict[str, 
 
 def _content(cube: Cube) -> list[str]:
     """Hashes of all arrays, read in slabs along the first axis of pixels."""
-    found = []
+    digests = []
     for name, array in sorted(cube.arrays.items()):
         digest = hashlib.sha256(f"{name} {array.dtype} {array.shape}".encode())
         rows = max(1, int(BYTES * array.shape[0] / (np.dtype(array.dtype).itemsize * math.prod(array.shape))))
         for start in range(0, array.shape[0], rows):
             digest.update(np.ascontiguousarray(array[start : start + rows]).tobytes())
-        found.append(digest.hexdigest())
-    return found
+        digests.append(digest.hexdigest())
+    return digests

@@ -102,13 +102,13 @@ def _predict(field: Field, near: Neighbourhood, pixels: np.ndarray) -> Predictio
         away, _ = plane(whole / np.maximum(np.abs(away), 1.0))
     off = np.abs(away) > _OUTLIER
     inner = np.where(off, 0.0, whole)
-    away, at = plane(inner)
+    away, solution = plane(inner)
     free = np.maximum((inner > 0).sum(axis=1) - near.axes - 1, 1)
     excess = np.maximum(np.sum(np.where(off, 0.0, away) ** 2, axis=1) / free, 1.0)
     number = number - off.sum(axis=1)
     enough = (number >= near.fewest) & (off.sum(axis=1) <= _OUTLIERS * used.sum(axis=1))
-    spread = at[:, 1] * excess + field.roughness**2
-    return Prediction(at[:, 0] + level, np.where(enough, spread, np.inf), number)
+    spread = solution[:, 1] * excess + field.roughness**2
+    return Prediction(solution[:, 0] + level, np.where(enough, spread, np.inf), number)
 
 
 def field_of(
@@ -144,8 +144,8 @@ def field_of(
         if known.sum() < 2:
             return field, np.nan
         away = thickness[pixels] - plane.thickness
-        own = plane.variance - field.roughness**2 + stderr[pixels] ** 2
-        excess = np.quantile(np.abs(away[known]), 0.95) ** 2 / 4 - np.median(own[known])
+        variance = plane.variance - field.roughness**2 + stderr[pixels] ** 2
+        excess = np.quantile(np.abs(away[known]), 0.95) ** 2 / 4 - np.median(variance[known])
         field = field._replace(roughness=float(np.sqrt(max(excess, 0.0))))
     plane = predict(field, near, pixels)
     spread = np.sqrt(plane.variance + stderr[pixels] ** 2)
