@@ -189,7 +189,7 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
     if name == "sellmeier":  # terms beyond the last one given are absent
         last = max((key[1] for key in values), default="1")
         complete = {key: value for key, value in complete.items() if key[1] <= last}
-    return _checked(lambda: _BUILDERS[name](complete))
+    return _checked(lambda: _built(name, complete))
 
 
 def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
@@ -233,60 +233,43 @@ def _spec(at: ParameterLocation) -> ParameterSpec | None:
     if at.field == "fraction":
         return ParameterSpec(0.0, 1.0, 0.5, (0.0, 1.0))
     for name, specs in MODELS.items():
-        if _TYPES.get(name) is type(at.owner) and (at.key in specs or at.field in specs):
+        kind = TERMS[name][0] if name in TERMS else KINDS[name]
+        # words free n and k of a constant with bounds around its own index
+        if kind is not Constant and kind is type(at.owner) and (at.key in specs or at.field in specs):
             return specs.get(at.key) or specs[at.field]
     return _EPS_INF if at.field == "eps_inf" else None
 
 
-def _constant(values: Values) -> Constant:
-    n, k = values["n"], values["k"]
-    require_nonnegative("constant", n=n, k=k)
-    return Constant(n, None if k == 0 else k)
-
-
-def _sellmeier(values: Values) -> Sellmeier:
-    orders = [key[1] for key in values if key[0] == "B"]
-    return Sellmeier(tuple(values[f"B{i}"] for i in orders), tuple(values[f"C{i}"] for i in orders))
-
-
-def _single(name: str) -> Callable[[Values], Oscillators]:
-    oscillator, specs = TERMS[name]
-    return lambda values: Oscillators(values["eps_inf"], (oscillator(**{key: values[key] for key in specs}),))
-
-
-def _spline(name: str, kind: type[Spline | KramersKronigSpline]) -> Callable[[Values], AbstractDispersion]:
-    def build(values: Values) -> AbstractDispersion:
-        complete: dict[str, Any] = {"knots": KNOTS, **values}
-        knots = complete["knots"]
-        if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
-            raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
-        for key in complete.keys() & {"n", "k"}:
-            column = complete[key]
-            complete[key] = tuple(column) if isinstance(column, list | tuple) else (column,) * len(knots)
-        return kind(**complete)
-
-    return build
-
-
-_BUILDERS: dict[str, Callable[[Values], AbstractDispersion]] = {
-    "constant": _constant,
-    "cauchy": lambda values: Cauchy(**values),
-    "cauchy-urbach": lambda values: CauchyUrbach(**values),
-    "sellmeier": _sellmeier,
-    **{name: _single(name) for name in TERMS},
-    "spline": _spline("spline", Spline),
-    "spline-kk": _spline("spline-kk", KramersKronigSpline),
-}
-
-# `constant` is absent: words free n and k of a constant with bounds around its own index
-_TYPES: dict[str, type] = {
+KINDS: dict[str, type[AbstractDispersion]] = {
+    "constant": Constant,
     "cauchy": Cauchy,
     "cauchy-urbach": CauchyUrbach,
     "sellmeier": Sellmeier,
-    **{name: oscillator for name, (oscillator, _) in TERMS.items()},
     "spline": Spline,
     "spline-kk": KramersKronigSpline,
 }
+"""The class of each model that is no oscillator, which `TERMS` has."""
+
+
+def _built(name: str, values: Values) -> AbstractDispersion:
+    """A model of all its values."""
+    given: dict[str, Any] = dict(values)
+    if name in TERMS:
+        oscillator, specs = TERMS[name]
+        return Oscillators(given["eps_inf"], (oscillator(**{key: given[key] for key in specs}),))
+    if name == "constant":
+        require_nonnegative("constant", **given)
+        return Constant(given["n"], None if given["k"] == 0 else given["k"])
+    if name == "sellmeier":
+        given = {key: tuple(x for word, x in given.items() if word[0] == key) for key in "BC"}
+    if name in SPLINES:
+        knots = given.setdefault("knots", KNOTS)
+        if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
+            raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
+        for key in given.keys() & {"n", "k"}:
+            column = given[key]
+            given[key] = tuple(column) if isinstance(column, list | tuple) else (column,) * len(knots)
+    return KINDS[name](**given)
 
 
 def _with_defaults(

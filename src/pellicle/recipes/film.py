@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,8 @@ from pydantic import BaseModel
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.errors import DataError, UsageError
-from pellicle.recipes import media_words
-from pellicle.recipes.media import FreeTable, Medium, Number, PriorTable, medium, number
+from pellicle.recipes import parts
+from pellicle.recipes.media import FreeTable, Number, PriorTable, medium
 from pellicle.recipes.schema import (
     CameraTable,
     DataTable,
@@ -29,8 +29,6 @@ from pellicle.recipes.schema import (
 )
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import Free, check_free_count, free_leaves
-from pellicle.scene.instrument import Instrument
-from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
 
 TABLES: dict[str, type[BaseModel]] = {
     "": RecipeTable,
@@ -129,7 +127,7 @@ class FilmRecipe:
 
 def incidence(angle: Number | list[float] | None) -> float | Free | np.ndarray:
     """Return the angle of incidence in degrees, or several; 0 if none is given. Raises UsageError."""
-    return np.array(angle) if isinstance(angle, list) else optional(angle, "angle") or 0.0
+    return np.array(angle) if isinstance(angle, list) else parts.optional(angle, "angle") or 0.0
 
 
 def light_signal(signal: str | None, transmitted: bool | None) -> str:
@@ -140,11 +138,11 @@ def light_signal(signal: str | None, transmitted: bool | None) -> str:
 
 
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
-    scene, data, instrument = tables.scene, tables.data, tables.instrument
+    scene, data = tables.scene, tables.data
     signal = light_signal(data.signal, tables.camera.transmitted)
     built = Scene(
-        [_layer(layer, folder) for layer in scene.layer],
-        _substrate(scene.substrate, folder, signal),
+        [parts.layer(layer, folder) for layer in scene.layer],
+        parts.substrate(scene.substrate, folder, signal),
         ambient=medium(scene.ambient, folder, "ambient"),
         light=Light(
             None,
@@ -153,69 +151,8 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             data.polarisation or "unpolarised",
             np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth,
         ),
-        instrument=Instrument(
-            instrument.scale,
-            instrument.offset,
-            optional(instrument.bandwidth, "bandwidth"),
-            optional(instrument.thickness_spread, "thickness_spread"),
-            optional(instrument.angle_spread, "angle_spread"),
-            optional(instrument.numerical_aperture, "numerical_aperture"),
-            optional(instrument.wavelength_shift, "wavelength_shift", minimum=None),
-            optional(instrument.angle_shift, "angle_shift", minimum=None),
-        ),
-        uncertainty=_uncertainty(scene, instrument),
+        instrument=parts.instrument(tables.instrument),
+        uncertainty=parts.uncertainty(scene, tables.instrument),
     )
     check_free_count(len(free_leaves(built)), least=0)
     return built
-
-
-def _uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:
-    """The usual uncertainties, or none, with those that a recipe gives in their place."""
-    stated = {}
-    for name in (field.name for field in fields(Uncertainty)):
-        for table in (scene, instrument):
-            value = getattr(table, f"{name}_uncertainty", None)
-            if value is not None:
-                stated[name] = value
-    return replace(Uncertainty() if scene.uncertainty == "usual" else Uncertainty.none(), **stated)
-
-
-def _layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
-    thickness: Any = optional(table.thickness, "thickness")
-    if table.between is not None:
-        fraction = optional(table.fraction, "fraction")
-        return Interface(
-            thickness, 1 if table.steps is None else table.steps, table.between, table.name, fraction
-        )
-    stated: Any = table.material  # LayerTable has checked that it is there
-    material = media_words.free_numbers(medium(stated, folder), table.free)
-    if table.plate_mm is not None:
-        return Plate(
-            material, number(table.plate_mm, "plate_mm", minimum=0.0), table.name, *_collected(table)
-        )
-    spread = optional(table.thickness_spread, "thickness_spread")
-    roughness = optional(table.roughness, "roughness")
-    return Layer(material, thickness, table.name, spread, roughness, table.index_uncertainty)
-
-
-def _substrate(value: Medium | PlateTable, folder: Path, signal: str) -> Substrate:
-    if not isinstance(value, PlateTable):
-        return Substrate(medium(value, folder, "substrate"))
-    collected, reflections = _collected(value)
-    if isinstance(value.back, str) and value.back in SCATTERING_BACKS:
-        back, collected = media_words.scattering_back(value.back, signal, (collected, reflections))
-    else:
-        back = None if value.back is None else medium(value.back, folder, "back")
-    plate_mm = number(value.plate_mm, "plate_mm", minimum=0.0)
-    roughness = optional(value.roughness, "roughness")
-    about = plate_mm, roughness, value.index_uncertainty, collected, reflections
-    return Substrate(medium(value.material, folder), back, *about)
-
-
-def _collected(table: PlateTable | LayerTable) -> tuple[float | Free | None, int | None]:
-    return optional(table.back_collected, "back_collected"), table.back_reflections
-
-
-def optional(value: Number | None, name: str, minimum: float | None = 0.0) -> float | Free | None:
-    """Return a number that may be absent. Raises UsageError as `number` does."""
-    return None if value is None else number(value, name, minimum=minimum)

@@ -7,7 +7,6 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,18 +18,15 @@ from pellicle.data.options import CameraOptions, FileOptions
 from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
+from pellicle.recipes import parts
 from pellicle.recipes.read import checked
-from pellicle.recipes.written_media import layer_medium, medium, number, same
+from pellicle.recipes.written_media import medium, number, same
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
-from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift
 from pellicle.scene.kinds import check_scene
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
 from pellicle.scene.layers import medium as medium_of
 from pellicle.scene.surface import Surface
 
-_OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer")
-"""Uncertainties that stand in [scene]; the others stand in [instrument]."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _WHOLE = 1e15
 """Whole numbers below this are written without a fraction."""
@@ -87,14 +83,19 @@ def recipe_text(
         again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
         _check_surface(scene, again)
         return text
+    ambient = medium(scene.ambient, "the ambient", at)
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
             "data": _data(scene) | sampled | data,
             "data.file": [_file(table, at) for table in tables],
-            "scene": _scene(scene, at),
-            "scene.layer": [_layer(layer, i, scene, at) for i, layer in enumerate(scene.layers)],
-            "instrument": _instrument(scene),
+            "scene": {
+                **({} if ambient == 1.0 else {"ambient": ambient}),
+                "substrate": parts.substrate_keys(scene.substrate, at),
+                **parts.uncertainty_keys(scene.uncertainty),
+            },
+            "scene.layer": [parts.layer_keys(layer, i, at) for i, layer in enumerate(scene.layers)],
+            "instrument": parts.instrument_keys(scene.instrument, scene.uncertainty),
             "camera": camera,
         }
     )
@@ -152,89 +153,6 @@ def _wavelengths(nm: np.ndarray) -> Any:
         if np.array_equal(grid, nm):
             return {"start": start, "stop": stop, "step": step}
     return nm.tolist()
-
-
-def _scene(scene: Scene, folder: Path) -> dict[str, Any]:
-    ambient = medium(scene.ambient, "the ambient", folder)
-    return {
-        **({} if ambient == 1.0 else {"ambient": ambient}),
-        "substrate": _substrate(scene.substrate, folder),
-        **_uncertainties(scene.uncertainty, _OF_THE_SCENE, "uncertainty"),
-    }
-
-
-def _substrate(substrate: Substrate, folder: Path) -> Any:
-    material = medium(substrate.material, "the substrate", folder)
-    keys: dict[str, Any] = {}
-    if substrate.back is not None:
-        keys["back"] = medium(substrate.back, "the medium behind the substrate", folder)
-    if isinstance(substrate.plate_mm, Free) or substrate.plate_mm != 1:
-        keys["plate_mm"] = number(substrate.plate_mm, "plate_mm")
-    keys |= _optional(substrate, ("back_collected", "roughness"), "substrate")
-    keys |= _given(substrate, ("back_reflections", "index_uncertainty"))
-    return {"material": material, **keys} if keys else material
-
-
-def _layer(layer: Layer | Interface | Plate, position: int, scene: Scene, folder: Path) -> dict[str, Any]:
-    name = layer.name or f"layer {position + 1}"
-    head = {} if layer.name is None else {"name": layer.name}
-    if isinstance(layer, Interface):
-        steps = {} if layer.steps == 1 else {"steps": layer.steps}
-        thickness = {"thickness": number(layer.thickness, f"{name}: thickness")}
-        return {**head, "between": layer.mix, **steps, **thickness, **_optional(layer, ("fraction",), name)}
-    head |= layer_medium(layer.material, name, folder)
-    if isinstance(layer, Plate):
-        plate = {"plate_mm": number(layer.plate_mm, f"{name}: plate_mm")}
-        collected = _optional(layer, ("back_collected",), name) | _given(layer, ("back_reflections",))
-        return {**head, **plate, **collected}
-    thickness = {"thickness": number(layer.thickness, f"{name}: thickness")}
-    about = _optional(layer, ("thickness_spread", "roughness"), name)
-    return {**head, **thickness, **about, **_given(layer, ("index_uncertainty",))}
-
-
-def _instrument(scene: Scene) -> dict[str, Any]:
-    instrument, found = scene.instrument, {}
-    for key, slow, usual in (("scale", SLOW_SCALE, 1.0), ("offset", SLOW_OFFSET, 0.0)):
-        value = getattr(instrument, key)
-        if isinstance(value, Drift):
-            if value not in (slow, ONE_NUMBER):
-                raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
-            found[key] = "slow" if value == slow else "free"
-        elif value != usual:
-            found[key] = number(value, key)
-    others = [field.name for field in fields(instrument) if field.name not in ("scale", "offset")]
-    rest = [field.name for field in fields(Uncertainty) if field.name not in _OF_THE_SCENE]
-    stated = _uncertainties(scene.uncertainty, rest, None)
-    return {**found, **_optional(instrument, others, "instrument"), **stated}
-
-
-def _base(uncertainty: Uncertainty) -> Uncertainty:
-    """The usual uncertainties or none, whichever leaves fewer to state."""
-
-    def stated(base: Uncertainty) -> int:
-        return sum(getattr(uncertainty, f.name) != getattr(base, f.name) for f in fields(Uncertainty))
-
-    return min((Uncertainty(), Uncertainty.none()), key=stated)
-
-
-def _uncertainties(uncertainty: Uncertainty, names: Iterable[str], word: str | None) -> dict[str, Any]:
-    """Uncertainties `names` that differ from the usual ones or none, and that choice under the key `word`."""
-    base = _base(uncertainty)
-    found: dict[str, Any] = {word: "none"} if word and base != Uncertainty() else {}
-    for name in names:
-        if getattr(uncertainty, name) != getattr(base, name):
-            found[f"{name}_uncertainty"] = float(getattr(uncertainty, name))
-    return found
-
-
-def _optional(owner: Any, names: Iterable[str], label: str) -> dict[str, Any]:
-    """Numbers that are there."""
-    given = {name: getattr(owner, name) for name in names}
-    return {name: number(x, f"{label}: {name}") for name, x in given.items() if x is not None}
-
-
-def _given(owner: Any, names: Iterable[str]) -> dict[str, Any]:
-    return {name: getattr(owner, name) for name in names if getattr(owner, name) is not None}
 
 
 def _surface(scene: Surface, folder: Path) -> dict[str, Any]:

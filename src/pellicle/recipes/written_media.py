@@ -15,14 +15,13 @@ import numpy as np
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier, Shifted
+from pellicle.dispersion.empirical import Constant, Sellmeier, Shifted
 from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.parameter_names import locate_parameter
 from pellicle.dispersion.profiles import PROFILES
-from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
-from pellicle.recipes.dispersion_models import MODELS, SPLINES, TERMS, fixed_model, free_model
+from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, TERMS, fixed_model, free_model
 from pellicle.recipes.media_words import free_numbers
 from pellicle.recipes.structured_media import BIAXIAL, UNIAXIAL
 from pellicle.scene.free import Free, free_leaves, is_free
@@ -32,8 +31,7 @@ from pellicle.scene.priors import HalfNormal, Normal
 _MIX = {kind: name for name, kind in MIXTURES.items()}
 _PROFILE = {kind: name for name, kind in PROFILES.items()}
 _TERM = {kind: name for name, (kind, _) in TERMS.items()}
-_FORMULA: dict[type, str] = {Cauchy: "cauchy", CauchyUrbach: "cauchy-urbach"}
-_SPLINE: dict[type, str] = {Spline: "spline", KramersKronigSpline: "spline-kk"}
+_MODEL: dict[type, str] = {kind: name for name, kind in KINDS.items()}
 
 
 def number(thing: Any, name: str) -> float | dict[str, Any]:
@@ -92,16 +90,14 @@ def medium(dispersion: Any, name: str, folder: Path) -> Any:
     if kind in _MIX:
         both = {key: medium(getattr(dispersion, key), name, folder) for key in ("host", "inclusion")}
         return {"mix": _MIX[kind], **both, "fraction": number(dispersion.fraction, f"{name}: fraction")}
-    if kind in _FORMULA:
-        return {"model": _FORMULA[kind], **_numbers(dispersion, name)}
     if isinstance(dispersion, Sellmeier) and len(dispersion.B) <= 3:
         pairs = zip(dispersion.B, dispersion.C, strict=True)
         each = {f"{key}{i}": x for i, pair in enumerate(pairs, 1) for key, x in zip("BC", pair, strict=True)}
         return {"model": "sellmeier", **{key: number(x, f"{name}: {key}") for key, x in each.items()}}
     if isinstance(dispersion, Oscillators):
         return _oscillators(dispersion, name)
-    if kind in _SPLINE and getattr(dispersion, "k", None) is not None:
-        return {"model": _SPLINE[kind], **_numbers(dispersion, name)}
+    if kind in _MODEL and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:
+        return {"model": _MODEL[kind], **_numbers(dispersion, name)}
     raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
 
 
@@ -185,7 +181,7 @@ def _words(dispersion: Any) -> Iterable[str]:
     for model in MODELS:
         if same(free_model(model), dispersion):
             yield model
-    kind = _SPLINE.get(type(dispersion))
+    kind = _MODEL.get(type(dispersion))
     if kind in SPLINES and same(fixed_model(kind, dispersion.knots, kind), dispersion):
         yield f"{kind}({','.join(repr(x) for x in dispersion.knots)})"
 
