@@ -15,8 +15,7 @@ from pellicle.accuracy.surface import BRDF_METHODS, SurfaceCost, films_of, rando
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.rendering.renderer_methods import RENDERER_METHODS
-from pellicle.reporting.cost_files import to_json
-from pellicle.reporting.cost_text import text
+from pellicle.reporting.cost import text, to_json
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.brdf import default_directions

@@ -135,7 +135,7 @@ def _objects(
         raise UsageError("methods are compared on one layer under D65: leave out the other flags")
     start()
     if view == "methods":
-        from pellicle.reporting.method_figure import draw_methods
+        from pellicle.reporting.sphere_figures import draw_methods
 
         for found in draw_methods(scene, out, nm, title):
             say(

@@ -89,8 +89,7 @@ def cost(
         check_folder(out)
     start(keep=False)
     from pellicle.api import plans
-    from pellicle.reporting.cost_files import to_json, write_cost
-    from pellicle.reporting.cost_text import text
+    from pellicle.reporting.cost import text, to_json, write_cost
     from pellicle.reporting.json_record import one_line
 
     with Progress(recipe) as progress:

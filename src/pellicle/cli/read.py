@@ -153,18 +153,11 @@ def _report_error(path: str, message: str, as_json: bool) -> None:
 
 
 def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
-    from pellicle.data.colours import Colours
-    from pellicle.data.cube import Cube
     from pellicle.reporting.json_record import one_line
+    from pellicle.reporting.measured_text import describe, to_json
 
-    if isinstance(measured, Colours):
-        from pellicle.reporting.colours_text import describe, to_json
-    elif isinstance(measured, Cube):
-        from pellicle.reporting.cube_text import describe, to_json
-    else:
-        from pellicle.reporting.spectrum_text import describe, to_json
-    of: Any = measured
-    text = one_line(to_json(of)) if as_json else describe(of, tuple(map(as_flags, measured.notes)))
+    notes = tuple(map(as_flags, measured.notes))
+    text = one_line(to_json(measured)) if as_json else describe(measured, notes)
     print(text, flush=True)
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from dataclasses import dataclass
 from importlib.metadata import version
-from io import StringIO
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +13,7 @@ from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import SIGMA, ColourThickness
 from pellicle.colour.spaces import outside
 from pellicle.files import write_text
+from pellicle.reporting.csv_text import csv_rows
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.scene.film import Scene
 from pellicle.simulation.colours import colour_table, interference_colours
@@ -138,13 +137,11 @@ def invert_chart(
     nm = np.linspace(*table.thickness, COLOURS)
     srgb = np.round(255 * np.asarray(table(nm, np.cos(np.deg2rad(angle))).srgb)) / 255
     inverse = ChartInverse(nm, srgb, ColourInverse.build(table, angle)(srgb, orders=16))
-    text = StringIO()
-    text.write(f"# thicknesses of the sRGB colours of {source} at {angle:g} degrees under {illuminant}\n")
-    text.write(f"# noise {SIGMA:.3g} of each channel, pellicle {version('pellicle')}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_HEADER)
-    written = set()
-    found = inverse.found
+    comments = [
+        f"thicknesses of the sRGB colours of {source} at {angle:g} degrees under {illuminant}",
+        f"noise {SIGMA:.3g} of each channel, pellicle {version('pellicle')}",
+    ]
+    rows, written, found = [], set(), inverse.found
     for row, colour in enumerate(np.round(255 * srgb).astype(int).tolist()):
         name = "{:02x}{:02x}{:02x}".format(*colour)
         if name not in written:
@@ -152,7 +149,7 @@ def invert_chart(
             for order in np.flatnonzero(inverse.admissible[row]):
                 nm_text, stderr, probability, delta_e = (float(x[row, order]) for x in columns)
                 numbers = [f"{nm_text:.1f}", f"{stderr:.1f}", f"{probability:.4f}", f"{delta_e:.2f}"]
-                writer.writerow([name, *colour, *numbers])
+                rows.append([name, *colour, *numbers])
         written.add(name)
-    write_text(path, text.getvalue())
+    write_text(path, csv_rows(_HEADER, rows, comments))
     return inverse

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from io import StringIO
 from typing import Any
 
 from pellicle.reporting.drawable import Table
+
+
+def csv_rows(names: Sequence[str], rows: Iterable[Sequence[Any]], comments: Sequence[str] = ()) -> str:
+    """Format rows below the names of their columns as `csv_text` does."""
+    columns = list(zip(*rows, strict=True)) or [()] * len(names)
+    return csv_text(Table(dict(zip(names, columns, strict=True)), comments))
 
 
 def csv_text(table: Table) -> str:
@@ -29,6 +36,6 @@ def written_by() -> str:
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, str):
-        return value
+    if isinstance(value, str | bool):
+        return str(value)
     return f"{float(value):.10g}" if value is not None and math.isfinite(value) else ""

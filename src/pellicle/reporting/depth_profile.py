@@ -9,28 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.files import MARKER, new_folder, write_text
+from pellicle.reporting import matplotlib_figure
+from pellicle.reporting.csv_text import csv_rows, csv_text
+from pellicle.reporting.drawable import Band, Line, Panel, Place, Section, Table
 from pellicle.reporting.json_record import indented, number, versions
-from pellicle.reporting.matplotlib_figure import (
-    ABOVE,
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    new_figure,
-    save_figure,
-)
-from pellicle.simulation.depth_profile import DepthProfile, Section
+from pellicle.simulation.depth_profile import DepthProfile
+from pellicle.simulation.depth_profile import Section as Group
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCHEMA = "pellicle.depth/1"
-COLOURS = (BLACK, ORANGE, BLUE, GREEN, "#CC79A7", "#56B4E9", "#E69F00")
+COLOURS = ("residual", "fit", "blue", "green", "#CC79A7", "#56B4E9", "#E69F00")
 """Okabe and Ito's; further lines repeat them."""
-NARROW = 0.07
-"""Layers thinner than this share of their panel have their names upright."""
 
 
 def report(profile: DepthProfile, title: str) -> str:
@@ -85,7 +76,7 @@ def write_depth_profile(
     write_text(target / MARKER, indented(to_json(profile, path)), overwrite=True)
     write_text(target / "absorptance.csv", _absorptance_csv(profile, comments), overwrite=True)
     write_text(target / "depth.csv", _depth_csv(profile, comments), overwrite=True)
-    save_figure(draw(profile), target / "depth.png", overwrite=True)
+    matplotlib_figure.save_figure(draw(profile), target / "depth.png", overwrite=True)
     return target
 
 
@@ -94,95 +85,84 @@ def _numbers(row: np.ndarray) -> list[float | None]:
 
 
 def _absorptance_csv(profile: DepthProfile, comments: list[str]) -> str:
-    names = [name.replace(",", ";") for name in profile.media]
-    table = np.column_stack([profile.wavelength, profile.R, profile.T, *profile.absorptance])
-    rows = [",".join(f"{x:.10g}" for x in row) for row in table]
-    header = ",".join(["wavelength_nm", "R", "T", *(f"A of {name}" for name in names)])
-    return "\n".join([*(f"# {line}" for line in comments), header, *rows, ""])
+    columns = {"wavelength_nm": profile.wavelength, "R": profile.R, "T": profile.T}
+    for name, row in zip(profile.media, profile.absorptance, strict=True):
+        columns[f"A of {name.replace(',', ';')}"] = row
+    return csv_text(Table(columns, comments))
 
 
 def _depth_csv(profile: DepthProfile, comments: list[str]) -> str:
-    lines = [
-        *(f"# {line}" for line in comments),
-        "# depth from the uppermost interface of each group of layers",
-    ]
-    lines.append("wavelength_nm,group,medium,depth_nm,intensity,absorbed_per_nm")
+    about = "depth from the uppermost interface of each group of layers"
+    names = ("wavelength_nm", "group", "medium", "depth_nm", "intensity", "absorbed_per_nm")
+    rows = []
     for i, nm in enumerate(profile.at):
         for j, section in enumerate(profile.sections, start=1):
             columns = (section.medium, section.depth, section.intensity[i], section.absorbed[i])
             for medium, depth, intensity, absorbed in zip(*columns, strict=True):
-                name = medium.replace(",", ";")
-                lines.append(f"{nm:.10g},{j},{name},{depth:.10g},{intensity:.8g},{absorbed:.8g}")
-    return "\n".join([*lines, ""])
+                numbers = f"{depth:.10g}", f"{intensity:.8g}", f"{absorbed:.8g}"
+                rows.append((nm, j, medium.replace(",", ";"), *numbers))
+    return csv_rows(names, rows, [*comments, about])
 
 
 def draw(profile: DepthProfile) -> Figure:
-    """Draw |E|² and the absorbed power against depth for each group of layers, and absorptances beside it."""
-    count = len(profile.sections)
-    figure = new_figure(4.2 * count + 4.4, 5.4)
-    grid = figure.add_gridspec(2, count + 1)
-    first: list[Axes | None] = [None, None]
-    for i, section in enumerate(profile.sections):
-        for row, (values, label) in enumerate(
-            ((section.intensity, "|E|², incident wave = 1"), (section.absorbed, "absorbed power (% per nm)"))
-        ):
-            axes = figure.add_subplot(grid[row, i], sharey=first[row])
-            first[row] = first[row] or axes
-            _against_depth(axes, section, profile.at, values * (100 if row else 1))
-            axes.set_ylabel(label if i == 0 else "")
-            axes.set_ylim(bottom=0)
-            if row == 0:
-                _name_layers(axes, section)
-            else:
-                axes.set_xlabel("depth (nm)")
-    _against_wavelength(figure.add_subplot(grid[:, -1]), profile)
-    return figure
+    """Draw |E|² and the absorbed power against depth for each group of layers, absorptances below."""
+    rows: list[list[Panel]] = [[], []]
+    for i, group in enumerate(profile.sections):
+        names = ("|E|², incident wave = 1", "absorbed power (% per nm)") if i == 0 else ("", "")
+        for row, values, label in zip(rows, (group.intensity, 100 * group.absorbed), names, strict=True):
+            lines = _against_depth(group, profile.at, values)
+            legend: Place = "above" if not i and row is rows[0] else ""
+            ends = group.depth[0], group.depth[-1]
+            top = max(float(np.nanmax(line.y)) for line in lines)
+            row.append(
+                Panel(
+                    label,
+                    lines,
+                    [],
+                    2.2,
+                    legend=legend,
+                    limits=(0.0, 1.35 * top or 1.0),
+                    span=ends,
+                    spans=_layers(group) if row is rows[0] else _layers(group, named=False),
+                )
+            )
+    sections = [Section("depth (nm)", rows), _against_wavelength(profile)]
+    return matplotlib_figure.draw(sections, "", max(8.0, 4.2 * len(profile.sections)))
 
 
-def _against_depth(axes: Axes, section: Section, at: np.ndarray, values: np.ndarray) -> None:
-    for j, (_, upper, lower) in enumerate(section.layers):
-        axes.axvspan(upper, lower, color=GREY, alpha=0.22 if j % 2 == 0 else 0.1, linewidth=0)
-    medium = np.array(section.medium)
-    for i, nm in enumerate(at):
-        # each medium by itself: E_z and the absorbed power jump at the interfaces
-        for name in dict.fromkeys(section.medium):
-            here = medium == name
-            line = axes.plot(section.depth[here], values[i][here], color=COLOURS[i % len(COLOURS)])[0]
-            line.set_label(f"{nm:g} nm" if name == section.medium[0] else "_")
-    axes.set_xlim(section.depth[0], section.depth[-1])
+def _against_depth(group: Group, at: np.ndarray, values: np.ndarray) -> list[Line]:
+    """A line for each wavelength, interrupted at the interfaces: E_z and the absorbed power jump there."""
+    medium = np.array(group.medium)
+    breaks = np.flatnonzero(medium[1:] != medium[:-1]) + 1
+    depth = np.insert(group.depth.astype(float), breaks, np.nan)
+    return [
+        Line(depth, np.insert(values[i], breaks, np.nan), f"{nm:g} nm", COLOURS[i % len(COLOURS)])
+        for i, nm in enumerate(at)
+    ]
 
 
-def _name_layers(axes: Axes, section: Section) -> None:
-    low, high = section.depth[0], section.depth[-1]
-    spans = [(section.above, low, 0.0), *section.layers, (section.below, section.layers[-1][2], high)]
-    for name, upper, lower in spans:
-        narrow = (lower - upper) / (high - low) < NARROW + 0.018 * len(name)
-        axes.text(
-            0.5 * (upper + lower),
-            0.97,
-            name.replace("$", r"\$"),
-            transform=axes.get_xaxis_transform(),
-            rotation=90 if narrow else 0,
-            ha="center",
-            va="top",
-            fontsize="small",
-        )
-    bottom, top = axes.get_ylim()
-    axes.set_ylim(bottom, bottom + 1.3 * (top - bottom))  # room for the names
-    axes.legend(**ABOVE | {"loc": "lower right", "bbox_to_anchor": (1, 1)}, ncols=3, fontsize="small")
+def _layers(group: Group, named: bool = True) -> list[tuple[float, float, str, float]]:
+    """Ranges of depth with the names of their media, and the shades of layers."""
+    low, high = group.depth[0], group.depth[-1]
+    media = [(group.above, low, 0.0), *group.layers, (group.below, group.layers[-1][2], high)]
+    shades = [0.0, *((0.22, 0.1)[j % 2] for j in range(len(group.layers))), 0.0]
+    return [
+        (left, right, name if named else "", shade)
+        for (name, left, right), shade in zip(media, shades, strict=True)
+    ]
 
 
-def _against_wavelength(axes: Axes, profile: DepthProfile) -> None:
-    nm, bottom = profile.wavelength, np.zeros_like(profile.wavelength)
+def _against_wavelength(profile: DepthProfile) -> Section:
+    """Absorptances above each other, transmittance and reflectance above them."""
+    nm, bottom, bands = profile.wavelength, np.zeros_like(profile.wavelength), []
     rows = [*zip(profile.media, profile.absorptance, strict=True), ("T", profile.T), ("R", profile.R)]
     rows = [(name, row) for name, row in rows if np.max(np.abs(row)) > 1e-4]
     for i, (name, row) in enumerate(rows):
-        colour = {"T": "#DDDDDD", "R": "#BBBBBB"}.get(name, (*COLOURS[1:], BLACK)[i % len(COLOURS)])
+        colour = {"T": "#DDDDDD", "R": "#BBBBBB"}.get(name, (*COLOURS[1:], COLOURS[0])[i % len(COLOURS)])
         label = f"absorbed: {name}" if name not in "RT" else name
-        axes.fill_between(nm, 100 * bottom, 100 * (bottom + row), color=colour, linewidth=0, label=label)
+        bands.append(Band(nm, 100 * bottom, 100 * (bottom + row), label, colour, 1.0))
         bottom = bottom + row
-    for at in profile.at:
-        axes.axvline(at, color=BLACK, linewidth=0.7, linestyle=":")
-    axes.set(xlabel="wavelength (nm)", ylabel="share of the incident power (%)", ylim=(0, 100))
-    axes.set_xlim(nm[0], nm[-1])
-    axes.legend(fontsize="small", ncols=2, **ABOVE)
+    marks = [Line(np.full(2, at), np.array([0.0, 100.0]), "", "residual", "dotted", 0.7) for at in profile.at]
+    label = "share of the incident\npower (%)"
+    panel = Panel(label, marks, bands, 2.6, legend="above", limits=(0.0, 100.0), span=(nm[0], nm[-1]))
+    return Section("wavelength (nm)", [[panel]])

@@ -69,8 +69,9 @@ class Panel:
     A panel without lines and images is empty and shows its title. `legend` is its place, `zero` adds a line
     at 0, `height` is in inches. `scale` "symlog" is linear below `threshold`. `limits` are those of the
     ordinate, `span` those of the abscissa. `ticks` are words at 1, 2, ... of the abscissa, `notes` texts
-    (x, y, text) above points, which a `key` beside the panel explains. An `image` (2, n, 3) shows patches of
-    data above those of the fit, with `captions` on these.
+    (x, y, text) above points, which a `key` beside the panel explains. `spans` are ranges (left, right, name,
+    shade) of the abscissa. An `image` (2, n, 3) shows patches of data above those of the fit, with `captions`
+    on these.
     """
 
     label: str
@@ -87,6 +88,7 @@ class Panel:
     span: tuple[float, float] | None = None
     ticks: Sequence[str] = ()
     notes: Sequence[tuple[float, float, str]] = ()
+    spans: Sequence[tuple[float, float, str, float]] = ()
     image: np.ndarray | None = None
     captions: Sequence[str] = ()
     key: Sequence[str] = ()

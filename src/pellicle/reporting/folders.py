@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from importlib.metadata import version
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError
 from pellicle.files import MARKER, new_folder, write_text
+from pellicle.reporting.csv_text import csv_rows, written_by
 from pellicle.reporting.json_record import indented, to_json, versions
 from pellicle.reporting.repeats import FILES as REPEATS
 
@@ -160,14 +158,10 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
     rows = [_summary_row(record) for record in records]
     ends = ("rms", "chi2_reduced", "sha256", "error")
     union = dict.fromkeys(name for row in rows for name in row)  # in order of appearance
-    text = StringIO(f"# one row per fitted file; written by pellicle {version('pellicle')}\n")
-    text.seek(0, os.SEEK_END)
     header = [*(name for name in union if name not in ends), *ends]
-    writer = csv.DictWriter(text, header, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
+    cells = [[row.get(name, "") for name in header] for row in rows]
     new_folder(Path(path).parent)
-    write_text(path, text.getvalue(), overwrite=True)
+    write_text(path, csv_rows(header, cells, [f"one row per fitted file; {written_by()}"]), overwrite=True)
 
 
 def write_index(
@@ -198,14 +192,10 @@ def _summary_row(record: Mapping[str, Any]) -> dict[str, Any]:
     row |= {"status": record["status"], "verdict": record["verdict"]}
     for name, p in record["parameters"].items():
         if p["free"]:
-            row |= {name: _cell(p["value"]), f"{name}_stderr": _cell(p["stderr"])}
+            row |= {name: p["value"], f"{name}_stderr": p["stderr"]}
     return row | {
-        "rms": _cell(record["rms"]),
-        "chi2_reduced": _cell(record["chi2_reduced"]),
+        "rms": record["rms"],
+        "chi2_reduced": record["chi2_reduced"],
         "sha256": data["sha256"] or "",
         "error": record.get("error", ""),
     }
-
-
-def _cell(value: float | None) -> str:
-    return "" if value is None else f"{value:.10g}"

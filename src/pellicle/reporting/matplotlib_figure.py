@@ -147,6 +147,8 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         _line(axes, line, points, listed)
     if panel.zero:
         axes.axhline(0, color=GREY, linewidth=0.6)
+    for left, right, name, shade in panel.spans:
+        _span(axes, panel, left, right, name, shade)
     upright = {} if panel.key else {"rotation": 90, "bbox": _BOX}
     for x, y, text in panel.notes:
         axes.annotate(text, (x, y), **_NOTE, **upright)
@@ -189,6 +191,16 @@ def _band(axes: Axes, band: Band, listed: set[str]) -> None:
     axes.fill_between(
         band.x, band.low, band.high, where=known, color=colour, alpha=band.opacity, lw=0, label=label
     )
+
+
+def _span(axes: Axes, panel: Panel, left: float, right: float, name: str, shade: float) -> None:
+    """Shade a range of the abscissa and write its name, upright where it is narrow."""
+    axes.axvspan(left, right, color=GREY, alpha=shade, linewidth=0)
+    low, high = panel.span or (left, right)
+    narrow = (right - left) / (high - low) < 0.07 + 0.018 * len(name)
+    turned, place = 90 if narrow else 0, axes.get_xaxis_transform()
+    style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "rotation": turned}
+    axes.text((left + right) / 2, 0.97, plain(name), transform=place, **style)
 
 
 def _patches(axes: Axes, panel: Panel) -> None:

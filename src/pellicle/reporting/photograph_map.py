@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import os
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +10,7 @@ import numpy as np
 
 from pellicle.files import MARKER, new_folder, replacing, write_text
 from pellicle.mapping.photograph import ThicknessMap
+from pellicle.reporting.csv_text import csv_rows
 from pellicle.reporting.json_record import indented, number, versions
 from pellicle.reporting.matplotlib_figure import BLUE, GREY, ORANGE, new_figure, save_figure
 
@@ -83,17 +82,14 @@ def to_json(made: ThicknessMap) -> dict[str, Any]:
 
 def to_csv(made: ThicknessMap) -> str:
     """Format a strip as rows, one for each admissible thickness of each position."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_HEADER)
-    found = made.found
+    found, rows = made.found, []
     assert made.position is not None
     for i, (at, colour) in enumerate(zip(made.position, made.colours, strict=True)):
         for order in np.flatnonzero(np.nan_to_num(found.probability[i]) >= LEAST):
             columns = (found.thickness, found.stderr, found.probability, found.delta_e)
             values = [f"{float(x[i, order]):.6g}" for x in columns]
-            writer.writerow([f"{at:.6g}", *(f"{x:.5f}" for x in colour), order + 1, *values, found.status[i]])
-    return text.getvalue()
+            rows.append([f"{at:.6g}", *(f"{x:.5f}" for x in colour), order + 1, *values, found.status[i]])
+    return csv_rows(_HEADER, rows)
 
 
 def draw(made: ThicknessMap, name: str = "") -> Figure:

@@ -17,9 +17,7 @@ from pellicle.forward_model.plan import Plan
 from pellicle.mapping.photograph import ThicknessMap
 from pellicle.reporting import (
     comparison,
-    cost_figure,
-    cost_files,
-    cost_text,
+    cost,
     figures,
     fit_text,
     folders,
@@ -73,7 +71,7 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map
         case Plan():
             return plans.report(result)
         case Cost() | SurfaceCost():
-            return cost_text.text(result)
+            return cost.text(result)
         case ThicknessMap():
             return photograph_map.report(result)
     if _is_map(result):
@@ -100,7 +98,7 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
         case Posterior():
             return posterior.corner_figure(result)
         case Cost() | SurfaceCost():
-            return cost_figure.draw(result)
+            return cost.draw(result)
         case ThicknessMap():
             return photograph_map.draw(result)
     if _is_map(result):
@@ -134,7 +132,7 @@ def save(
         case Repeats():
             return repeats.write_repeats(folder, result)
         case Cost() | SurfaceCost():
-            return cost_files.write_cost(folder, result)
+            return cost.write_cost(folder, result)
         case ThicknessMap():
             return photograph_map.write_map(folder, result)
     if _is_map(result):

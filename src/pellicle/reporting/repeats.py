@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Sequence
-from importlib.metadata import version
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
+from pellicle.reporting.csv_text import csv_rows, written_by
 from pellicle.reporting.json_record import indented, number, versions
 from pellicle.reporting.plain_text import block, facts, table, wrapped
 
@@ -116,14 +114,10 @@ def _parameter(p: RepeatedParameter) -> dict[str, Any]:
 
 def repeats_csv(repeats: Repeats) -> str:
     """Format one row for each parameter as CSV."""
-    text = StringIO(f"# scatter of repeated measurements; written by pellicle {version('pellicle')}\n")
-    text.seek(0, os.SEEK_END)
     rows = [{"parameter": name, **_parameter(p)} for name, p in repeats.parameters.items()]
     header = [name for name in rows[0] if name not in ("values", "stderr_noise")]
-    writer = csv.DictWriter(text, header, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: f"{v:.10g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
-    return text.getvalue()
+    cells = [[row[name] for name in header] for row in rows]
+    return csv_rows(header, cells, [f"scatter of repeated measurements; {written_by()}"])
 
 
 def write_repeats(folder: str | os.PathLike[str], repeats: Repeats) -> Path:

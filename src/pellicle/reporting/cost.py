@@ -1,14 +1,25 @@
-"""Report of accuracy against time: tables of methods, of solvers and of intervals."""
+"""Report, JSON record, table, figure and folder of accuracy against time."""
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from pellicle.files import MARKER, new_folder, write_text
+from pellicle.reporting import matplotlib_figure
+from pellicle.reporting.csv_text import csv_rows
+from pellicle.reporting.drawable import Line, Panel, Section, Style
+from pellicle.reporting.json_record import indented, versions
 from pellicle.reporting.plain_text import COLUMNS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from pellicle.accuracy.cost import Cost
     from pellicle.accuracy.registry import Comparison
     from pellicle.accuracy.surface import SurfaceCost
@@ -160,3 +171,150 @@ def _omitted(left_out: Mapping[str, str]) -> list[str]:
         reasons.setdefault(why, []).append(name)
     texts = [f"left out: {', '.join(names)}: {why}" for why, names in reasons.items()]
     return [line for item in texts for line in textwrap.wrap(item, COLUMNS, subsequent_indent="    ")]
+
+
+SCHEMA = "pellicle.cost/1"
+_CSV_COLUMNS = (
+    *("kind", "name", "leaves_out", "error", "seconds", "compile_seconds", "flops", "pareto"),
+    *("median_error", "failures", "datasets", "coverage", "doubt", "width"),
+)
+
+
+def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
+    """Convert to dictionaries: all methods in one list, `rungs`, each with its `kind`.
+
+    Kinds of a film are "forward", "inverse" (a solver) and "interval" (its error is the distance of its
+    coverage from 95 %), or of its colours "colour" (mean ΔE2000); of a surface "colour" and "brdf" (relative
+    error). `recommended` names a forward method, or one for colours; `within` says whether it meets the
+    tolerance. `brdf` has the same keys for a surface's values. Infinite errors are None.
+    """
+    from pellicle.accuracy.surface import SurfaceCost
+
+    details = _surface(cost) if isinstance(cost, SurfaceCost) else _film(cost)
+    end = {"interrupted": cost.interrupted, "versions": versions()}
+    return {"schema": SCHEMA, "recipe": recipe} | details | end
+
+
+def _film(cost: Cost) -> dict[str, Any]:
+    methods, solvers, intervals = cost.methods, cost.solvers, cost.intervals
+    omitted = [part.left_out for part in (methods, solvers, intervals) if part is not None]
+    return {
+        **_summary(methods),
+        "wavelengths": methods.wavelengths,
+        "draws": methods.draws,
+        "rungs": _rungs(methods, solvers, intervals),
+        "recommended_solver": None if solvers is None else solvers.recommended,
+        "recommended_interval": None if intervals is None else intervals.recommended,
+        "noise": None if solvers is None else solvers.noise,
+        "left_out": {name: why for left_out in omitted for name, why in left_out.items()},
+        "no_fits": cost.no_solvers or None,
+    }
+
+
+def _surface(cost: SurfaceCost) -> dict[str, Any]:
+    parts = [part for part in (cost.colours, cost.values) if part is not None]
+    first = parts[0]
+    return {
+        **_summary(first),
+        "draws": first.draws,
+        "rungs": _rungs(*parts),
+        "brdf": _summary(cost.values),
+        "left_out": {name: why for methods in parts for name, why in methods.left_out.items()},
+        "no_colours": cost.no_colours or None,
+    }
+
+
+def _rungs(*comparisons: Comparison | None) -> list[dict[str, Any]]:
+    return [
+        {"kind": part.kind, **result.record()}
+        for part in comparisons
+        if part is not None
+        for result in part.results
+    ]
+
+
+def _summary(methods: Comparison) -> dict[str, Any]:
+    names = ("reference", "tolerance", "unit", "recommended", "within")
+    return {name: getattr(methods, name) for name in names}
+
+
+def to_csv(rungs: list[dict[str, Any]]) -> str:
+    """Format the methods of a record as rows; columns that a kind of method lacks are empty."""
+    cells = [[rung.get(name) for name in _CSV_COLUMNS] for rung in rungs]
+    return csv_rows(_CSV_COLUMNS, [["" if cell is None else str(cell) for cell in row] for row in cells])
+
+
+def write_cost(folder: str | os.PathLike[str], cost: Cost | SurfaceCost, recipe: str = "scene") -> Path:
+    """Write result.json, report.txt, cost.csv and cost.png into a folder, each complete or not at all.
+
+    Returns the folder. Raises UsageError where it holds files that pellicle did not write, or cannot be
+    written.
+    """
+    from pellicle.reporting.matplotlib_figure import save_figure
+
+    name, record = Path(recipe).name, to_json(cost, recipe)
+    target = new_folder(folder)
+    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder
+    write_text(target / "report.txt", text(cost, name), overwrite=True)
+    write_text(target / "cost.csv", to_csv(record["rungs"]), overwrite=True)
+    save_figure(draw(cost, name), target / "cost.png", overwrite=True)
+    return target
+
+
+FLOOR = 1e-17
+"""Height at which an error of zero is drawn."""
+
+
+def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
+    """Draw error against time: of a film's methods and solvers, or of a surface's colours and values."""
+    from pellicle.accuracy.surface import SurfaceCost
+
+    if isinstance(cost, SurfaceCost):
+        kinds = [methods for methods in (cost.colours, cost.values) if methods is not None]
+        solvers = None
+    else:
+        kinds, solvers = [cost.methods], cost.solvers if cost.solvers and cost.solvers.results else None
+    sections = [_methods_section(methods) for methods in kinds]
+    if solvers is not None:
+        label = "mean error of the parameters,\nshare of the bounds"
+        panel = _panel(solvers.results, solvers.recommended, 1e3, label)
+        sections.append(Section("time of one fit (ms)", [[panel]]))
+    return matplotlib_figure.draw(sections, name)
+
+
+def _methods_section(methods: Comparison) -> Section:
+    """Error against time of methods of simulation, and the tolerance."""
+    unit, scale = time_unit(methods)
+    which = "mean" if methods.sample == "colour" else "largest"
+    label = f"{which} {error_label(methods)},\nagainst {methods.reference}"
+    tolerance = f"{error_label(methods, f'{methods.tolerance:g}')} (tolerance)", methods.tolerance
+    panel = _panel(methods.results, methods.recommended, scale, label, tolerance)
+    return Section(f"time of one {methods.sample} ({unit})", [[panel]])
+
+
+def _panel(
+    items: Sequence[Any],
+    recommended: str | None,
+    scale: float,
+    label: str,
+    tolerance: tuple[str, float] | None = None,
+) -> Panel:
+    """Numbered points, the Pareto front joined; an error of zero is drawn at the bottom."""
+    shown = sorted((item for item in items if np.isfinite(item.error)), key=lambda item: item.seconds)
+    x = np.array([item.seconds * scale for item in shown])
+    y = np.array([max(item.error, FLOOR) for item in shown])
+    front = np.array([item.pareto for item in shown], dtype=bool)
+    best = np.array([item.name == recommended for item in shown], dtype=bool)
+    lines = [Line(x[front], y[front], "", "fit", width=1.0)]
+    if tolerance is not None:
+        lines.append(Line(x[[0, -1]], np.full(2, tolerance[1]), tolerance[0], "blue", "dotted", 0.8))
+    groups: tuple[tuple[np.ndarray, str, str, Style], ...] = (
+        (front & ~best, "fastest at its accuracy", "fit", "circle"),
+        (~front & ~best, "", "data", "circle"),
+        (best, "recommended", "fit", "diamond"),
+    )
+    lines += [Line(x[rows], y[rows], name, colour, style) for rows, name, colour, style in groups]
+    notes = [(*place, str(i)) for i, place in enumerate(zip(x, y, strict=True), start=1)]
+    key = [f"{i}  {item.name}" for i, item in enumerate(shown, start=1)]
+    axes: Any = {"scale": "log", "abscissa": "log", "legend": "above"}
+    return Panel(label, lines, height=4.0, notes=notes, key=key, **axes)
