@@ -157,6 +157,7 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         axes.text(1.02, 1.0, names, transform=axes.transAxes, va="top", fontsize="small")
         axes.grid(alpha=0.2)
     axes.margins(x=0.02 if panel.title else 0.01)
+    axes.yaxis.get_offset_text().set_va("top")  # a factor such as 1e-6 stands inside
     _scale(axes, panel)
     if panel.empty:
         axes.set(xticks=[], yticks=[])
@@ -272,7 +273,7 @@ def _arrange(figure: Figure, grid: list[list[Axes]], rows: list[Sequence[Panel]]
     heights = [row[0].height for row in rows]
     above = [_TEXT * _lines_above(axes_row, row) for axes_row, row in zip(grid, rows, strict=True)]
     below = [_room_below(axes_row) for axes_row in grid]
-    top = _TEXT * (title.count("\n") + 1) + 2 * _GAP
+    top = _TEXT * (title.count("\n") + 1) + 2 * _GAP if title else _GAP
     width, height = figure.get_figwidth(), top + sum(above) + sum(heights) + sum(below)
     figure.set_size_inches(width, height)
     figure.suptitle(plain(title), fontsize="medium", x=0.01, y=1 - _GAP / height, ha="left", va="top")
