@@ -4,65 +4,37 @@ import pytest
 
 from pellicle.data.tabular.columns import is_header, recognise
 
+ROLES = {
+    ("wavelength", "nm"): ("wavelength (nm)", "wavelength_nm", "lambda / nm", "λ (nm)", "nm"),
+    ("wavelength", "um"): ("Wavelength [um]", "Wavelength [µm]"),
+    ("wavelength", "A"): ("Wavelength (Å)",),
+    ("wavelength", None): ("WAVELENGTH", "lambda", "wl"),
+    ("wavelength", "eV"): ("energy", "energy (eV)", "photon energy (eV)"),
+    ("wavelength", "cm-1"): ("wavenumber (1/cm)", "wavenumber_cm-1", "Wavenumber [cm⁻¹]"),
+    ("R", None): ("R", "r"),
+    ("R", "percent"): ("R (%)", "%R", "R%", "% Reflectance", "R_percent", "Reflectance (%)"),
+    ("R", "fraction"): ("R_fraction", "Reflectance [-]"),
+    ("T", None): ("T", "T (Abs)"),
+    ("T", "percent"): ("%T", "Transmittance / %"),
+    ("intensity", None): ("intensity", "Intensity (a.u.)"),
+    ("sigma", None): ("sigma",),
+    ("sigma", "percent"): ("sigma (%)",),
+    ("angle", "deg"): ("angle_deg", "angle", "AOI (°)", "aoi_deg"),
+    ("psi", "deg"): ("psi_deg",),
+    ("delta", None): ("delta",),
+    ("other", None): ("R_sigma_as_stated", "Rubbish", "temperature", ""),
+    ("T", "absorbance"): ("A", "Abs", "Absorbance (AU)"),
+    ("R", "absorbance"): ("log(1/R)",),
+    ("wavelength", "THz"): ("frequency (THz)",),
+}
+"""Names of columns by the role and the unit that they state."""
 
-@pytest.mark.parametrize(
-    ("name", "role", "unit"),
-    [
-        ("wavelength (nm)", "wavelength", "nm"),
-        ("Wavelength [um]", "wavelength", "um"),
-        ("Wavelength [µm]", "wavelength", "um"),
-        ("Wavelength (Å)", "wavelength", "A"),
-        ("wavelength_nm", "wavelength", "nm"),
-        ("WAVELENGTH", "wavelength", None),
-        ("lambda", "wavelength", None),
-        ("lambda / nm", "wavelength", "nm"),
-        ("λ (nm)", "wavelength", "nm"),
-        ("wl", "wavelength", None),
-        ("nm", "wavelength", "nm"),
-        ("energy", "wavelength", "eV"),
-        ("energy (eV)", "wavelength", "eV"),
-        ("photon energy (eV)", "wavelength", "eV"),
-        ("wavenumber (1/cm)", "wavelength", "cm-1"),
-        ("wavenumber_cm-1", "wavelength", "cm-1"),
-        ("Wavenumber [cm⁻¹]", "wavelength", "cm-1"),
-        ("R", "R", None),
-        ("r", "R", None),
-        ("R (%)", "R", "percent"),
-        ("%R", "R", "percent"),
-        ("R%", "R", "percent"),
-        ("% Reflectance", "R", "percent"),
-        ("R_percent", "R", "percent"),
-        ("R_fraction", "R", "fraction"),
-        ("Reflectance (%)", "R", "percent"),
-        ("Reflectance [-]", "R", "fraction"),
-        ("T", "T", None),
-        ("%T", "T", "percent"),
-        ("Transmittance / %", "T", "percent"),
-        ("intensity", "intensity", None),
-        ("Intensity (a.u.)", "intensity", None),
-        ("sigma", "sigma", None),
-        ("sigma (%)", "sigma", "percent"),
-        ("angle_deg", "angle", "deg"),
-        ("angle", "angle", "deg"),
-        ("AOI (°)", "angle", "deg"),
-        ("aoi_deg", "angle", "deg"),
-        ("psi_deg", "psi", "deg"),
-        ("delta", "delta", None),
-        ("R_sigma_as_stated", "other", None),
-        ("Rubbish", "other", None),
-        ("temperature", "other", None),
-        ("A", "T", "absorbance"),
-        ("Abs", "T", "absorbance"),
-        ("Absorbance (AU)", "T", "absorbance"),
-        ("T (Abs)", "T", None),
-        ("log(1/R)", "R", "absorbance"),
-        ("frequency (THz)", "wavelength", "THz"),
-        ("", "other", None),
-    ],
-)
-def test_role_and_unit_of_a_name(name, role, unit):
-    column = recognise(name)
-    assert (column.role, column.unit) == (role, unit)
+
+@pytest.mark.parametrize(("role", "unit"), ROLES)
+def test_role_and_unit_of_a_name(role, unit):
+    for name in ROLES[role, unit]:
+        column = recognise(name)
+        assert (column.role, column.unit) == (role, unit), name
 
 
 @pytest.mark.parametrize(

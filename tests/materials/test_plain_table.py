@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pellicle.errors import DataError
 from pellicle.materials import material
 from pellicle.optics.pair import imag, is_real, real
 
@@ -71,45 +70,3 @@ def test_the_range_check_names_the_file(write):
         material(path).check_range([300, 500])
     assert path in str(caught.value)
     assert "`range=(400, 500)`" in str(caught.value)
-
-
-BAD = [
-    ("", "empty", None),
-    ("# only this\n", "comments", None),
-    ("wavelength_nm,n,k\n", "numbers", None),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,abc,0.1\n600,1.4,0.1\n", "'abc'", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,nan,0.1\n600,1.4,0.1\n", "finite", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,1.4\n600,1.4,0.1\n", "empty", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,1.4,0.1,7\n600,1.4,0.1\n", "4 values", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,1.4,-0.1\n", "turn its sign", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,0,0.1\n", "above 0", "line 3"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n500,1.4,0.1\n500,1.3,0.1\n", "sort the rows", "line 4"),
-    ("wavelength_nm,n,k\n-400,1.5,0.1\n500,1.4,0.1\n", "above 0", "line 2"),
-    ("wavelength_nm,n,k\n400,1.5,0.1\n", "two rows", None),
-    ("wavelength_nm,eps,k\n400,1.5,0.1\n500,1.5,0.1\n", "column named n", None),
-    ("x,n,k\n400,1.5,0.1\n500,1.5,0.1\n", "column named wavelength", None),
-    ("wavelength_nm,n,n\n400,1.5,0.1\n500,1.5,0.1\n", "two columns are named n", None),
-    ("wavelength (furlong),n\n400,1.5\n500,1.5\n", "unknown unit 'furlong'", None),
-    ("wavelength,n\n0.4,1.5\n0.5,1.5\n", "wavelength_um", None),
-    ("400,1.5,0.1,3\n500,1.5,0.1,3\n", "2 or 3 columns", None),
-    ("my film of 1999\n\n400 1.5\n500 1.5\n", "header", None),
-    (b"\x00\x01\x02\x03", "binary", None),
-]
-
-
-@pytest.mark.parametrize(("text", "words", "line"), BAD)
-def test_bad_files_get_one_sentence(write, text, words, line):
-    path = write(text)
-    with pytest.raises(DataError, match="film") as caught:
-        material(path)
-    message = str(caught.value)
-    assert words in message
-    assert line is None or line in message
-    assert "\n" not in message
-
-
-def test_missing_files_and_folders(tmp_path):
-    with pytest.raises(DataError, match="no such file"):
-        material(str(tmp_path / "none.csv"))
-    with pytest.raises(DataError, match="folder"):
-        material(str(tmp_path))
