@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.problem import Explained, Form, Problem
-from pellicle.fitting.program_cache import kept
+from pellicle.programs.cache import kept
 
 Static = tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]
 """The static part of a program: coordinates, and of each view its form and the parameters that it takes."""

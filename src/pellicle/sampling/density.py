@@ -14,7 +14,7 @@ from pellicle.fitting.coordinates import Box
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.evaluation import Static, explained
 from pellicle.fitting.problem import Explained, Problem
-from pellicle.fitting.program_cache import kept
+from pellicle.programs.cache import kept
 
 
 class Systematics(NamedTuple):

@@ -23,8 +23,8 @@ from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.minima import Minima, minima, solve
 from pellicle.fitting.positive_definite import solve_positive
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.program_cache import kept
 from pellicle.fitting.progress import Progress
+from pellicle.programs.cache import kept
 
 log = getLogger(__name__)
 

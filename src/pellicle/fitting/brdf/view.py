@@ -17,9 +17,9 @@ from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
-from pellicle.fitting.program_cache import kept
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
+from pellicle.programs.cache import kept
 from pellicle.scene.surface import SurfaceView
 
 _ROUND = 128

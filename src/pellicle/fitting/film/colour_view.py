@@ -21,11 +21,11 @@ from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
-from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
+from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.instrument import Drift

@@ -18,8 +18,8 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.program_cache import kept
 from pellicle.optics.pair import Pair, imag, real
+from pellicle.programs.cache import kept
 from pellicle.scene.content import Content, remembered
 from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import Free, free_leaves, insert, is_free

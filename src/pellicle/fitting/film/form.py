@@ -9,11 +9,11 @@ from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.problem import Explained
-from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
+from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.signals.base import Signal

@@ -12,8 +12,8 @@ from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.program_cache import kept
 from pellicle.fitting.reported_layer import linearised
+from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 
 LANES, FEW = 256, 16

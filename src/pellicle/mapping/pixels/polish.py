@@ -14,9 +14,9 @@ from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
-from pellicle.fitting.program_cache import kept
 from pellicle.mapping.pixels.minima import PixelData
 from pellicle.optics.hoisting import compute_once
+from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 

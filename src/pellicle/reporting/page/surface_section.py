@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.brdf.directions import direction, frame
 from pellicle.brdf.models import model
-from pellicle.fitting.program_cache import kept
+from pellicle.programs.cache import kept
 from pellicle.rendering.films import with_values
 from pellicle.reporting.drawable import CHANNELS, Line, Panel, Section, Table
 from pellicle.reporting.page.document import picture

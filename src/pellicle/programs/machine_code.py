@@ -20,7 +20,7 @@ from typing import Any
 
 import jax
 
-from pellicle import private_files
+from pellicle.programs import private_files
 
 log = logging.getLogger(__name__)
 

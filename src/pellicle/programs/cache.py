@@ -3,7 +3,7 @@
 JAX's own cache saves the compilation; the rest of a start is tracing and lowering programs in Python. Where
 a session has a compilation cache, programs are kept beside it, each under a key of everything that it depends
 on. The next process neither traces nor lowers them, and does not import the solver. What is kept is machine
-code where no one but the user can write the files (`executables`); elsewhere (Windows, a shared folder, a
+code where no one but the user can write the files (`machine_code`); elsewhere (Windows, a shared folder, a
 GPU) it is the traced program, which is data: JAX lowers it again and finds the machine code in its cache.
 """
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from pellicle.errors import DataError, UsageError
 from pellicle.files import replacing
-from pellicle.fitting import executables
+from pellicle.programs import machine_code
 
 Program = Callable[..., Any]
 Options = dict[str, str | bool]
@@ -69,18 +69,18 @@ def _load(
     key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
     path = cache / "programs" / key.hex()
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-    run = executables.load(path, key) if jax.default_backend() == "cpu" else None
+    run = machine_code.load(path, key) if jax.default_backend() == "cpu" else None
     if run is None:
         options = _options(many_calls)  # found by compiling, which a kept program needs not
         if jax.default_backend() == "cpu":
-            run = executables.make(path, key, flat, inputs, cache, options)
+            run = machine_code.make(path, key, flat, inputs, cache, options)
         run = run or _traced(path.with_suffix(".export"), flat, inputs, options)
     kind = get_type_hints(function)["return"]
     return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
 
 def _options(many_calls: bool) -> Options:
-    return {} if many_calls else executables.compiler_options()
+    return {} if many_calls else machine_code.compiler_options()
 
 
 def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct], options: Options) -> Program:
