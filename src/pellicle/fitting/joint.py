@@ -30,6 +30,7 @@ from pellicle.fitting.film import fit as of_film
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.minima import minima
+from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.progress import Progress, quiet
@@ -112,62 +113,88 @@ def fitted(
         return _concluded(both, own.scenes, film, brdf, began), ranked
 
 
-def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarray]:
-    """The problem of all data, and starts (starts, parameters) from pairs of minima."""
-    first, second = film.searched, brdf.searched
-    shared = {p.name: i for i, p in enumerate(first.parameters)}
-    both = {j: shared[p.name] for j, p in enumerate(second.parameters) if p.name in shared}
-    if not any(first.parameters[i].key == "thickness" for i in both.values()):
+class _Merged(NamedTuple):
+    """Parameters of both problems: those of the film, within the bounds of both where they share a name, then
+    the `rest` of the surface's. `shared` are positions of shared ones, by that in the surface's problem."""
+
+    parameters: tuple[Parameter, ...]
+    lower: np.ndarray
+    upper: np.ndarray
+    shared: dict[int, int]
+    rest: list[int]
+
+    def joined(self, film: Any, surface: Any) -> np.ndarray:
+        """A number for each parameter from those of both problems."""
+        return np.concatenate([film, np.asarray(surface)[self.rest]])
+
+    @property
+    def positions(self) -> dict[int, int]:
+        """Positions of the surface's parameters among all."""
+        first = len(self.parameters) - len(self.rest)
+        return self.shared | {j: first + at for at, j in enumerate(self.rest)}
+
+
+def _merged(film: Problem, surface: Problem) -> _Merged:
+    """Raises UsageError where they share no free thickness, or bounds do not overlap."""
+    named = {p.name: i for i, p in enumerate(film.parameters)}
+    shared = {j: named[p.name] for j, p in enumerate(surface.parameters) if p.name in named}
+    if not any(film.parameters[i].key == "thickness" for i in shared.values()):
         raise UsageError(
             "the scene and the surface share no free thickness: free both under one name, as in"
             " pl.Layer(material, pl.Free(10, 1000)) and {'thickness': pl.Free(10, 1000)}"
         )
-    parameters, lower, upper = list(first.parameters), np.array(first.box.lower), np.array(first.box.upper)
-    for j, i in both.items():
-        p, q = parameters[i], second.parameters[j]
+    parameters, lower, upper = list(film.parameters), np.array(film.box.lower), np.array(film.box.upper)
+    for j, i in shared.items():
+        p, q = parameters[i], surface.parameters[j]
         lower[i], upper[i] = max(p.lower, q.lower), min(p.upper, q.upper)
         if not lower[i] < upper[i]:
             raise UsageError(f"the bounds of {p.name} in the scene and in the surface do not overlap")
         parameters[i] = replace(p, lower=float(lower[i]), upper=float(upper[i]))
-    rest = [j for j in range(len(second.parameters)) if j not in both]
-    where = both | {j: len(parameters) + at for at, j in enumerate(rest)}
-    parameters += [second.parameters[j] for j in rest]
+    rest = [j for j in range(len(surface.parameters)) if j not in shared]
+    every = (*parameters, *(surface.parameters[j] for j in rest))
+    return _Merged(every, lower, upper, shared, rest)
 
-    def joined(one: Any, other: Any) -> np.ndarray:
-        return np.concatenate([one, np.asarray(other)[rest]])
 
+def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarray]:
+    """The problem of all data, and starts (starts, parameters) from pairs of minima."""
+    first, second = film.searched, brdf.searched
+    merged = _merged(first, second)
     box = Box(
-        lower=joined(lower, second.box.lower),
-        upper=joined(upper, second.box.upper),
-        prior_mean=joined(first.box.prior_mean, second.box.prior_mean),
-        prior_weight=joined(first.box.prior_weight, second.box.prior_weight),
-        logarithmic=joined(first.box.logarithmic, second.box.logarithmic),
+        lower=merged.joined(merged.lower, second.box.lower),
+        upper=merged.joined(merged.upper, second.box.upper),
+        prior_mean=merged.joined(first.box.prior_mean, second.box.prior_mean),
+        prior_weight=merged.joined(first.box.prior_weight, second.box.prior_weight),
+        logarithmic=merged.joined(first.box.logarithmic, second.box.logarithmic),
         reach=second.box.reach,
     )
-    log, tilt = second.coordinates.log, second.coordinates.tilt
+    where, log, tilt = merged.positions, second.coordinates.log, second.coordinates.tilt
     coordinates = Coordinates(
-        tuple(joined(np.zeros(len(lower), bool), log).tolist()) if log else (),
+        tuple(merged.joined(np.zeros(len(merged.lower), bool), log).tolist()) if log else (),
         None if tilt is None else (where[tilt[0]], where[tilt[1]]),
         second.coordinates.folded,
     )
-    names = [view.name for view in second.views]
-    views = [replace(v, takes=tuple(where[i] for i in v.takes)) for v in second.views]
-    named = enumerate(zip(views, names, strict=True), start=1)
-    views = [replace(view, name=name or f"brdf-{i}") for i, (view, name) in named]
-    values = np.asarray(first.values(film.minima.units))[:_MOST_FILMS]
-    others = brdf.minima.units[:_MOST_SURFACES]
-    their = np.asarray(second.values(others))
-    starts = []
-    for row in values:
-        for units, numbers in zip(others, their, strict=True):
-            shared_numbers = row.copy()
-            for j, i in both.items():
-                shared_numbers[i] = numbers[j]
-            for each in (row, shared_numbers):
-                own = np.clip((each - lower) / (upper - lower), 0.0, 1.0)
-                starts.append(np.concatenate([own, units[rest]]))
-    problem = Problem((*first.views, *views), tuple(parameters), box, coordinates)
-    return problem, np.array(starts)
+    views = [
+        replace(view, takes=tuple(where[i] for i in view.takes), name=view.name or f"brdf-{number}")
+        for number, view in enumerate(second.views, start=1)
+    ]
+    problem = Problem((*first.views, *views), merged.parameters, box, coordinates)
+    return problem, _starts(merged, film, brdf)
+
+
+def _starts(merged: _Merged, film: RankedMinima, brdf: RankedMinima) -> np.ndarray:
+    """Points (starts, parameters) of the unit cube from pairs of minima, with shared numbers of either."""
+    values = np.asarray(film.searched.values(film.minima.units))[:_MOST_FILMS]
+    units = brdf.minima.units[:_MOST_SURFACES]
+    span, starts = merged.upper - merged.lower, []
+    for own in values:
+        for unit, numbers in zip(units, np.asarray(brdf.searched.values(units)), strict=True):
+            of_surface = own.copy()
+            for j, i in merged.shared.items():
+                of_surface[i] = numbers[j]
+            for numbers_of_film in (own, of_surface):
+                inside = np.clip((numbers_of_film - merged.lower) / span, 0.0, 1.0)
+                starts.append(merged.joined(inside, unit))
+    return np.array(starts)
 
 
 class JointMeasurements(NamedTuple):

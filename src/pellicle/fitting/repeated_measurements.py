@@ -248,25 +248,29 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
         known = [(path, fit, p) for path, fit in used if (p := fit.parameters.get(name)) and _usable(p)]
         if len(known) < 2:
             continue
-        estimates = [p for *_, p in known]
-        shared = float(np.mean([max(p.stderr**2 - p.stderr_noise**2, 0.0) for p in estimates]))
-        compared[name] = RepeatedParameter(
-            name,
-            estimates[0].unit,
-            tuple(p.value for p in estimates),
-            tuple(p.stderr_noise for p in estimates),
-            math.sqrt(shared),
-        )
-        own = compared[name]
-        log.info(
-            "repeats: %s scatters by %.3g, stated noise error %.3g: chi-square %.3g on %d degrees of freedom",
-            *(name, own.sd, own.stated, own.chi2, own.freedom),
-        )
-        if own.agreement is Agreement.LARGER:
+        compared[name] = _repeated(name, [p for *_, p in known])
+        if compared[name].agreement is Agreement.LARGER:
             warnings += _other_minima(known, name)
     if not compared:
         raise UsageError(f"no parameter has a finite error in two of the {len(used)} repeats")
     return Repeats(every, compared, tuple(n for n in names if n not in compared), tuple(warnings))
+
+
+def _repeated(name: str, estimates: Sequence[Estimate]) -> RepeatedParameter:
+    """A parameter with its estimates by all repeats. Logs their scatter."""
+    shared = float(np.mean([max(p.stderr**2 - p.stderr_noise**2, 0.0) for p in estimates]))
+    repeated = RepeatedParameter(
+        name,
+        estimates[0].unit,
+        tuple(p.value for p in estimates),
+        tuple(p.stderr_noise for p in estimates),
+        math.sqrt(shared),
+    )
+    log.info(
+        "repeats: %s scatters by %.3g, stated noise error %.3g: chi-square %.3g on %d degrees of freedom",
+        *(name, repeated.sd, repeated.stated, repeated.chi2, repeated.freedom),
+    )
+    return repeated
 
 
 def _usable(p: Estimate) -> bool:

@@ -26,6 +26,7 @@ from pellicle.fitting.noise import local_noise
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import ViewFit
 from pellicle.optics.pair import real
+from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.layers import Layer
@@ -93,13 +94,18 @@ def phase_per_thickness(
     return (2 * np.sqrt(np.maximum(n**2 - sine**2, 1e-6)) / wavelength)[rows]
 
 
+@remembered  # the best fit asks again with the same index, where that is known
 def fringes(x: np.ndarray, values: np.ndarray) -> Fringes | None:
     """The clear fringes of `values` (points,) against x (points,); None where there are none."""
-    every = (_with_trend(x, values, degree, fewest) for degree, fewest in _TRENDS)
+    # white noise of N points leaves an amplitude of σ √(2/N), and 1.22 times that in a Hann window
+    noise = 1.22 * float(np.median(local_noise(values))) * np.sqrt(2 / len(x))
+    every = (_with_trend(x, values, noise, degree, fewest) for degree, fewest in _TRENDS)
     return next((found for found in every if found is not None), None)
 
 
-def _with_trend(x: np.ndarray, values: np.ndarray, degree: int, fewest: float) -> Fringes | None:
+def _with_trend(
+    x: np.ndarray, values: np.ndarray, noise: float, degree: int, fewest: float
+) -> Fringes | None:
     even, level = _even(x, values, degree)
     span, window = even[-1] - even[0], _window(_GRID)
     spectrum = np.fft.rfft(level * window, 8 * _GRID)
@@ -109,8 +115,6 @@ def _with_trend(x: np.ndarray, values: np.ndarray, degree: int, fewest: float) -
         return None
     at = float(thickness[np.argmax(np.where(allowed, np.abs(spectrum), 0.0))])
     amplitude = _amplitude(even, level, at)
-    # white noise of N points leaves an amplitude of σ √(2/N), and 1.22 times that in a Hann window
-    noise = 1.22 * float(np.median(local_noise(values))) * np.sqrt(2 / len(x))
     if abs(amplitude) < _NOISES * noise or abs(amplitude) ** 2 / 2 < _SHARE * np.average(
         level**2, weights=window
     ):
