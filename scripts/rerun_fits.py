@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from pellicle.cli.fit import fit
+from pellicle.cli.flags import BatchFlags
 from pellicle.files import replacing, write_text
 from pellicle.reporting.json_record import indented
 
@@ -48,7 +49,7 @@ def run(study: Path, out: Path) -> dict[str, Any]:
     """
     stderr = StringIO()
     with chdir(study), redirect_stdout(StringIO()), redirect_stderr(stderr):
-        code = fit(recipe="recipe.toml", out=str(out))
+        code = fit(recipe="recipe.toml", results=BatchFlags(out=str(out)))
     if code not in (0, 4):
         raise ValueError(stderr.getvalue().strip().rpartition("\n")[2])
     return json.loads((out / "result.json").read_text(encoding="utf-8"))

@@ -72,12 +72,6 @@ def test_two_angles_in_one_spectrum(film):
 
 
 @pytest.mark.slow  # compiles a scene of its own
-def test_a_free_angle(film, measured):
-    scene = film(light=pl.Light(angle=pl.Free(0.0, 60.0), polarisation="s"))
-    agrees(pl.fit(measured(scene, 480.0, 35.0), scene), {"thickness": 480.0, "angle": 35.0})
-
-
-@pytest.mark.slow  # compiles a scene of its own
 def test_a_plate_with_its_back_face(film, measured):
     plate = pl.Substrate(Constant(1.5), "air", 1.0)
     scene = film(material=2.1, substrate=plate, light=pl.Light(signal="T"))
@@ -89,21 +83,33 @@ def test_a_plate_with_its_back_face(film, measured):
     assert "The back face makes no difference here" in opaque.verdict
 
 
-@pytest.mark.slow  # compiles a scene of its own
-def test_bandwidth(film, measured):
-    scene = film(instrument=pl.Instrument(bandwidth=pl.Free(0.0, 40.0)))
-    fit = pl.fit(measured(scene, 900.0, 25.0), scene)
-    agrees(fit, {"thickness": 900.0, "instrument.bandwidth": 25.0})
-    sharp = pl.fit(measured(film(), 900.0), film())
-    assert fit.plan.on("coherence")
-    assert not sharp.plan.on("coherence")
-
-
-@pytest.mark.slow  # compiles a scene of its own
-def test_uneven_thickness(film, measured):
-    scene = film(instrument=pl.Instrument(thickness_spread=pl.Free(0.0, 60.0)))
-    fit = pl.fit(measured(scene, 900.0, 30.0), scene)
-    agrees(fit, {"thickness": 900.0, "instrument.thickness_spread": 30.0})
+@pytest.mark.slow  # each compiles a scene of its own
+@pytest.mark.parametrize(
+    ("more", "truth", "averages"),
+    [
+        (
+            {"light": pl.Light(angle=pl.Free(0.0, 60.0), polarisation="s")},
+            {"thickness": 480.0, "angle": 35.0},
+            False,
+        ),
+        (
+            {"instrument": pl.Instrument(bandwidth=pl.Free(0.0, 40.0))},
+            {"thickness": 900.0, "instrument.bandwidth": 25.0},
+            True,
+        ),
+        (
+            {"instrument": pl.Instrument(thickness_spread=pl.Free(0.0, 60.0))},
+            {"thickness": 900.0, "instrument.thickness_spread": 30.0},
+            True,
+        ),
+    ],
+    ids=["angle", "bandwidth", "uneven thickness"],
+)
+def test_a_free_number_of_light_or_instrument(film, measured, more, truth, averages):
+    scene = film(**more)
+    fit = pl.fit(measured(scene, *truth.values()), scene)
+    agrees(fit, truth)
+    assert fit.plan.on("coherence") == averages
 
 
 @pytest.mark.slow  # compiles a scene of its own

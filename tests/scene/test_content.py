@@ -1,0 +1,64 @@
+"""Results that are kept by the content of scenes and arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import measured
+from pellicle.scene.content import KEPT, Content, remembered
+
+NM = np.linspace(400.0, 800.0, 64)
+
+
+def scene(thickness=None, **more) -> pl.Scene:
+    return pl.Scene(pl.Layer(1.46, thickness or pl.Free(10, 500)), 3.9, **more)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "equal"),
+    [
+        (scene(), scene(), True),
+        (scene(), scene(pl.Free(10, 501)), False),
+        (scene(100.0), scene(100.5), False),
+        (scene(), scene(uncertainty=pl.Uncertainty.none()), False),
+        ((NM, "a"), (NM.copy(), "a"), True),
+        ((NM, "a"), (NM, "b"), False),
+        ((NM,), (NM[:, None],), False),
+        ((0,), (False,), False),
+        ((np.float64(1.0),), (np.float32(1.0),), False),
+        ((NM,), (np.append(NM[:-1], 800.0 + 1e-9),), False),
+    ],
+)
+def test_content(one, other, equal):
+    assert (Content(one) == Content(other)) is equal
+    assert (hash(Content(one)) == hash(Content(other))) or not equal
+
+
+def test_a_result_is_computed_once_for_equal_arguments_and_few_are_kept():
+    calls = []
+
+    @remembered
+    def total(numbers: np.ndarray, factor: float) -> float:
+        calls.append(factor)
+        return float(factor * np.sum(numbers))
+
+    assert total(NM, 2.0) == total(NM.copy(), 2.0) == total(Content(NM), 2.0) == 2 * NM.sum()
+    assert calls == [2.0]
+    assert total(NM + 1, 2.0) == 2 * NM.sum() + 128
+    for factor in range(KEPT):
+        total(NM, float(factor + 10))
+    total(NM, 2.0)
+    assert calls.count(2.0) == 3
+
+
+def test_spectra_of_one_scene_and_grid_share_its_structure():
+    first, second = (pl.simulate(scene(float(d)), NM, noise=0.001) for d in (100, 200))
+    longer = pl.simulate(scene(100.0), np.linspace(400.0, 801.0, 64), noise=0.001)
+    problems = [make(measured(data, scene())) for data in (first, second, longer)]
+    scenes = [problem.views[0].scene for problem in problems]
+    assert scenes[0] is scenes[1]
+    assert scenes[2].light.wavelength[-1] == 801.0
+    assert np.any(problems[0].views[0].data.values != problems[1].views[0].data.values)
