@@ -188,6 +188,16 @@ def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_pa
     assert "another input" in again.err
 
 
+def test_counts_with_a_white_of_a_material(pellicle, words, fits, tmp_path):
+    np.save(tmp_path / "white.npy", np.full(30, 1.0))
+    with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
+        counts = cube.R.values
+    ran = pellicle(*words, "--white-frame", tmp_path / "white.npy", "--white-reflectance", "1.5+0.0j")
+    assert ran.code == 0, ran.err
+    with xarray.open_dataset(tmp_path / "out/map.nc") as map:
+        np.testing.assert_allclose(map.thickness, 100 * 0.04 * counts[..., 0], rtol=1e-6)
+
+
 def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):
     film = tmp_path / "film.toml"
     for flags, text in (

@@ -13,6 +13,7 @@ from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.photograph import ThicknessMap, map_photograph
+from pellicle.mapping.run import map_cube
 from pellicle.scene.film import Scene
 from pellicle.scene.kinds import check_scene
 from pellicle.scene.surface import Surface
@@ -20,22 +21,6 @@ from pellicle.scene.surface import Surface
 if TYPE_CHECKING:
     from pellicle.mapping.lamp import LampCurve
     from pellicle.mapping.map_result import Map
-
-
-_OF_A_CUBE = (
-    "out",
-    "workers",
-    "scheduler",
-    "resume",
-    "overwrite",
-    "preview",
-    "lamp_curve",
-    "lamp_reference",
-    "neighbours",
-    "recipe",
-    "progress",
-)
-"""Arguments of `map` for a cube, besides those of reading it."""
 
 
 @overload
@@ -129,8 +114,6 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     _refuse_others(options, ("photograph", "cube") if photograph else ("cube", "photograph"))
     if photograph:
         return map_photograph(data, scene, **options)
-    from pellicle.mapping.run import map_cube
-
     return map_cube(data, scene, **options)
 
 
@@ -138,7 +121,7 @@ def _refuse_others(options: Iterable[str], kinds: tuple[str, str]) -> None:
     """Raise UsageError for an argument of `map` that is not for the first of the kinds of data."""
     names = {
         "photograph": {*signature(map_photograph).parameters},
-        "cube": {*_OF_A_CUBE, *signature(read_cube).parameters},
+        "cube": {*signature(map_cube).parameters, *signature(read_cube).parameters} - {"reading"},
     }
     own, other = kinds
     for name in options:

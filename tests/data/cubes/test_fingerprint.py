@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pellicle.data.cube import Cube
 from pellicle.data.read_cube import read_cube
 
 NM = np.linspace(400.0, 800.0, 9)
@@ -41,6 +42,12 @@ def test_content_and_options_change_it(path, values, tmp_path):
     np.save(path, values)
     others.append(read_cube(path, wavelengths=NM))
     assert len({first, *(cube.fingerprint for cube in others)}) == 1 + len(others)
+
+
+def test_a_cube_without_a_fingerprint_gets_none(values):
+    """A map then hashes its values; one made of the places of the pixels would be that of any cube."""
+    cube = Cube({"values": values}, NM)
+    assert cube.coarse(2).fingerprint == cube.divided(np.ones(9), "lamp").fingerprint == ""
 
 
 def test_arrays_in_memory_and_of_dask(values):

@@ -1,5 +1,7 @@
 """TIFF stacks in the layouts that cameras, ImageJ and OME write."""
 
+import sys
+
 import numpy as np
 import tifffile
 
@@ -53,6 +55,14 @@ def test_a_photograph_is_no_cube(values, refused, tmp_path):
     refused(path, "three channels", '`signal="srgb"`', error=UsageError)
     tifffile.imwrite(tmp_path / "stack.tif", values.transpose(2, 0, 1), photometric="minisblack")
     assert not is_photograph(tmp_path / "stack.tif")
+
+
+def test_a_compressed_stack_needs_zarr(values, refused, tmp_path, monkeypatch):
+    tifffile.imwrite(
+        tmp_path / "a.tif", values.transpose(2, 0, 1), compression="zlib", photometric="minisblack"
+    )
+    monkeypatch.setitem(sys.modules, "zarr", None)
+    refused(tmp_path / "a.tif", "need zarr: pip install 'pellicle[maps]'", error=UsageError, wavelengths=NM)
 
 
 def test_a_compression_that_needs_another_package(values, refused, tmp_path):
