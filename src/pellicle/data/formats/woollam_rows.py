@@ -127,29 +127,22 @@ def generalised(groups: dict[str, Rows], path: str) -> Selected:
 
     Raises DataError for rows of other lengths, and without a point that all ratios have.
     """
-    each = {label: psi_delta(rows, path, label) for label, rows in groups.items()}
-    points = {
-        label: dict(zip(_points(own.rows, False), own.rows, strict=True)) for label, own in each.items()
-    }
-    first, *others = points.values()
-    common = [point for point in first if all(point in other for other in others)]
-    if not common:
-        raise DataError(f"{path}: {', '.join(groups)} have no point in common; export them together")
-    notes = [f"{label}: {note}" for label, own in each.items() for note in own.notes]
-    if len(common) < max(map(len, points.values())):
-        notes.append(f"{len(common)} points that {', '.join(groups)} have in common")
-    with_errors = all(len(own.names) == 5 for own in each.values())
-    if not with_errors and any(len(own.names) == 5 for own in each.values()):
+    selected = {label: psi_delta(rows, path, label) for label, rows in groups.items()}
+    notes = [f"{label}: {note}" for label, of in selected.items() for note in of.notes]
+    points, common = _in_common({label: of.rows for label, of in selected.items()}, ", ".join(groups), path)
+    notes += common
+    with_errors = [len(of.names) == 5 for of in selected.values()]
+    if any(with_errors) and not all(with_errors):
         notes.append("errors ignored, which not all ratios have")
-    width = 4 if with_errors else 2
+    width = 4 if all(with_errors) else 2
     names = ["angle_deg"]
-    for label in each:
-        own = [f"{angle}_{label.lower()}" for angle in ("psi", "delta")]
-        names += [f"{name} (deg)" for name in (*own, *(f"sigma_{name}" for name in own))][:width]
-    rows = []
-    for point in common:
-        line, cells = first[point]
-        rows.append((line, [*cells[:2], *(x for of in points.values() for x in of[point][1][2 : 2 + width])]))
+    for label in selected:
+        angles = [f"{angle}_{label.lower()}" for angle in ("psi", "delta")]
+        names += [f"{name} (deg)" for name in (*angles, *(f"sigma_{name}" for name in angles))][:width]
+    rows = [
+        (line, [*setting, *(x for label in selected for x in values[label][:width])])
+        for line, setting, values in points
+    ]
     return Selected(tuple(names), rows, notes)
 
 
@@ -158,7 +151,7 @@ def mueller(groups: dict[str, Rows], path: str) -> Selected:
 
     Raises DataError for rows of other lengths, and without a point that all elements have.
     """
-    found, errors, notes = {}, [], []
+    measured, notes = {}, []
     for label, rows in groups.items():
         odd = next((line for line, cells in rows if len(cells) not in (3, 4)), None)
         if odd is not None:
@@ -166,27 +159,43 @@ def mueller(groups: dict[str, Rows], path: str) -> Selected:
                 f"{path}: line {odd.number} is not {label}, wavelength, angle, a value and its error; "
                 "correct that line"
             )
-        rows, missing = _measured(rows, slice(2, 3))
-        found[label] = dict(zip(_points(rows, False), rows, strict=True))
-        errors.append([cells[3] for _, cells in rows if len(cells) == 4])
+        measured[label], missing = _measured(rows, slice(2, 3))
         notes += [f"{label}: {note}" for note in missing]
-    first, *others = found.values()
+    points, common = _in_common(measured, "its Mueller elements", path)
+    errors = [cells[3:] for rows in measured.values() for _, cells in rows]
+    # 0 and 1 stand for unknown errors
+    known = all(errors) and not any(all(_is(error, x) for [error] in errors) for x in (0.0, 1.0))
+    with_error = [label for label in measured if label.lower() != "mm11"] if known else []
+    names = ("angle_deg", *measured, *(f"sigma_{label}" for label in with_error))
+    rows = [
+        (line, [*setting, *(values[x][0] for x in measured), *(values[x][1] for x in with_error)])
+        for line, setting, values in points
+    ]
+    return Selected(names, rows, [*notes, *common])
+
+
+def _in_common(
+    groups: dict[str, Rows], subject: str, path: str
+) -> tuple[list[tuple[Line, list[str], dict[str, list[str]]]], list[str]]:
+    """The points that all labels have: line, wavelength and angle, values of each label; and a note if fewer.
+
+    Raises DataError without such a point.
+    """
+    by_point = [dict(zip(_points(rows, False), rows, strict=True)) for rows in groups.values()]
+    first, *others = by_point
     common = [point for point in first if all(point in other for other in others)]
     if not common:
-        raise DataError(f"{path}: its Mueller elements have no point in common; export them together")
-    if len(common) < max(map(len, found.values())):
-        notes.append(f"{len(common)} points that all Mueller elements have")
-    # 0 and 1 stand for unknown errors
-    known = all(len(own) == len(rows) for own, rows in zip(errors, found.values(), strict=True))
-    known = known and not any(all(_is(e, x) for own in errors for e in own) for x in (0.0, 1.0))
-    measured = [label for label in found if label.lower() != "mm11"] if known else []
-    names = ("angle_deg", *found, *(f"sigma_{label}" for label in measured))
-    rows = []
-    for point in common:
-        line, cells = first[point]
-        own = [*cells[:2], *(of[point][1][2] for of in found.values())]
-        rows.append((line, [*own, *(found[label][point][1][3] for label in measured)]))
-    return Selected(names, rows, notes)
+        raise DataError(f"{path}: {subject} have no point in common; export them together")
+    fewer = len(common) < max(map(len, by_point))
+    notes = [f"{len(common)} points that {subject} have in common"] if fewer else []
+    points = [
+        (
+            *(first[point][0], first[point][1][:2]),
+            {label: of[point][1][2:] for label, of in zip(groups, by_point, strict=True)},
+        )
+        for point in common
+    ]
+    return points, notes
 
 
 def _measured(rows: Rows, positions: slice) -> tuple[Rows, list[str]]:
