@@ -212,9 +212,3 @@ def test_one_wavelength_is_simulated_at_each_angle(pellicle, tmp_path):
     path.write_text(re.sub(r"wavelengths = \{.*\}\n", "", text))
     assert pellicle("simulate", path, "--out", out).code == 0
     assert pl.read_spectrum(out).angle.tolist() == [30.0, 50.0]
-
-
-def test_words_are_no_angles(pellicle, tmp_path):
-    ran = pellicle("read", tmp_path / "x.csv", "--angle", "0,x")
-    assert ran.code == 2
-    assert "degrees such as 70, or 0,30,60" in " ".join(ran.err.replace("│", " ").split())

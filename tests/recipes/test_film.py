@@ -163,7 +163,46 @@ def test_an_unknown_key_names_the_nearest(refused, text, said):
         (BASE + "[instrument]\nscale = 'loose'\n", ("instrument.scale", "'loose'")),
         (BASE + "[instrument]\nbandwidth = -1\n", ("bandwidth", "-1")),
         ('[scene]\nsubstrate = "Si"\nlayer = []\n', ("scene.layer",)),
-        ("[scene\n", ("is not TOML", "line 1")),
+        ("[data]\nfile = ['a.csv']\n" + BASE, ("data.file", "go into files")),
+        ("[data]\nwavelengths = [400, nan]\n" + BASE, ("data.wavelengths.1", "finite", "nan")),
+        (BASE.replace('"SiO2"', "inf"), ("scene.layer.0.material", "finite", "inf")),
+        (BASE.replace('"SiO2"', '"inf"'), ("material", "inf", "finite")),
+        (BASE.replace('"SiO2"', "{ model = 'lorentz', A = -1.0 }"), ("lorentz: A must not be negative",)),
+        (
+            BASE.replace('"SiO2"', "{ model = 'oscillators', terms = [{ kind = 'drude', Ep = -3 }] }"),
+            ("drude: Ep must not be negative, got -3",),
+        ),
+        (
+            BASE.replace('"SiO2"', "{ model = 'tauc-lorentz', E0 = 2.0, Eg = 3.0 }"),
+            ("Eg must lie below", "Eg 3 and E0 2"),
+        ),
+        (
+            BASE.replace('"SiO2"', "{ model = 'cody-lorentz', E0 = 2.0, Eg = 3.0 }"),
+            ("Eg must lie below", "Eg 3 and E0 2"),
+        ),
+        (BASE.replace('"SiO2"', "{ model = 'tauc-lorentz', A = nan }"), ("A must be a finite number",)),
+        (BASE.replace('"SiO2"', "{ model = 'spline', knots = [400, nan, 700] }"), ("knots2", "finite")),
+        (
+            BASE.replace('"SiO2"', "{ mix = 'bruggeman', host = 1.5, inclusion = 1.0, fraction = 1.2 }"),
+            ("bruggeman: fraction must lie in 0 to 1, got 1.2",),
+        ),
+        (
+            BASE.replace(
+                '"SiO2"',
+                "{ mix = 'looyenga', host = 1.5, inclusion = 1.0, fraction = { lower = -0.2, upper = 1 } }",
+            ),
+            ("looyenga: fraction must lie in 0 to 1, got -0.2",),
+        ),
+        (BASE.replace("upper = 3000", "upper = 1e300"), ("thickness", "a metre", "1e+300")),
+        (BASE.replace("{ lower = 10, upper = 3000 }", "nan"), ("scene.layer.0.thickness", "finite", "nan")),
+        (BASE.replace("upper = 3000", "upper = inf"), ("thickness", "two finite bounds")),
+        (
+            BASE.replace("upper = 3000", "upper = 3000, prior = { mean = nan, sd = 1 }"),
+            ("prior.mean", "finite"),
+        ),
+        (BASE.replace('"Si"', "{ material = 'Si', back = 'air', plate_mm = nan }"), ("plate_mm", "finite")),
+        (BASE + "[instrument]\nscale = nan\n", ("instrument.scale", "finite", "nan")),
+        (BASE + "[instrument]\nbandwidth = inf\n", ("instrument.bandwidth", "finite", "inf")),
     ],
 )
 def test_refused_in_one_sentence(refused, text, said):

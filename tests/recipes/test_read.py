@@ -94,6 +94,8 @@ def test_the_base_of_a_surface_is_fixed(write):
     surface = SURFACE + 'base = { model = "constant", n = 2.9, k = 3.1 }\n'
     fixed = pl.read_recipe(write(surface)).scene().fixed_numbers()
     assert (fixed["base_n"].tolist(), fixed["base_k"].tolist()) == ([2.9] * 3, [3.1] * 3)
+    metal = pl.read_recipe(write(SURFACE + 'base = "Fe"\n')).scene().fixed_numbers()
+    assert np.all((metal["base_n"] > 2) & (metal["base_n"] < 3.2) & (metal["base_k"] > 2))
     with pytest.raises(DataError, match=r"scene\.surface: base cannot be free: give base_n and base_k"):
         pl.read_recipe(write(surface.replace("3.1", "{ lower = 0, upper = 4 }"))).scene()
 
