@@ -15,11 +15,11 @@ from pellicle.data.settings import named
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.reporting.drawable import CHANNELS, SERIES, Style
+from pellicle.signals.base import Quantity as Measured
 
 RATIOS = {"ane": "AnE", "aps": "Aps", "asp": "Asp"}
 """Ratios as Woollam's programs write them."""
 FORMULAS = {"ane": "$r_{pp}/r_{ss}$", "aps": "$r_{ps}/r_{pp}$", "asp": "$r_{sp}/r_{ss}$"}
-_POWERS = {"R": "reflectance", "T": "transmittance"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +56,8 @@ def quantities(
         assert isinstance(curve, ColourCurve)
         return _channels(data, curve.data, curve.sigma, curve.model, CHANNELS)
     assert curve is None or isinstance(curve, Curve)
-    if data.ratios:
-        return _generalised(data, curve)
-    if data.elements:
-        return _mueller(data, curve)
-    return [_power(data, curve)] if data.delta is None else _psi_delta(data, curve)
+    known = [q for q in data.kind.quantities if curve is None or _in_curve(q, curve)]
+    return [_of_spectrum(data, curve, q, i) for i, q in enumerate(known)]
 
 
 def _channels(
@@ -77,8 +74,12 @@ def _channels(
         Quantity(
             name,
             name,
-            **_column([values, model, residual], sigma, c, scaled),
-            drawn=(name, colours[c % len(colours)], "point"),
+            values[:, c],
+            None if sigma is None else sigma[:, c],
+            model[:, c],
+            residual[:, c],
+            scaled[:, c],
+            (name, colours[c % len(colours)], "point"),
         )
         for c, name in enumerate(data.channels)
     ]
@@ -86,58 +87,6 @@ def _channels(
 
 def _channel_colours(channels: Sequence[str]) -> Sequence[str]:
     return CHANNELS if set(channels) <= {"R", "G", "B"} else ("fit", "green", "blue", "fourth")
-
-
-def power_label(spectrum: Spectrum) -> str:
-    """`reflectance`, or `reflectance × unknown scale` of an uncalibrated instrument."""
-    label = _POWERS.get(spectrum.signal, str(spectrum.signal))
-    return label if spectrum.calibrated else f"{label} × unknown scale"
-
-
-def _power(data: Spectrum, curve: Curve | None) -> Quantity:
-    label = power_label(data)
-    if curve is None:
-        return Quantity(data.signal, label, data.values, data.sigma)
-    return Quantity(data.signal, label, curve.data, curve.sigma, curve.model, curve.residual, curve.residual)
-
-
-def _psi_delta(data: Spectrum, curve: Curve | None) -> list[Quantity]:
-    psi, delta, share = _angles(data, curve)
-    sigma = data.sigma if curve is None else curve.sigma
-    dashed: Any = ("Δ", "blue", "dashed")
-    angles = [
-        Quantity("psi", "Ψ (degrees)", **_column(psi, sigma), drawn=("Ψ", "residual", "solid")),
-        Quantity("delta", "Δ (degrees)", **_column(delta, data.delta_sigma), drawn=dashed, turns=True),
-    ]
-    if share[0] is None:
-        return angles
-    values = _column(share, data.depolarisation_sigma)
-    values["missed"] = None  # it has another unit than the residuals of angles
-    return [*angles, Quantity("depolarisation", "depolarisation", **values)]
-
-
-def _angles(data: Spectrum, curve: Curve | None) -> tuple[list[Any], list[Any], list[Any]]:
-    """Data, and of a fit model and residual, of Ψ, Δ and depolarisation."""
-    if curve is None:
-        return [data.values], [data.delta], [data.depolarisation]
-    share: list[Any] = [curve.depolarisation_data]
-    if share[0] is not None:
-        share += [curve.depolarisation_model, curve.depolarisation_residual]
-    delta = [curve.delta_data, curve.delta_model, curve.delta_residual]
-    return [curve.data, curve.model, curve.residual], delta, share
-
-
-def _column(
-    arrays: list[Any], sigma: np.ndarray | None, column: int | None = None, missed: np.ndarray | None = None
-) -> dict[str, Any]:
-    """Fields of a quantity: one column of data, of a fit also of model and residual, and of σ.
-
-    `missed` replaces the residual in figures.
-    """
-    data, model, residual = [*arrays, None, None][:3]
-    fields: dict[str, Any] = {"data": data, "model": model, "residual": residual, "sigma": sigma}
-    fields["missed"] = residual if missed is None else missed
-    return {name: x if x is None or column is None else x[:, column] for name, x in fields.items()}
 
 
 def weighted_delta(curve: Curve) -> np.ndarray:
@@ -148,52 +97,49 @@ def weighted_delta(curve: Curve) -> np.ndarray:
     return 0.5 * np.sin(2 * np.deg2rad(curve.model)) * curve.delta_residual
 
 
-def _generalised(data: Spectrum, curve: Curve | None) -> list[Quantity]:
-    quantities = []
-    psi, delta, _ = _angles(data, curve)
-    sigma = data.sigma if curve is None else curve.sigma
-    for i, ratio in enumerate(data.ratios):
+def _in_curve(q: Measured, curve: Curve) -> bool:
+    return q.array != "depolarisation" or curve.depolarisation_data is not None
+
+
+def _of_spectrum(data: Spectrum, curve: Curve | None, q: Measured, i: int) -> Quantity:
+    """One quantity of a spectrum, the i-th one, with those of a fit."""
+    values: dict[str, Any] = {"data": q.measured(data), "sigma": q.error(data)}
+    if curve is not None:
+        names = "data", "model", "residual"
+        values |= dict(zip(names, q.curve(curve), strict=True))
+        if q.array == "values":
+            values["sigma"] = curve.sigma if q.column is None else curve.sigma[:, q.column]
+        if q.array != "depolarisation":  # it has another unit than the residuals of angles
+            weighted = bool(data.ratios) and q.wraps
+            values["missed"] = weighted_delta(curve)[:, q.column] if weighted else values["residual"]
+    label = q.axis if data.calibrated else f"{q.axis} × unknown scale"
+    for ratio in data.ratios:
+        label = label.replace(f" {ratio}", f" {RATIOS[ratio]}")
+    return Quantity(q.name, label, **values, turns=q.wraps, **_style(data, q, i))
+
+
+def _style(data: Spectrum, q: Measured, i: int) -> dict[str, Any]:
+    """Label, place in a grid, and line of the residual of a quantity."""
+    if data.ratios:
+        ratio, row = data.ratios[i // 2], int(q.wraps)
         name = RATIOS[ratio]
-        missed = None if curve is None else weighted_delta(curve)
-        quantities += [
-            Quantity(
-                f"psi_{ratio}",
-                f"Ψ {name} (degrees)",
-                **_column(psi, sigma, i),
-                drawn=(f"Ψ {name}", SERIES[i], "solid"),
-                place=(0, i),
-                title=f"Ψ of {name} = {FORMULAS[ratio]} (degrees)",
-                smallest=0.5,
-            ),
-            Quantity(
-                f"delta_{ratio}",
-                f"Δ {name} (degrees)",
-                **_column(delta, data.delta_sigma, i, missed),
-                drawn=(f"½ sin 2Ψ Δ {name}", SERIES[i], "dashed"),
-                turns=True,
-                place=(1, i),
-                title=f"Δ of {name} (degrees)",
-                smallest=0.5,
-            ),
-        ]
-    return quantities
-
-
-def _mueller(data: Spectrum, curve: Curve | None) -> list[Quantity]:
-    values = [data.values] if curve is None else [curve.data, curve.model, curve.residual]
-    sigma = data.sigma if curve is None else curve.sigma
-    return [
-        Quantity(
-            name,
-            name,
-            **_column(values, sigma, i),
-            drawn=(name, f"C{i % 10}", "solid" if i < 10 else "dashed"),
-            place=(int(name[1]) - 1, int(name[2]) - 1),
-            title=name,
-            smallest=0.02,
-        )
-        for i, name in enumerate(data.elements)
-    ]
+        sign = q.label.split()[0]
+        return {
+            "drawn": (f"{'½ sin 2Ψ ' * row}{sign} {name}", SERIES[i // 2], ("solid", "dashed")[row]),
+            "place": (row, i // 2),
+            "title": f"{sign} of {name}{'' if row else f' = {FORMULAS[ratio]}'} (degrees)",
+            "smallest": 0.5,
+        }
+    if data.elements:
+        return {
+            "drawn": (q.name, f"C{i % 10}", "solid" if i < 10 else "dashed"),
+            "place": (int(q.name[1]) - 1, int(q.name[2]) - 1),
+            "title": q.name,
+            "smallest": 0.02,
+        }
+    if q.unit:
+        return {"drawn": (q.label, *(("blue", "dashed") if q.wraps else ("residual", "solid")))}
+    return {}
 
 
 def abscissa(data: Spectrum | Colours | BrdfSamples) -> tuple[np.ndarray, str]:
