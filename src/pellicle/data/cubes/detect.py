@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from pellicle.data.cubes import envi, numpy_files, spectra_folder, tiff_stacks, xarray_cubes
@@ -14,40 +15,46 @@ LARGEST_SPECTRUM = 2**27
 READ = "zarr, NetCDF, ENVI (.hdr), TIFF stacks, .npy, .npz, and folders of spectra with a table of file, x, y"
 
 
+def _is_table(path: Path) -> bool:
+    return image_format(path) is None and spectra_folder.table_of(path) is not None
+
+
+READERS = {
+    xarray_cubes.is_zarr: xarray_cubes.read_zarr,
+    Path.is_dir: spectra_folder.read_folder,
+    xarray_cubes.is_netcdf: xarray_cubes.read_netcdf,
+    numpy_files.is_numpy: numpy_files.read_numpy,
+    tiff_stacks.is_tiff: tiff_stacks.read_tiff,
+    envi.is_envi: envi.read_envi,
+    _is_table: spectra_folder.read_folder,
+}
+"""Readers of cubes by the test of a file or folder that they read; the first that holds is taken."""
+
+
+def _reader(path: Path) -> Callable[[Path, Asked], RawCube] | None:
+    return next((read for recognises, read in READERS.items() if recognises(path)), None)
+
+
 def read_raw(path: Path, asked: Asked) -> RawCube:
     """Read the cube of a file or folder. Raises DataError or UsageError, one sentence."""
     if not path.exists():
         raise DataError(f"{path}: no such file or folder; check its name")
-    if path.is_dir():
-        if xarray_cubes.is_zarr(path):
-            return xarray_cubes.read_zarr(path, asked)
-        return spectra_folder.read_folder(path, asked)
-    if xarray_cubes.is_netcdf(path):
-        return xarray_cubes.read_netcdf(path, asked)
-    if numpy_files.is_numpy(path):
-        return numpy_files.read_numpy(path, asked)
-    if tiff_stacks.is_tiff(path):
-        return tiff_stacks.read_tiff(path, asked)
-    if envi.header_of(path) is not None:
-        return envi.read_envi(path, asked)
-    if image_format(path) is None and spectra_folder.table_of(path) is not None:
-        return spectra_folder.read_folder(path, asked)
-    raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+    read = _reader(path)
+    if read is None:
+        raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+    return read(path, asked)
 
 
 def is_cube(path: Path) -> bool:
     """True for a file or folder that only a reader of cubes understands; HDF5 may also be a spectrum."""
-    if not path.exists():
-        return False
-    if path.is_dir():
-        return xarray_cubes.is_zarr(path) or spectra_folder.table_of(path) is not None
-    if numpy_files.is_numpy(path) or envi.header_of(path) is not None:
-        return True
-    if tiff_stacks.is_tiff(path):
+    read = _reader(path) if path.exists() else None
+    if read is spectra_folder.read_folder:
+        return spectra_folder.table_of(path) is not None
+    if read is tiff_stacks.read_tiff:
         return not tiff_stacks.is_colour_image(path)
-    if xarray_cubes.is_netcdf(path):
+    if read is xarray_cubes.read_netcdf:
         return xarray_cubes.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
-    return image_format(path) is None and spectra_folder.table_of(path) is not None
+    return read is not None
 
 
 def is_photograph(path: Path) -> bool:

@@ -30,7 +30,7 @@ _FIELD = re.compile(r"^[ \t]*([^=;{}\n]+?)[ \t]*=[ \t]*(\{[^}]*\}|[^\n]*)", re.M
 _MOST_HEADER = 2**24
 
 
-def header_of(path: Path) -> Path | None:
+def _header_of(path: Path) -> Path | None:
     """The ENVI header of a file: itself, or the one beside it; None for a file of another format."""
     for header in (path, path.with_name(path.name + ".hdr"), path.with_suffix(".hdr")):
         if header.is_file():
@@ -40,9 +40,14 @@ def header_of(path: Path) -> Path | None:
     return None
 
 
+def is_envi(path: Path) -> bool:
+    """True for an ENVI header, or a file with one beside it."""
+    return _header_of(path) is not None
+
+
 def read_envi(path: Path, asked: Asked) -> RawCube:
     """Read the cube of an ENVI header, or of the data file beside one. Raises DataError or UsageError."""
-    header = header_of(path)
+    header = _header_of(path)
     assert header is not None, "the file was recognised by it"
     fields = _fields(header)
     stored = _stored(fields, header, path if path != header else _data_file(header))
