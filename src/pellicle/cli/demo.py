@@ -40,7 +40,7 @@ def demo(
     Makes a folder with a recipe, a spectrum and results, and prints the commands that made them.
     """
     from pellicle.cli.chart import chart
-    from pellicle.cli.simulate import simulate
+    from pellicle.cli.simulate import SimulationFlags, simulate
     from pellicle.files import write_text
     from pellicle.sampling.checks import missing
 
@@ -53,7 +53,7 @@ def demo(
     write_text(recipe, RECIPE)
     say(f"{recipe}: a recipe to change and try again")
     say("", f"$ pellicle simulate {recipe} --out {data} --seed 1")
-    simulate(str(recipe), out=str(data), seed=1)
+    simulate(str(recipe), out=str(data), how=SimulationFlags(seed=1))
     sampler, command = (None, "fit") if missing() else (Sampler(), "sample")
     say("", f"$ pellicle {command} --recipe {recipe} --out {folder / 'result'}")
     files = inputs([], str(recipe))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.cli.flags import Flags
 from pellicle.cli.reading import recipe_angles
 from pellicle.cli.session import check_folder, not_negative, say, start
 from pellicle.cli.wavelengths import directions, each_setting, wavelengths
@@ -22,19 +24,16 @@ if TYPE_CHECKING:
     from pellicle.simulation.spectra import SimulatedSignal
 
 
-def simulate(
-    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
-    *,
-    out: Annotated[
-        str,
-        Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth."),
-    ],
+@dataclass(frozen=True)
+class SimulationFlags(Flags):
+    """Flags of the noise and of the effects of a simulation."""
+
     noise: Annotated[
         float | str | None,
         Parameter(
             help='Standard deviation of the noise, or "2 %" of a BRDF (the recipe\'s, or 0).', metavar="SIGMA"
         ),
-    ] = None,
+    ] = None
     depolarisation_noise: Annotated[
         float | None,
         Parameter(
@@ -42,11 +41,30 @@ def simulate(
             " depolarises (4 times --noise in radians).",
             metavar="SIGMA",
         ),
-    ] = None,
-    seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0,
+    ] = None
+    seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0
     tolerance: Annotated[
         float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
-    ] = 0.0,
+    ] = 0.0
+
+    def spread(self) -> float | str | None:
+        """The noise: a number from 0, or a share of the signal as text. Raises UsageError."""
+        from pellicle.data.noise_level import noise_level
+
+        if self.noise is None or self.noise == 0:
+            return self.noise
+        level = noise_level(self.noise, "--noise")
+        return str(level) if level.relative else level.value
+
+
+def simulate(
+    recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
+    *,
+    out: Annotated[
+        str,
+        Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth."),
+    ],
+    how: Annotated[SimulationFlags, Parameter(name="*")] = SimulationFlags(),
     depth: Annotated[
         str | None,
         Parameter(
@@ -68,49 +86,34 @@ def simulate(
 
     if json and depth is None:
         raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
-    spread = _spread(noise)
-    not_negative("--tolerance", tolerance)
+    spread = how.spread()
+    not_negative("--tolerance", how.tolerance)
     described = read_recipe(recipe)
-    if depolarisation_noise is not None:
-        not_negative("--depolarisation-noise", depolarisation_noise)
+    if how.depolarisation_noise is not None:
+        not_negative("--depolarisation-noise", how.depolarisation_noise)
         if isinstance(described, SurfaceRecipe) or described.tables.data.signal != "psi-delta":
             raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
     if depth is not None:
-        if isinstance(described, SurfaceRecipe) or described.tables.data.signal in SPACES:
-            raise DataError(f"{recipe}: --depth is for a film and its spectrum")
-        if spread or tolerance:
+        if spread or how.tolerance:
             raise UsageError("--depth is exact: leave out --noise and --tolerance")
         _write_depth_profile(described, out, _wavelengths_of(depth), json)
         return 0
     start()
-    source = f"recipe {Path(recipe).name}, seed {seed}, noise {{}}, pellicle {version('pellicle')}"
+    noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
+    said = f"{noise:g}" if isinstance(noise, float | int) else noise
+    source = f"recipe {Path(recipe).name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
     comments = ["SYNTHETIC: simulated, not measured", source]
     if isinstance(described, SurfaceRecipe):
-        given = (described.tables.data.noise or 0.0) if spread is None else spread
-        comments[1] = source.format(f"{given:g}" if isinstance(given, float) else given)
-        _write_samples(described, out, given, seed, tolerance, comments)
-        return 0
-    if isinstance(spread, str):
+        _write_samples(described, out, noise, how, comments)
+    elif isinstance(noise, str):
         raise UsageError(
-            f"--noise {spread} is a share of the signal, which BRDF samples can have: give a number"
+            f"--noise {noise} is a share of the signal, which BRDF samples can have: give a number"
         )
-    sigma = (described.tables.data.noise or 0.0) if spread is None else spread
-    comments[1] = source.format(f"{sigma:g}")
-    if described.tables.data.signal in SPACES:
-        _write_colours(described, out, sigma, seed, tolerance, comments)
+    elif described.tables.data.signal in SPACES:
+        _write_colours(described, out, noise, how, comments)
     else:
-        _write_spectrum(described, out, (sigma, depolarisation_noise), seed, tolerance, comments)
+        _write_spectrum(described, out, noise, how, comments)
     return 0
-
-
-def _spread(noise: float | str | None) -> float | str | None:
-    """The flag's noise: a number from 0, or a share of the signal as text. Raises UsageError."""
-    from pellicle.data.noise_level import noise_level
-
-    if noise is None or noise == 0:
-        return noise
-    level = noise_level(noise, "--noise")
-    return str(level) if level.relative else level.value
 
 
 def _wavelengths_of(text: str) -> list[float]:
@@ -124,7 +127,11 @@ def _wavelengths_of(text: str) -> list[float]:
     return numbers
 
 
-def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bool) -> None:
+def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, at: list[float], json: bool) -> None:
+    from pellicle.recipes.surface import SurfaceRecipe
+
+    if isinstance(recipe, SurfaceRecipe) or recipe.tables.data.signal in SPACES:
+        raise DataError(f"{recipe.path}: --depth is for a film and its spectrum")
     check_folder(out)
     start()
     from pellicle.api.simulations import depth_profile
@@ -152,14 +159,8 @@ def _write_depth_profile(recipe: FilmRecipe, out: str, at: list[float], json: bo
 
 
 def _write_spectrum(
-    recipe: FilmRecipe,
-    out: str,
-    noises: tuple[float, float | None],
-    seed: int,
-    tolerance: float,
-    comments: list[str],
+    recipe: FilmRecipe, out: str, noise: float, how: SimulationFlags, comments: list[str]
 ) -> None:
-    """Write a spectrum; `noises` are those of the signal and of the depolarisation."""
     from pellicle.files import write_text
     from pellicle.fitting.film.messages import log_plan, log_scene
     from pellicle.signals.registry import of_parts
@@ -171,10 +172,9 @@ def _write_spectrum(
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     grid = wavelengths(recipe, scene)
     scene, nm = each_setting(scene, grid)
-    noise, of_depolarisation = noises
     elements, kind = recipe.tables.data.elements, scene.light.kind
     kind = kind if elements is None or not kind.parts else of_parts(elements, scene.light.signal)
-    result = simulate_signal(scene, nm, noise, seed, tolerance, of_depolarisation, kind)
+    result = simulate_signal(scene, nm, noise, how.seed, how.tolerance, how.depolarisation_noise, kind)
     log_plan(result.plan)
     write_text(out, _csv(scene, result, kind, noise, comments))
     span = f"{grid[0]:g} to {grid[-1]:g} nm" if len(grid) > 1 else f"at {grid[0]:g} nm"
@@ -182,7 +182,7 @@ def _write_spectrum(
 
 
 def _write_colours(
-    recipe: FilmRecipe, out: str, noise: float, seed: int, tolerance: float, comments: list[str]
+    recipe: FilmRecipe, out: str, noise: float, how: SimulationFlags, comments: list[str]
 ) -> None:
     from pellicle.data.colours import write_colours
     from pellicle.fitting.film.messages import log_plan, log_scene
@@ -202,8 +202,8 @@ def _write_colours(
         gamma=table.camera.gamma or 1.0,
         camera=seen.matrix,
         noise=noise,
-        seed=seed,
-        tolerance=tolerance,
+        seed=how.seed,
+        tolerance=how.tolerance,
     )
     log_plan(plan)
     write_colours(out, [colours], comments=[*comments, *seen.notes, _truth(scene)])
@@ -257,7 +257,7 @@ def _csv(
 
 
 def _write_samples(
-    recipe: SurfaceRecipe, out: str, noise: Any, seed: int, tolerance: float, comments: list[str]
+    recipe: SurfaceRecipe, out: str, noise: Any, how: SimulationFlags, comments: list[str]
 ) -> None:
     import numpy as np
 
@@ -266,7 +266,7 @@ def _write_samples(
     from pellicle.simulation.brdf import simulate_samples
 
     surface = recipe.scene()
-    samples, plan = simulate_samples(surface, directions(recipe), noise, seed, tolerance)
+    samples, plan = simulate_samples(surface, directions(recipe), noise, how.seed, how.tolerance)
     log_plan(plan)
     units = {parameter.key: parameter.unit for parameter in surface.brdf.parameters}
     means = {
