@@ -55,7 +55,7 @@ class Encoding(NamedTuple):
         return np.clip(coded, 0.0, highest) if self.clips else coded
 
     def roots(self, channels: np.ndarray) -> np.ndarray:
-        """The channels to the power of the space."""
+        """The channels (..., 3) to the power of the space."""
         return channels if self.power == 1 else np.clip(channels, 0.0, None) ** self.power
 
     def decode(self, coded: np.ndarray) -> np.ndarray:

@@ -138,7 +138,7 @@ class BrdfSamples:
         return dataclasses.replace(self, sigma=sigma, relative=tuple(share.tolist()) if share.any() else None)
 
     def at(self, rows: np.ndarray) -> BrdfSamples:
-        """Return the samples of these rows, in their order."""
+        """Return the samples of rows (N,), in their order."""
         names = [name for name in (*DIRECTIONS, *_TABLES, "lines") if getattr(self, name) is not None]
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names})
 

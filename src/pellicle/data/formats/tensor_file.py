@@ -77,7 +77,7 @@ def read_tensors(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
 def write_tensors(
     path: str | os.PathLike[str], fields: Mapping[str, np.ndarray], *, overwrite: bool = False
 ) -> None:
-    """Write named arrays as a tensor file.
+    """Write named arrays, of any shape, as a tensor file.
 
     Raises UsageError where `path` exists without `overwrite`, or cannot be written; ValueError for an array
     of a type that the format does not have.

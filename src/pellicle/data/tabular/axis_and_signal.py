@@ -171,7 +171,7 @@ class Scale:
     stated: bool
 
     def fractions(self, values: np.ndarray, sigma: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Convert the signal and its σ to fractions.
+        """Convert the signal (points,) and its σ (points,) to fractions.
 
         An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
         """

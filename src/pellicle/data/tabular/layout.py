@@ -78,7 +78,7 @@ def array_columns(
     name: str = "",
     facts: Sequence[tuple[str, str]] = (),
 ) -> Layout:
-    """Return the layout of numbers that a reader of a binary file has found; names as in `plain_columns`."""
+    """Return the layout of columns (points,) of a binary file; names as in `plain_columns`."""
     cells = ArrayCells(tuple(np.asarray(column, dtype=np.float64) for column in columns))
     return Layout(tuple(names), len(names), cells, tuple(notes), name, Declared(facts=tuple(facts)))
 

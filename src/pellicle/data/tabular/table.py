@@ -52,7 +52,7 @@ class Table:
         raise TypeError(f"{self.path} is no text")
 
     def source_lines(self, rows: np.ndarray) -> np.ndarray | None:
-        """Return the source lines of these rows, None for a binary file."""
+        """Return the source lines of rows (N,), None for a binary file."""
         return None if self.lines is None else self.lines[rows]
 
     def __len__(self) -> int:
@@ -73,7 +73,7 @@ class Table:
         return f"{self.path}: {self.place(row)}, {self.label(position)}"
 
     def places(self, position: int, rows: np.ndarray | None = None) -> Callable[[int], str]:
-        """Return `where` of one column as a function of the row, or of the position in `rows`."""
+        """Return `where` of one column as a function of the row, or of the position in `rows` (N,)."""
         return lambda row: self.where(row if rows is None else int(rows[row]), position)
 
     def numbers(self, positions: Sequence[int]) -> list[np.ndarray]:

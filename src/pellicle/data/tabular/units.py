@@ -70,7 +70,7 @@ def brdf_unit(text: str) -> str | None:
 
 
 def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
-    """Convert positive `values` in one of `WAVELENGTH_UNITS` to wavelengths in nm."""
+    """Convert positive `values`, of any shape, in one of `WAVELENGTH_UNITS` to wavelengths in nm."""
     match unit:
         case "nm":
             return values

@@ -134,7 +134,7 @@ class OpticalConstants(NamedTuple):
 def constants_of(
     rows: Table, unit: str, dielectric: bool = False, axis: np.ndarray | None = None
 ) -> OpticalConstants:
-    """Return the columns of rows of axis, n and k, or eps1 and eps2; of rows of n and k with their `axis`.
+    """Return the columns of rows of axis, n and k, or eps1 and eps2; of n and k with their `axis` (rows,).
 
     Raises DataError for a cell that is no finite number.
     """
@@ -155,7 +155,7 @@ def constants_of(
 
 
 def nk_from_dielectric(eps1: np.ndarray, eps2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return n and k of eps1 + i·eps2, (n + ik)², for eps2 ≥ 0, to rounding also where eps2 is small.
+    """Return n and k (N,) of eps1 + i·eps2 (N,), the square of n + ik; to rounding also where eps2 is small.
 
     2n² = |ε| + ε₁ and 2k² = |ε| − ε₁ cancel for small ε₂, one on either side of ε₁ = 0; the other of the two
     follows from ε₂ = 2nk.
