@@ -83,6 +83,15 @@ def fit() -> Fit:
     )
 
 
+@pytest.fixture
+def curved(fit) -> Fit:
+    """The fit with the curves of its rivals, which differ from the best by a constant."""
+    [part] = fit.parts
+    curves = [(dataclasses.replace(part.curve, model=part.curve.model + shift),) for shift in (0.01, 0.02)]
+    rivals = [dataclasses.replace(r, curves=c) for r, c in zip(fit.rivals, curves, strict=True)]
+    return dataclasses.replace(fit, rivals=tuple(rivals))
+
+
 def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
     """`fit` as if it were one of Ψ and Δ at these points; Δ passes 360 degrees, the data before the model."""
     size = np.size(wavelength)

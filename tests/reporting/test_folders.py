@@ -15,7 +15,7 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import Curve
-from pellicle.fitting.result import Estimate, Fit, Part, Profile, Rival, Status
+from pellicle.fitting.result import Estimate, Fit, Rival, Status
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.materials import material
 from pellicle.reporting.fit_tables import fit_csv, nk_csvs
@@ -30,48 +30,31 @@ KEYS = (
 
 
 @pytest.fixture
-def fit() -> Fit:
-    nm = np.linspace(400.0, 800.0, 41)
-    model = 0.3 + 0.1 * np.cos(nm / 30)
-    data = model + 0.002 * np.sin(nm)
-    return Fit(
-        parts=(
-            Part(
-                name="",
-                data=Spectrum(nm, data, "R", path="/data/film.csv", sha256="ab" * 32),
-                curve=Curve(
-                    wavelength=nm,
-                    data=data,
-                    sigma=np.full(41, 0.002),
-                    model=model,
-                    n=np.linspace(1.4, 1.3, 41),
-                    k=np.linspace(0.02, 0.01, 41),
-                    n_stderr=np.linspace(0.0, 0.001, 41),
-                    k_stderr=np.where(nm < 600, np.inf, 0.001),
-                ),
-                plan=Plan((Row("absorption", True, "k is free", np.float64(0.0)),), "R", "unpolarised"),
-                rms=0.00141,
-                chi2_reduced=math.nan,
-                effective_points=12.0,
-            ),
-        ),
+def fit(fit, with_part) -> Fit:
+    """A fit with infinite and undefined numbers, a limit and one rival."""
+    nm = fit.curve.wavelength
+    layer = {
+        "n": np.linspace(1.4, 1.3, 41),
+        "k": np.linspace(0.02, 0.01, 41),
+        "n_stderr": np.linspace(0.0, 0.001, 41),
+        "k_stderr": np.where(nm < 600, np.inf, 0.001),
+    }
+    plan = Plan((Row("absorption", True, "k is free", np.float64(0.0)),), "R", "unpolarised")
+    return replace(
+        with_part(fit, curve=replace(fit.curve, **layer), plan=plan, chi2_reduced=math.nan),
         status=Status.CONVERGED,
         verdict="The data determine thickness: 486.28 ± 0.12 nm.",
         parameters={
             "thickness": Estimate("thickness", 486.28, 0.12, "nm", 10.0, 3000.0, True),
             "k": Estimate("k", 0.0, 0.001, "", 0.0, 1.0, True, True, None, 0.0016),
             "instrument.scale": Estimate("instrument.scale", 4.5, math.inf, "", -math.inf, math.inf, True),
-            "B": Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
+            "B": fit["B"],
         },
         rivals=(Rival({"thickness": 242.87, "k": 0.1}, 8.5),),
         chi2_reduced=math.nan,
-        rms=0.00141,
-        effective_points=12.0,
         correlation_names=("thickness", "k"),
         correlation=np.array([[1.0, np.nan], [np.nan, 1.0]]),
         warnings=("a warning",),
-        profile=Profile(np.linspace(10.0, 3000.0, 30), np.linspace(5.0, 400.0, 30)),
-        seconds=0.42,
     )
 
 

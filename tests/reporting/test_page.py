@@ -56,15 +56,6 @@ class Page(HTMLParser):
         return {figure["id"]: figure for figure in json.loads(self.scripts["figures"])}
 
 
-@pytest.fixture
-def curved(fit):
-    """The fit with the curves of its rivals, which differ from the best by a constant."""
-    [part] = fit.parts
-    curves = [(replace(part.curve, model=part.curve.model + shift),) for shift in (0.01, 0.02)]
-    rivals = [replace(r, curves=c) for r, c in zip(fit.rivals, curves, strict=True)]
-    return replace(fit, rivals=tuple(rivals))
-
-
 def test_it_is_one_file_that_loads_nothing(fit):
     text = fit_page(fit, IMAGE)
     page = Page(text)

@@ -17,13 +17,10 @@ IMAGE = b"\x89PNG\r\n"
 
 
 @pytest.fixture
-def curved(fit):
-    """The fit with the curves of its rivals, n and k with errors, and a scan."""
-    [part] = fit.parts
-    curves = [(replace(part.curve, model=part.curve.model + shift),) for shift in (0.01, 0.02)]
-    rivals = [replace(r, curves=c) for r, c in zip(fit.rivals, curves, strict=True)]
+def curved(curved):
+    """The fit with the curves of its rivals and a scan."""
     scan = Profile(np.linspace(100.0, 1000.0, 60), 60 + 50 * np.cos(np.linspace(0.0, 20.0, 60)))
-    return replace(fit, rivals=tuple(rivals), profile=scan)
+    return replace(curved, profile=scan)
 
 
 @pytest.fixture

@@ -171,18 +171,23 @@ def _page(
             left = (_LEFT + (_LEFT + across + between) * j) / width
             panels[i, j] = figure.add_axes((left, bottom, across / width, share))
     if words:
-        figure.legend(
-            handles=hatched(words),
-            title="numbers that should not be used:",
-            title_fontsize="small",
-            fontsize="small",
-            loc="lower left",
-            bbox_to_anchor=(0.0, 0.0),
-            ncols=min(len(words), each_line),
-            frameon=False,
-            alignment="left",
-        )
+        _list_hatching(figure, words, each_line)
     return figure, panels, wides
+
+
+def _list_hatching(figure: Figure, words: list[str], columns: int) -> None:
+    """Explain the hatching at the bottom of a page."""
+    figure.legend(
+        handles=hatched(words),
+        title="numbers that should not be used:",
+        title_fontsize="small",
+        fontsize="small",
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.0),
+        ncols=min(len(words), columns),
+        frameon=False,
+        alignment="left",
+    )
 
 
 def _title(sheet: Sheet, columns: int, remark: str) -> str:
