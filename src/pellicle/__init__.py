@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import Substrate as Substrate
     from pellicle.scene.layers import Uncertainty as Uncertainty
     from pellicle.scene.layers import medium as medium
+    from pellicle.scene.reference import Reference as Reference
     from pellicle.scene.surface import Surface as Surface
     from pellicle.simulation.brdf import Directions as Directions
     from pellicle.simulation.depth import absorptance as absorptance
@@ -106,6 +107,7 @@ _NAMES = {
     "pellicle.scene.graded": ("Graded",),
     "pellicle.scene.instrument": ("Instrument",),
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "Uncertainty", "medium"),
+    "pellicle.scene.reference": ("Reference",),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),

@@ -49,9 +49,10 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     noisy = clean + random.normal(0.0, sigma, clean.shape)
     channels = clean.shape[1] // len(case.wavelength)
     noisy = noisy.reshape(count, -1, channels) if channels > 1 else noisy
+    kind = scene.light.kind.seen_in(scene, False)
     nm, sigmas = case.wavelength, np.full(len(case.wavelength), sigma)
     return [
-        DataSet(make(Measured(scene, nm, values, sigmas, scene.light.kind)), unit, start)
+        DataSet(make(Measured(scene, nm, values, sigmas, kind)), unit, start)
         for values, unit in zip(noisy, units, strict=True)
     ]
 

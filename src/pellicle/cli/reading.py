@@ -35,7 +35,9 @@ def light(reading: FileOptions, azimuth: Any = None) -> Light:
     from pellicle.scene.film import Light
 
     signal = light_signal(reading.signal, reading.transmitted)
-    return Light(None, incidence(reading.angle), signal, reading.polarisation or "unpolarised", azimuth)
+    through = bool(reading.transmission and reading.signal)
+    polarisation = reading.polarisation or "unpolarised"
+    return Light(None, incidence(reading.angle), signal, polarisation, azimuth, through)
 
 
 def read(path: str, options: FileOptions, *, free_scale: bool) -> list[Spectrum]:

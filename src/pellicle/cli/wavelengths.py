@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pellicle.cli.reading import recipe_angles
@@ -42,8 +43,6 @@ def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     import equinox as eqx
     import numpy as np
 
-    from pellicle.scene.film import Light
-
     if recipe.tables.data.wavelengths is not None:
         raise DataError(
             f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
@@ -52,7 +51,7 @@ def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     scene, nm, angles = own.scene(), own.sight().sensor.wavelength, recipe_angles(recipe)
     say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")
     angle: Any = scene.light.angle if len(angles) == 1 else np.repeat(angles, len(nm))
-    light = Light(None, angle, scene.light.signal, scene.light.polarisation, scene.light.azimuth)
+    light = replace(scene.light, wavelength=None, angle=angle)
     return eqx.tree_at(lambda s: s.light, scene, light), np.tile(nm, len(angles))
 
 
@@ -74,7 +73,7 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     angle = stated.angle if spectrum.angle is None else first.angle
     azimuth = scene.light.azimuth if first.azimuth is None else first.azimuth or None
     polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation
-    own_light = Light(None, angle, spectrum.signal, polarised, azimuth)
+    own_light = Light(None, angle, spectrum.signal, polarised, azimuth, spectrum.transmission)
     return eqx.tree_at(lambda s: s.light, scene, own_light), np.sort(spectrum.wavelength[first.rows])
 
 

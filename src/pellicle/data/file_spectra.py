@@ -153,7 +153,7 @@ def chosen(found: Sequence[Candidate], spectrum: str | None, *, together: bool) 
             " or read all with pl.read_spectra"
         )
     every = '`spectrum="all"`'
-    if signals == set(SIGNALS):
+    if signals == {"R", "T"}:
         raise UsageError(
             f'{path}: has both R and T; choose one with `signal="R"` or `signal="T"`, or take {every}'
         )

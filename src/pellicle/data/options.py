@@ -18,7 +18,7 @@ from pellicle.errors import UsageError
 SPECTRA, COLOURS, BRDF = "spectra", "colours", "BRDF samples"
 """Kinds of data to which an option applies."""
 SPACES = ("srgb", "rgb", "xyz", "lab")
-SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", *SPACES)
+SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
 
 Record = TypeVar("Record", bound="Options")
@@ -234,7 +234,8 @@ class SpectrumOptions(Options):
     signal: Annotated[
         str | None,
         Option(
-            "R, T, psi-delta, mueller, generalised-psi-delta, srgb, rgb, xyz or lab (that of the file).",
+            "R, T, psi-delta, mueller, generalised-psi-delta, contrast, srgb, rgb, xyz or lab (that of the"
+            " file).",
             kinds=(SPECTRA, COLOURS, BRDF),
             words=(*SIGNALS, "brdf"),
         ),
@@ -267,6 +268,10 @@ class SpectrumOptions(Options):
             kinds=(SPECTRA,),
             negative=True,
         ),
+    ] = None
+    transmission: Annotated[
+        bool | None,
+        Option("Psi and delta are those of transmitted light, t_p/t_s (that of the file).", kinds=(SPECTRA,)),
     ] = None
     analyser: Annotated[
         float | None,

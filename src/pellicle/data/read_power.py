@@ -10,7 +10,8 @@ from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_col
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError
-from pellicle.signals.limits import check_power, refuse_first
+from pellicle.signals.limits import refuse_first
+from pellicle.signals.one_column import OneColumn
 from pellicle.signals.registry import KINDS
 
 
@@ -87,6 +88,6 @@ def _check(
         '`signal_unit="absorbance"`, or in its header'
     )
     where = table.places(position, rows)
-    check_power(
-        KINDS[signal].noun, values, sigma, where, too_high=remedy if unit_stated else too_high, remedy=remedy
-    )
+    kind = KINDS[signal]()
+    assert isinstance(kind, OneColumn)
+    kind.check_values(values, sigma, where, remedy if unit_stated else too_high, remedy)

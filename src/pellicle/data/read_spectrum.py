@@ -19,12 +19,12 @@ from pellicle.data.read_mueller import MuellerColumns, read_mueller
 from pellicle.data.read_power import read_power
 from pellicle.data.spectrum import POLARISATIONS, Spectrum
 from pellicle.data.tabular.column_selection import SpectrumColumns
-from pellicle.data.tabular.columns import SIGNALS
 from pellicle.data.tabular.table import Table
 from pellicle.errors import UsageError
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.limits import check_noise
 from pellicle.signals.mueller import Mueller
+from pellicle.signals.registry import SIMULATED
 
 log = getLogger(__name__)
 
@@ -45,6 +45,7 @@ def read_spectrum(
     analyser: float | int | None = None,
     spot: int | None = None,
     elements: Sequence[str] | None = None,
+    transmission: bool | None = None,
 ) -> Spectrum:
     """Read reflectance, transmittance or ellipsometry from a file: CSV, or an instrument's export.
 
@@ -52,8 +53,8 @@ def read_spectrum(
 
     - `path` of the file.
     - `spectrum`: the name of one of several spectra in the file.
-    - `signal`: "R", "T", "psi-delta", "mueller" or "generalised-psi-delta"; needed where the file does not
-      state it, or has several.
+    - `signal`: "R", "T", "psi-delta", "mueller", "generalised-psi-delta" or "contrast"; needed where the
+      file does not state it, or has several.
     - `columns`: names in the order of the file's columns, "_" to skip one; overrides the header.
     - `wavelength_unit`: "nm", "um", "A", "eV", "cm-1" or "THz", where the file does not state it (else nm).
     - `signal_unit`: "fraction", "percent" or "absorbance" (−log₁₀ of the signal), where the file does not
@@ -69,6 +70,7 @@ def read_spectrum(
     - `spot`: number of the spot, from 1 in the order of the file, for an Accurion file of several spots.
     - `elements`: names of the elements of a Mueller matrix to read, such as ["m12", "m33"], or ratios of
       generalised Ψ and Δ, such as ["ane", "aps"]; None for all.
+    - `transmission`: True where Ψ and Δ are those of transmitted light; None takes it from the file.
 
     **Returns:** a `Spectrum`; of several complete sweeps over the same wavelengths, their mean.
 
@@ -88,6 +90,7 @@ def read_spectrum(
         analyser=analyser,
         spot=spot,
         elements=elements,
+        transmission=transmission,
     )
     if spectrum == ALL:
         raise UsageError(f"{path}: one spectrum is wanted; read all of a file with pl.read_spectra")
@@ -124,7 +127,7 @@ class _Reading(SpectrumOptions):
 
     def __post_init__(self) -> None:
         for name, known in (
-            ("signal", (*SIGNALS, SIGNAL, Mueller.word, Generalised.word)),
+            ("signal", SIMULATED),
             ("polarisation", POLARISATIONS),
         ):
             value = getattr(self, name)
@@ -136,8 +139,10 @@ class _Reading(SpectrumOptions):
         """Find the spectra of a file that these arguments may mean."""
         tables = read_tables(path, self.spot)
         found = file_candidates(tables, self.columns, self.signal, self.polarisation, self.elements)
-        if (self.folded or self.analyser is not None) and all(one.signal != SIGNAL for one in found):
-            name = "folded" if self.folded else "analyser"
+        stated = ("folded", self.folded), ("analyser", self.analyser is not None)
+        asked = [name for name, given in (*stated, ("transmission", self.transmission)) if given]
+        if asked and all(one.signal != SIGNAL for one in found):
+            name = asked[0]
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
         kinds = {SIGNAL: "psi and delta are in degrees", Mueller.word: "Mueller elements have no unit"}
         kinds[Generalised.word] = kinds[SIGNAL]
@@ -180,6 +185,11 @@ class _Reading(SpectrumOptions):
                 _folded(table) if self.folded is None else self.folded,
                 self.analyser,
             )
+            declared = dict(table.layout.declared.facts).get("light", "").startswith("transmitted")
+            if declared if self.transmission is None else self.transmission:
+                sweeps = tuple(replace(sweep, transmission=True) for sweep in spectrum.sweeps)
+                notes = (*spectrum.notes, "of transmitted light: conj(t_p/t_s)")
+                spectrum = replace(spectrum, transmission=True, notes=notes, sweeps=sweeps)
         angle = table.layout.declared.angle
         if angle is not None and spectrum.angle is None:
             notes = (*spectrum.notes, f"angle of incidence {angle:g} degrees, as the file declares")

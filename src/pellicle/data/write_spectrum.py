@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.errors import UsageError, install_command
 from pellicle.files import replacing
 
@@ -58,51 +57,27 @@ def _columns(spectrum: Spectrum) -> list[_Column]:
         found.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
     if spectrum.azimuth is not None:
         found.append(_Column("azimuth_deg", spectrum.azimuth, "degree", "sample_azimuth"))
-    if spectrum.ratios:
-        return found + _of_ratios(spectrum)
-    if spectrum.delta is not None:
-        found.append(_Column("psi_deg", spectrum.values, "degree", "psi"))
-        found.append(_Column("delta_deg", spectrum.delta, "degree", "delta"))
-        errors = [("sigma_psi", spectrum.sigma, "psi"), ("sigma_delta", spectrum.delta_sigma, "delta")]
-        found += [_Column(f"{n}_deg", x, "degree", f"{of}_errors") for n, x, of in errors if x is not None]
-        for header, values in (
-            ("depolarisation", spectrum.depolarisation),
-            ("sigma_depolarisation", spectrum.depolarisation_sigma),
-        ):
-            if values is not None:
-                name = header if header == "depolarisation" else "depolarisation_errors"
-                found.append(_Column(header, values, "", name))
-        return found
-    if spectrum.elements:
-        pairs = list(zip(spectrum.elements, spectrum.values.T, strict=True))
-        found += [_Column(element, values, "", element) for element, values in pairs]
-        errors = () if spectrum.sigma is None else spectrum.sigma.T
-        named = zip(spectrum.elements, errors, strict=True) if len(errors) else ()
-        return found + [_Column(f"sigma_{e}", values, "", f"{e}_errors") for e, values in named]
-    header = f"{spectrum.signal}{_POLARISED[spectrum.polarisation]}"
-    if spectrum.signal == "counts" or not spectrum.calibrated:
-        header = "counts" if spectrum.signal == "counts" else "intensity"
-    name = {"R": "reflectance", "T": "transmittance"}.get(spectrum.signal, "counts")
-    found.append(_Column(header, spectrum.values, "", name))
-    if spectrum.sigma is not None:
-        found.append(_Column("sigma", spectrum.sigma, "", f"{name}_errors"))
+    kind, name = spectrum.kind, _signal_header(spectrum)
+    shares = [q for q in kind.quantities if q.array == "depolarisation"]
+    for group in ([q for q in kind.quantities if q not in shares], shares):
+        for q in group:
+            stored = q.name if kind.degrees or kind.parts else kind.noun
+            found.append(_Column(name or q.header, q.measured(spectrum), "degree" if q.unit else "", stored))
+        for q in group:
+            if (error := q.error(spectrum)) is not None:
+                header, stored = ("sigma", kind.noun) if name else (f"sigma_{q.header}", q.name)
+                found.append(_Column(header, error, "degree" if q.unit else "", f"{stored}_errors"))
     return found
 
 
-def _of_ratios(spectrum: Spectrum) -> list[_Column]:
-    """Generalised Ψ and Δ of each ratio, then their errors."""
-    assert spectrum.delta is not None
-    values, errors = [], []
-    for i, ratio in enumerate(spectrum.ratios):
-        for angle, own, sigma in (
-            ("psi", spectrum.values, spectrum.sigma),
-            ("delta", spectrum.delta, spectrum.delta_sigma),
-        ):
-            name = f"{angle}_{ratio}"
-            values.append(_Column(f"{name}_deg", own[:, i], "degree", name))
-            if sigma is not None:
-                errors.append(_Column(f"sigma_{name}_deg", sigma[:, i], "degree", f"{name}_errors"))
-    return values + errors
+def _signal_header(spectrum: Spectrum) -> str:
+    """Name of the only column of a signal; empty where there are several."""
+    kind = spectrum.kind
+    if kind.degrees or kind.parts:
+        return ""
+    if kind.of_counts or not spectrum.calibrated:
+        return "counts" if kind.of_counts else "intensity"
+    return f"{kind.word}{_POLARISED[spectrum.polarisation] if kind.has_scale else ''}"
 
 
 def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:
@@ -115,6 +90,7 @@ def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:
         ("signal" if spectrum.calibrated else "uncalibrated", spectrum.signal),
         ("polarisation", "" if spectrum.ellipsometric else spectrum.polarisation),
         ("delta", "folded into 0 to 180 degrees" if spectrum.folded else ""),
+        ("light", "transmitted" if spectrum.transmission else ""),
         ("written_by", f"pellicle {version('pellicle')}"),
     ]
     return [(key, " ".join(value.split())) for key, value in pairs if value.strip()]
@@ -151,15 +127,10 @@ def _write_nexus(path: Path, spectrum: Spectrum) -> None:
         process = _group(entry, "origin", "NXprocess")
         for key, value in _facts(spectrum):
             process[key] = value
-        columns = _columns(spectrum)
-        signals = [c.name for c in columns if c.name in ("psi", "reflectance", "transmittance", "counts")]
-        others = [c.name for c in columns if c.name in ("delta", "depolarisation")]
-        if spectrum.ratios:
-            found = [c.name for c in columns if c.name in RATIO_COLUMNS]
-            signals, others = found[:1], found[1:]
-        if spectrum.elements:
-            signals, others = [spectrum.elements[0]], list(spectrum.elements[1:])
-        data = _group(entry, "data", "NXdata", signal=signals[0], axes=["wavelength"])
+        columns, kind = _columns(spectrum), spectrum.kind
+        names = [q.name for q in kind.quantities] if kind.degrees or kind.parts else [kind.noun]
+        first, *others = [c.name for c in columns if c.name in names]
+        data = _group(entry, "data", "NXdata", signal=first, axes=["wavelength"])
         if others:
             data.attrs["auxiliary_signals"] = others
         for column in columns:

@@ -23,7 +23,7 @@ from pellicle.effects.tolerance import (
 )
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.forward_model.plan import Plan, Row
-from pellicle.scene.film import Scene
+from pellicle.scene.film import Scene, of_reference
 from pellicle.scene.free import is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, absorbs
@@ -67,7 +67,8 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     known = {row.effect: row for row in given}
     rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)
     light = scene.light
-    return Plan(rows, light.signal, light.polarisation, transmission=light.transmission)
+    reference = exact(of_reference(scene)) if light.kind.has_reference else None
+    return Plan(rows, light.signal, light.polarisation, transmission=light.transmission, reference=reference)
 
 
 def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan:

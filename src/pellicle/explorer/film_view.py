@@ -182,7 +182,7 @@ class FilmView:
         if data.azimuth is not None and np.ptp(data.azimuth) > 0:
             raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
         azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
-        light = Light(None, angle, data.signal, polarised, azimuth)
+        light = Light(None, angle, data.signal, polarised, azimuth, data.transmission)
         view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, bool(data.folded))
         same = view.folded == self.folded and np.array_equal(nm, self.wavelength)
         same = same and eqx.tree_equal(view.scene.light, own) is True

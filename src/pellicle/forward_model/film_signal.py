@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -28,9 +29,10 @@ from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.lens import Turn
-from pellicle.scene.film import Scene, media, thickness_spread, turned
+from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
+from pellicle.scene.reference import Reference
 
 Simulate = Callable[[Scene], Any]
 
@@ -46,6 +48,10 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
     """
     wavelength = np.asarray(scene.light.wavelength, dtype=float)
 
+    if (reference := scene.reference) is not None:
+        known = tabulated(of_reference(scene), slope)
+        layers = known.layers if reference.layers else ()
+        scene = replace(scene, reference=Reference(known.substrate, layers, reference.form))
     return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
 
 
@@ -119,7 +125,17 @@ def build(plan: Plan) -> Simulate:
         rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
 
-    return simulate
+    return simulate if plan.reference is None else _against(simulate, build(plan.reference))
+
+
+def _against(simulate: Simulate, reference: Simulate) -> Simulate:
+    """The contrast of a scene against its reference."""
+
+    def contrast(scene: Scene) -> Any:
+        kind = scene.light.kind.seen_in(scene, False)
+        return kind.against(simulate(scene), reference(of_reference(scene)))
+
+    return contrast
 
 
 def depolarises(plan: Plan) -> bool:

@@ -50,7 +50,8 @@ class Plan:
     The `build` functions of `pellicle.forward_model` turn it into a forward model. `left_out` are the effects
     that are present but left out within the `tolerance` (in the unit of the signal), in the order in which
     the scene is simplified. `gradient_error` is the largest change of a derivative in a free parameter by
-    that, relative to the largest value of that derivative.
+    that, relative to the largest value of that derivative. `reference` is the plan of the reference of a
+    contrast.
     """
 
     rows: tuple[Row, ...]
@@ -60,6 +61,7 @@ class Plan:
     tolerance: float = 0.0
     gradient_error: float = 0.0
     transmission: bool = False
+    reference: Plan | None = None
 
     @property
     def kind(self) -> Signal:
@@ -96,7 +98,8 @@ class Plan:
     def static_key(self) -> Plan:
         """The plan without reasons and bounds: everything that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)
-        return replace(self, rows=rows, tolerance=0.0, gradient_error=0.0)
+        reference = None if self.reference is None else self.reference.static_key
+        return replace(self, rows=rows, tolerance=0.0, gradient_error=0.0, reference=reference)
 
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)

@@ -24,6 +24,7 @@ from pellicle.recipes.schema import (
     LayerTable,
     PlateTable,
     RecipeTable,
+    ReferenceTable,
     SceneTable,
     of_file,
 )
@@ -36,6 +37,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "file": FileTable,
     "wavelengths": GridTable,
     "scene": SceneTable,
+    "reference": ReferenceTable,
     "layer": LayerTable,
     "substrate": PlateTable,
     "instrument": InstrumentTable,
@@ -150,9 +152,11 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
             signal,
             data.polarisation or "unpolarised",
             np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth,
+            transmission=bool(data.transmission and data.signal),
         ),
         instrument=parts.instrument(tables.instrument),
         uncertainty=parts.uncertainty(scene, tables.instrument),
+        reference=None if tables.reference is None else parts.reference(tables.reference, folder),
     )
     check_free_count(len(free_leaves(built)), least=0)
     return built

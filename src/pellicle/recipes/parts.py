@@ -16,13 +16,14 @@ from pydantic import BaseModel
 from pellicle.errors import UsageError
 from pellicle.recipes import media_words
 from pellicle.recipes.media import FreeTable, Medium, Number, medium, number
-from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, SceneTable
+from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, ReferenceTable, SceneTable
 from pellicle.recipes.written_media import layer_medium
 from pellicle.recipes.written_media import medium as written_medium
 from pellicle.recipes.written_media import number as written_number
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
 from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
+from pellicle.scene.reference import Reference
 
 _SIGNED = ("wavelength_shift", "angle_shift")
 """Numbers that may be negative."""
@@ -100,6 +101,21 @@ def substrate_keys(substrate: Substrate, folder: Path) -> Any:
     if substrate.back is not None:
         keys = {"back": written_medium(substrate.back, "the medium behind the substrate", folder), **keys}
     return {"material": material, **keys} if keys else material
+
+
+def reference(table: ReferenceTable, folder: Path) -> Reference:
+    """Return the reference of a recipe, whose reflectance is known."""
+    layers = [layer(one, folder) for one in table.layer]
+    return Reference(substrate(table.substrate, folder, "R"), layers, table.form)
+
+
+def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
+    """Return `[reference]` and `[[reference.layer]]`."""
+    form = {} if reference.form == "relative" else {"form": reference.form}
+    return {
+        "reference": {"substrate": substrate_keys(reference.substrate, folder), **form},
+        "reference.layer": [layer_keys(one, i, folder) for i, one in enumerate(reference.layers)],
+    }
 
 
 def instrument(table: InstrumentTable) -> Instrument:

@@ -18,6 +18,7 @@ from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
+from pellicle.scene.reference import Reference
 from pellicle.scene.surface import Surface
 
 _PLACES = {
@@ -32,6 +33,7 @@ _POSITIONAL = {
     Interface: ("thickness",),
     Plate: ("material", "plate_mm"),
     Substrate: ("material",),
+    Reference: ("substrate",),
     Graded: ("first", "second"),
     Surface: ("model", "numbers"),
 }
@@ -158,9 +160,9 @@ def _module(module: Any) -> str:
 
 def _shortened(module: Any, name: str, value: Any) -> Any:
     """The value of a field as its converter takes it: one layer, and a plain substrate by its material."""
-    if isinstance(module, Scene) and name == "layers":
+    if isinstance(module, Scene | Reference) and name == "layers":
         return value[0] if len(value) == 1 else list(value)
-    if isinstance(module, Scene) and name == "substrate" and value == Substrate(value.material):
+    if isinstance(module, Scene | Reference) and name == "substrate" and value == Substrate(value.material):
         return value.material
     return dict(value) if isinstance(module, Surface) and name == "numbers" else value
 
@@ -173,6 +175,8 @@ def _is_default(module: Any, field: Any, value: Any) -> bool:
         return bool(replace(value, wavelength=None) == Light())
     if isinstance(value, Instrument | Uncertainty) or isinstance(module, Scene):
         return bool(value == default)
+    if isinstance(module, Reference) and field.name == "layers":
+        return value == ()
     return value is default or (isinstance(value, str | int | float) and value == default)
 
 

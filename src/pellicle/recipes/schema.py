@@ -184,11 +184,20 @@ class SceneTable(_Table):
     interlayer_uncertainty: Uncertain = None
 
 
+class ReferenceTable(_Table):
+    """`[reference]`: the known sample with which a contrast is measured."""
+
+    substrate: Medium | PlateTable
+    layer: list[LayerTable] = []
+    form: Literal["relative", "normalised"] = "relative"
+
+
 class RecipeTable(_Table):
     """A whole recipe."""
 
     data: DataTable = DataTable()
     scene: SceneTable
+    reference: ReferenceTable | None = None
     instrument: InstrumentTable = InstrumentTable()
     camera: CameraTable = CameraTable()
 

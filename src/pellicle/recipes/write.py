@@ -95,6 +95,7 @@ def recipe_text(
                 **parts.uncertainty_keys(scene.uncertainty),
             },
             "scene.layer": [parts.layer_keys(layer, i, at) for i, layer in enumerate(scene.layers)],
+            **({} if scene.reference is None else parts.reference_tables(scene.reference, at)),
             "instrument": parts.instrument_keys(scene.instrument, scene.uncertainty),
             "camera": camera,
         }
@@ -129,6 +130,8 @@ def _data(scene: Scene) -> dict[str, Any]:
         found["signal"] = light.signal
     if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
         found["angle"] = _one_or_several(light.angle, light, "the angle of incidence")
+    if light.transmission:
+        found["transmission"] = True
     if light.azimuth is not None:
         found["azimuth"] = _one_or_several(light.azimuth, light, "the azimuth of the sample")
     if light.polarisation != "unpolarised":
@@ -186,7 +189,7 @@ def _check_film(scene: Scene, again: Scene) -> None:
     parts = [
         (f"layer {i + 1}", x, y) for i, (x, y) in enumerate(zip(scene.layers, again.layers, strict=True))
     ]
-    names = ("substrate", "ambient", "light", "instrument", "uncertainty")
+    names = ("substrate", "ambient", "light", "instrument", "uncertainty", "reference")
     parts += [(name, getattr(scene, name), getattr(again, name)) for name in names]
     for name, one, other in parts:
         if one != other if name == "uncertainty" else not same(one, other):

@@ -13,16 +13,9 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.reporting.fitted_colours import display
 from pellicle.reporting.json_record import number, versions
 from pellicle.reporting.plain_text import facts
+from pellicle.signals.registry import KINDS
 
 SPECTRUM_SCHEMA = "pellicle.spectrum/1"
-QUANTITIES = {
-    "R": "reflectance R",
-    "T": "transmittance T",
-    "psi-delta": "ellipsometry, psi and delta",
-    "mueller": "normalised elements of a Mueller matrix",
-    "generalised-psi-delta": "generalised ellipsometry, psi and delta of ratios",
-    "counts": "raw counts",
-}
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
 
 
@@ -54,8 +47,8 @@ def describe_spectrum(spectrum: Spectrum, notes: tuple[str, ...] | None = None) 
     azimuths = _each(spectrum.azimuth)
     steps = np.diff(np.unique(nm))
     reach = f"{nm[0]:g} to {nm[-1]:g} nm, every {np.median(steps):.3g} nm" if steps.size else f"{nm[0]:g} nm"
-    quantity = QUANTITIES[spectrum.signal] + ("" if spectrum.calibrated else ", scale unknown")
-    if not spectrum.ellipsometric and spectrum.signal != "counts":
+    quantity = spectrum.kind.title + ("" if spectrum.calibrated else ", scale unknown")
+    if not (spectrum.kind.ellipsometric or spectrum.kind.of_counts):
         quantity += f", {spectrum.polarisation} light"
     rows = [
         ("spectrum", spectrum.name),
@@ -88,6 +81,7 @@ def spectrum_json(spectrum: Spectrum) -> dict[str, Any]:
         "polarisation": spectrum.polarisation,
         "calibrated": spectrum.calibrated,
         "folded": spectrum.folded,
+        "transmission": spectrum.transmission,
         "points": len(spectrum),
         "sweeps": len(spectrum.sweeps),
         "range_nm": [low, high],
@@ -242,7 +236,7 @@ def describe_cube(cube: Cube, notes: tuple[str, ...] | None = None) -> str:
     `notes` replace those of the cube. Values are of a sample of the pixels.
     """
     seen, nm = _sample(cube), cube.wavelength
-    quantity = QUANTITIES[cube.signal] + ("" if cube.calibrated else ", scale unknown")
+    quantity = KINDS[cube.signal].title + ("" if cube.calibrated else ", scale unknown")
     if cube.signal != "psi-delta":
         quantity += f", {cube.polarisation} light"
     pixels = ", ".join(f"{dim} {n}" for dim, n in zip(cube.dims, cube.shape, strict=True))

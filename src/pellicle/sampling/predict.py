@@ -20,7 +20,6 @@ from pellicle.signals.sphere import psi_delta
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""
-_SIGNALS = {"R": "reflectance", "T": "transmittance"}
 
 
 class Axis(NamedTuple):
@@ -86,7 +85,7 @@ def _spectrum(
         ]
     if curve.delta_data is None:
         signal = part.spectrum.signal
-        return [Prediction(signal + suffix, prefix + _SIGNALS[signal], axis, curve.data, model, noisy)]
+        return [Prediction(signal + suffix, prefix + part.spectrum.kind.noun, axis, curve.data, model, noisy)]
     of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
     if part.spectrum.ratios:
         spheres = [own.reshape(*own.shape[:-1], -1, 3) for own in (of_model, of_noisy)]

@@ -32,6 +32,7 @@ from pellicle.scene.layers import (
     ambient_medium,
     divided,
 )
+from pellicle.scene.reference import Reference
 from pellicle.signals.base import Signal
 from pellicle.signals.registry import SIMULATED, of_light
 
@@ -126,6 +127,7 @@ class Scene(eqx.Module):
     - `ambient`: the medium of the incident light, which must not absorb.
     - `light`: a `Light`.
     - `instrument`: an `Instrument`.
+    - `reference`: a `Reference`, with which a contrast is measured.
     - `uncertainty`: an `Uncertainty` of what the scene states or leaves out; it enters the errors of a fit.
 
     **Raises:** ValueError where the ambient absorbs, without layers, and where the parts contradict.
@@ -141,6 +143,7 @@ class Scene(eqx.Module):
     light: Light = Light()
     instrument: Instrument = Instrument()
     uncertainty: Uncertainty = eqx.field(static=True, default=Uncertainty())
+    reference: Reference | None = None
 
     def __check_init__(self):
         if not self.layers:
@@ -231,6 +234,24 @@ def _neighbours(scene: Scene, position: int) -> tuple[AbstractDispersion, Abstra
     above, below = media[position], media[position + 2]
     assert above is not None and below is not None  # two interfaces are never adjacent  # noqa: PT018
     return face(above, 1.0), face(below, 0.0)
+
+
+def of_reference(scene: Scene) -> Scene:
+    """Return the scene of the reference, in the same light and instrument. Raises UsageError without one."""
+    reference, light = scene.reference, scene.light
+    if reference is None:
+        raise UsageError(
+            f"the signal {light.signal} needs a reference: give the scene `reference=pl.Reference(...)`, or a"
+            " recipe [reference] with its substrate"
+        )
+    instrument = {"scale": 1.0, "offset": 0.0, "thickness_spread": None}
+    return Scene(
+        reference.layers or Layer(1.0, 0.0),
+        reference.substrate,
+        scene.ambient,
+        Light(light.wavelength, light.angle, "R", light.polarisation, light.azimuth),
+        replace(scene.instrument, **instrument),
+    )
 
 
 def media(scene: Scene) -> list[AbstractDispersion]:

@@ -148,6 +148,8 @@ class Signal(ABC):
     """True for the change against a reference, which the scene describes too."""
     degrees: ClassVar[bool] = False
     """True where differences and residuals are degrees of Ψ on spheres of N, C, S."""
+    names: ClassVar[tuple[str, ...]] = ()
+    """Names of a column of its own, in lower case."""
     ordinate: ClassVar[str]
     """Label of an axis that all quantities share."""
     keywords: ClassVar[frozenset[str]] = frozenset()
@@ -249,9 +251,13 @@ class Signal(ABC):
         """Return the signal of some of its parts. Raises UsageError for unknown ones."""
         raise NotImplementedError(parts)
 
+    def against(self, sample: Any, reference: Any) -> Any:
+        """Return the signal of a reflectance and that of the reference (traced)."""
+        raise NotImplementedError
+
     # a fit
 
-    def seen_in(self, depolarises: bool) -> Signal:
+    def seen_in(self, scene: Any, depolarises: bool) -> Signal:
         """Return the signal as a scene explains it, in which some light may be unpolarised."""
         return self
 

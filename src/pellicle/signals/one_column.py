@@ -15,10 +15,12 @@ from pellicle.signals.base import (
     ChannelGroup,
     Channels,
     Offset,
+    Place,
     Quantity,
     Residuals,
     Signal,
 )
+from pellicle.signals.limits import Where
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,19 @@ class OneColumn(Signal):
         return cls()
 
     @property
-    @abstractmethod
-    def label(self) -> str:
-        """Label of an axis."""
-
-    @property
     def quantities(self) -> tuple[Quantity, ...]:
-        return (Quantity(self.word, self.label),)
+        return (Quantity(self.word, self.noun),)
+
+    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+        if data.calibrated and len(data):
+            too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
+            self.check_values(data.values, data.sigma, place("`values`"), too_high, remedy)
+
+    @abstractmethod
+    def check_values(
+        self, values: np.ndarray, sigma: np.ndarray | None, where: Where, too_high: str, remedy: str
+    ) -> None:
+        """Refuse impossible values; `too_high` and `remedy` are advice. Raises DataError."""
 
     @property
     def independent(self) -> int:

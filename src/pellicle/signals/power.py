@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from pellicle.signals.base import Arrays, Place
-from pellicle.signals.limits import check_power
+import numpy as np
+
+from pellicle.signals.limits import Where, check_power
 from pellicle.signals.one_column import OneColumn
 
 
@@ -16,15 +17,10 @@ class _Power(OneColumn):
 
     has_scale: ClassVar[bool] = True
 
-    @property
-    def label(self) -> str:
-        return self.noun
-
-    def check(self, data: Arrays, place: Place, remedy: str) -> None:
-        if data.calibrated and len(data):
-            too_high = "divide percent by 100, or give `calibrated=False` for an arbitrary scale"
-            where = place("`values`")
-            check_power(self.noun, data.values, data.sigma, where, too_high=too_high, remedy=remedy)
+    def check_values(
+        self, values: np.ndarray, sigma: np.ndarray | None, where: Where, too_high: str, remedy: str
+    ) -> None:
+        check_power(self.noun, values, sigma, where, too_high=too_high, remedy=remedy)
 
 
 @final
@@ -65,9 +61,7 @@ class Counts(OneColumn):
     has_scale: ClassVar[bool] = True
     of_counts: ClassVar[bool] = True
 
-    @property
-    def label(self) -> str:
-        return self.noun
-
-    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+    def check_values(
+        self, values: np.ndarray, sigma: np.ndarray | None, where: Where, too_high: str, remedy: str
+    ) -> None:
         """Accept any finite count."""

@@ -129,7 +129,7 @@ class PsiDelta(Signal):
         """Of N, C and S those that were measured."""
         return 2 if self.folded else 3
 
-    def seen_in(self, depolarises: bool) -> PsiDelta:
+    def seen_in(self, scene: Any, depolarises: bool) -> PsiDelta:
         return self if depolarises else replace(self, depolarisation=False)
 
     def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:

@@ -7,19 +7,23 @@ from typing import Any
 
 from pellicle.errors import UsageError
 from pellicle.signals.base import Signal
+from pellicle.signals.contrast import Contrast
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.mueller import Mueller
+from pellicle.signals.one_column import OneColumn
 from pellicle.signals.power import Counts, Reflectance, Transmittance
 from pellicle.signals.psi_delta import PsiDelta
 
 KINDS: dict[str, type[Signal]] = {
-    kind.word: kind for kind in (Reflectance, Transmittance, PsiDelta, Mueller, Generalised, Counts)
+    kind.word: kind for kind in (Reflectance, Transmittance, PsiDelta, Mueller, Generalised, Contrast, Counts)
 }
 """Kinds of signals by their words, in the order in which messages list them."""
 SIGNALS = tuple(KINDS)
 """Words of all signals of a spectrum."""
 KEYWORDS = tuple(dict.fromkeys(name for kind in KINDS.values() for name in sorted(kind.keywords)))
 """Arguments of `pellicle.Spectrum` that go with some kinds only."""
+ONE_COLUMN = tuple(word for word, kind in KINDS.items() if issubclass(kind, OneColumn) and kind.simulated)
+"""Words of the signals of one column."""
 SIMULATED = tuple(word for word, kind in KINDS.items() if kind.simulated)
 """Words of the signals that a scene has."""
 

@@ -260,10 +260,12 @@ def test_generalised_rows_beside_psi_and_delta(write):
     assert {one.signal for one in read_spectra(write(turned), spectrum="all")} <= {"R", "T"}
 
 
-def test_ellipsometry_in_transmission_is_not_read(write, refused):
+def test_ellipsometry_in_transmission(write):
     text = JOINT.replace("WVASE=3.688", "WVASE=3.688, TransmissionMeas=1")
-    assert [one.name for one in read_spectra(write(text), spectrum="all")] == ["Rp", "Rs", "T"]
-    refused(WVASE.replace("WVASE", "TransmissionMeas=1, WVASE"), "only psi and delta in transmission (E)")
+    first, *others = read_spectra(write(text), spectrum="all")
+    assert first.signal == "psi-delta"
+    assert first.transmission
+    assert [one.name for one in others] == ["Rp", "Rs", "T"]
 
 
 def test_columns_behind_the_errors_and_points_without_a_value(write, refused):

@@ -64,7 +64,7 @@ def layouts(file: TextFile) -> list[Layout] | None:
         return None
     dynamic = any(line.text.strip().lower() == "dynamic" for line in heading)
     transmitted = "TransmissionMeas=1" in method.replace(" ", "")
-    facts = _facts(heading, method)
+    facts = _facts(heading, method) + ([("light", "transmitted")] if transmitted else [])
     axis = f"wavelength ({wavelength_unit(unit[0])})"
     found, left_out = [], {}
     for time, groups in _by_time(rows, dynamic, path).items():
@@ -94,7 +94,7 @@ def _tables(
     tables = []
     if LABEL in groups and trigonometric:
         tables.append(("", woollam_rows.tan_cos(groups.pop(LABEL), path)))
-    elif LABEL in groups and not transmitted:
+    elif LABEL in groups:
         selected = woollam_rows.psi_delta(groups.pop(LABEL), path)
         shares = next((label for label in groups if label.lower() == DEPOLARISATION), None)
         if shares is not None:
@@ -192,8 +192,6 @@ def _described(labels: dict[str, None], transmitted: bool) -> str:
         kind = next((text for pattern, text in _OTHERS.items() if re.fullmatch(pattern, label)), "")
         if label in _POWERS:
             kind = "intensities, with errors of 1"
-        elif label == LABEL and transmitted:
-            kind = "psi and delta in transmission"
         kinds[kind].append(label)
     parts = []
     for kind, own in kinds.items():

@@ -1,5 +1,7 @@
 """Names of columns, in lower case, in the languages that instruments write."""
 
+from pellicle.signals.registry import KINDS
+
 NAMES: dict[str, tuple[str, ...]] = {
     "wavelength": (
         *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
@@ -92,6 +94,7 @@ RATIO_COLUMNS = tuple(f"{angle}_{ratio}" for ratio in ("ane", "aps", "asp") for 
 for _role in RATIO_COLUMNS:
     NAMES[_role] = (_role, _role.replace("_", " "), "{}({})".format(*_role.split("_")))
     NAMES[f"sigma_{_role}"] = tuple(form.format(_role) for form in _SIGMA_OF)
+NAMES |= {word: kind.names for word, kind in KINDS.items() if kind.names}
 FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),

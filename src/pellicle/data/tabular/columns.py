@@ -15,8 +15,9 @@ from pellicle.data.tabular.column_names import FOREIGN, NAMES, RATIO_COLUMNS
 from pellicle.data.tabular.text import Line
 from pellicle.data.tabular.units import angle_unit, signal_unit, wavelength_unit
 from pellicle.errors import UsageError
+from pellicle.signals.registry import ONE_COLUMN
 
-SIGNALS = ("R", "T")
+SIGNALS = ONE_COLUMN
 """Roles of the signals of one column; psi-delta has two."""
 COUNTS = ("sample counts", "reference counts", "dark counts")
 """Raw counts of a sample, of a reference and without light, as some programs write beside their quotient."""
@@ -93,6 +94,7 @@ _FACTS = {
     "date": r"date( (and|/) ?time)?|(acquired|measured|created)( (on|at))?|(measurement|acquisition) date"
     r"|time ?stamp|longdate|date of measurement",
     "delta": r"delta",  # "folded into 0 to 180 degrees"
+    "light": r"light",  # "transmitted" of psi and delta
     "sample": r"sample( (name|id|description))?|title|spectrum name",
 }
 _FOREIGN = re.compile(
@@ -198,7 +200,7 @@ def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
 def is_header(names: Sequence[str]) -> bool:
     """Return True if `names` include a wavelength and a signal, or directions, as no free text does."""
     roles = {column.role for column in recognise_all(names)}
-    measured = bool(roles & {"R", "T", "intensity", "counts", "psi"})
+    measured = bool(roles & {*SIGNALS, "intensity", "counts", "psi"})
     measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
     measured = measured or {"tan_psi", "cos_delta"} <= roles or bool(roles & set(RATIO_COLUMNS))
     return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)

@@ -56,7 +56,7 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
-    signal = data.kind.seen_in(depolarises(exact(scene)))
+    signal = data.kind.seen_in(scene, depolarises(exact(scene)))
     values, sigma, frame = signal.channels(data, _guess(data, source))
     known = values, sigma, signal, independent_fraction, source, name, frame
     return Measured(scene, data.wavelength, *known)
@@ -119,7 +119,7 @@ def without_scale(scene: Scene, data: Spectrum | Colours) -> Scene:
         if isinstance(scene.instrument.scale, Drift):
             kept["scale"] = ONE_NUMBER
         return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
-    if not data.ellipsometric:
+    if data.kind.has_scale:
         return scene
     kept = {name: value for name, value in vars(scene.instrument).items() if name not in ("scale", "offset")}
     return eqx.tree_at(lambda s: s.instrument, scene, Instrument(**kept))
@@ -134,15 +134,21 @@ def _check(data: Spectrum, scene: Scene) -> None:
     if not data.ellipsometric and len(data) < 2:
         raise DataError(f"{data.path}: holds one point of {data.signal}; a fit needs a spectrum")
     drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
-    if not data.ellipsometric and not data.calibrated and scene.instrument.scale not in drifting:
+    if data.kind.has_scale and not data.calibrated and scene.instrument.scale not in drifting:
         raise UsageError(
             f'{data.path}: an uncalibrated intensity needs a free scale: `scale="slow"` or `scale="free"`'
         )
-    if not data.ellipsometric:
-        return
-    if drifting or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0:
-        raise UsageError(f"{data.path}: ellipsometry has no scale and no offset: leave both out")
-    if data.angle is None and not free_leaves(scene.light) and not np.any(scene.light.angle):
+    name = "ellipsometry" if data.ellipsometric else f"a {data.signal}"
+    if not data.kind.has_scale and (
+        drifting or scene.instrument.scale != 1.0 or scene.instrument.offset != 0.0
+    ):
+        raise UsageError(f"{data.path}: {name} has no scale and no offset: leave both out")
+    if (
+        data.ellipsometric
+        and data.angle is None
+        and not free_leaves(scene.light)
+        and not np.any(scene.light.angle)
+    ):
         raise UsageError(
             f"{data.path}: ellipsometry needs its angle of incidence: give `angle=70`, for instance, "
             "angle = 70 under [data] in a recipe, or a column angle_deg"

@@ -1,0 +1,127 @@
+"""Optical contrast against a reference of its own: values by the package tmm, fits, files and recipes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import tmm
+
+import pellicle as pl
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.write_spectrum import write_spectrum
+from pellicle.effects.film_plan import exact, plan
+from pellicle.errors import DataError, UsageError
+from pellicle.recipes import read_recipe
+from pellicle.recipes.python_text import python_text
+from pellicle.recipes.write import recipe_text
+from pellicle.reporting.figures import draw_spectrum
+from pellicle.scene.film import with_wavelength
+
+NM = np.linspace(450.0, 750.0, 64)
+FILM, OXIDE, SILICON = 2.6 + 1.3j, 1.46, 3.9 + 0.02j
+RECIPE = """
+[data]
+signal = "contrast"
+wavelengths = {{ start = 450, stop = 750, step = 4 }}
+
+[scene]
+substrate = "3.9+0.02j"
+layer = [
+    {{ name = "flake", material = "2.6+1.3j", thickness = {{ lower = 0.1, upper = 20, value = 3.35 }} }},
+    {{ name = "oxide", material = 1.46, thickness = 285 }},
+]
+
+[reference]
+substrate = "3.9+0.02j"
+{form}layer = [{{ material = 1.46, thickness = 285 }}]
+"""
+
+
+def scene(form: str = "relative", **more) -> pl.Scene:
+    flake = pl.Layer(FILM, pl.Free(0.1, 20.0, start=3.35), "flake")
+    reference = pl.Reference(SILICON, pl.Layer(OXIDE, 285.0), form)
+    layers = [flake, pl.Layer(OXIDE, 285.0, "oxide")]
+    return pl.Scene(layers, SILICON, light=pl.Light(signal="contrast", **more), reference=reference)
+
+
+def by_tmm(form: str, angle: float, polarisation: str) -> np.ndarray:
+    def reflectance(*stack):
+        indices, depths = [1.0, *(n for n, _ in stack), SILICON], [np.inf, *(d for _, d in stack), np.inf]
+        each = [tmm.coh_tmm(polarisation, indices, depths, np.deg2rad(angle), nm)["R"] for nm in NM]
+        return np.array(each)
+
+    sample, bare = reflectance((FILM, 3.35), (OXIDE, 285.0)), reflectance((OXIDE, 285.0))
+    return (sample - bare) / (bare if form == "relative" else sample + bare)
+
+
+@pytest.mark.parametrize(
+    ("form", "angle", "polarisation"),
+    [("relative", 0.0, "s"), ("normalised", 0.0, "s"), ("relative", 50.0, "p"), ("normalised", 50.0, "s")],
+)
+def test_values_of_tmm(form, angle, polarisation):
+    simulated = pl.simulate(scene(form, angle=angle, polarisation=polarisation), NM)
+    np.testing.assert_allclose(simulated.values, by_tmm(form, angle, polarisation), atol=1e-12)
+
+
+def test_a_bare_reference_and_a_plan_within_a_tolerance():
+    bare = pl.Scene(
+        pl.Layer(1.46, 100.0), "Si", light=pl.Light(NM, signal="contrast"), reference=pl.Reference("Si")
+    )
+    sample, substrate = (pl.reflectance(NM, d, 1.46, "Si") for d in (100.0, 0.0))
+    values = pl.simulate(bare, NM).values
+    np.testing.assert_allclose(values, (sample - substrate) / substrate, atol=1e-12)
+    assert exact(bare).reference == exact(bare).reference.static_key.__class__(**vars(exact(bare).reference))
+    assert plan(bare, 1e-3).error_bound <= 1e-3
+
+
+@pytest.mark.parametrize("form", ["relative", "normalised"])
+def test_the_fit_finds_the_thickness(form):
+    data = pl.simulate(scene(form), NM, noise=0.004, seed=2)
+    fit = pl.fit(data, scene(form))
+    found = fit.parameters["flake.thickness"]
+    assert fit.status == "converged"
+    assert abs(found.value - 3.35) < 3 * found.stderr
+    assert "lamp between sample and reference" in str(fit.budget)
+
+
+def test_scene_and_data_are_checked():
+    without = pl.Scene(pl.Layer(1.46, pl.Free(10, 300)), "Si", light=pl.Light(signal="contrast"))
+    with pytest.raises(UsageError, match=r"contrast needs a reference: .*\[reference\]"):
+        pl.simulate(without, NM)
+    with pytest.raises(UsageError, match="`form`"):
+        pl.Reference("Si", form="difference")
+    with pytest.raises(UsageError, match="a `reference` is known"):
+        pl.Reference("Si", pl.Layer("SiO2", pl.Free(10, 300)))
+    with pytest.raises(DataError, match=r"`values` at 450 nm: -1\.2 is a contrast below -1"):
+        pl.Spectrum(NM, np.full(64, -1.2), "contrast")
+    with pytest.raises(DataError, match="above 50 for a contrast"):
+        pl.Spectrum(NM, np.full(64, 120.0), "contrast")
+    scaled = pl.Scene(
+        scene().layers, SILICON, instrument=pl.Instrument(scale="free"), reference=scene().reference
+    )
+    with pytest.raises(UsageError, match="contrast has no scale and no offset"):
+        pl.fit(pl.simulate(scene(), NM), scaled)
+
+
+def test_files(tmp_path):
+    written = pl.simulate(scene(), NM, noise=0.004)
+    write_spectrum(tmp_path / "c.csv", written)
+    back = read_spectrum(tmp_path / "c.csv")
+    assert back.signal == "contrast"
+    np.testing.assert_array_equal(back.values, written.values)
+    rows = "\n".join(f"{nm},{100 * value}" for nm, value in zip(NM, written.values, strict=True))
+    (tmp_path / "percent.csv").write_text(f"wavelength_nm,ΔR/R (%)\n{rows}\n", encoding="utf-8")
+    np.testing.assert_allclose(read_spectrum(tmp_path / "percent.csv").values, written.values)
+    assert draw_spectrum(back).axes[0].get_ylabel() == "contrast"
+
+
+def test_a_recipe_both_ways(tmp_path):
+    path = tmp_path / "flake.toml"
+    for form in ("", 'form = "normalised"\n'):
+        path.write_text(RECIPE.format(form=form), encoding="utf-8")
+        read = read_recipe(path).scene()
+        assert read.reference == scene("normalised" if form else "relative").reference
+        again = tmp_path / "again.toml"
+        again.write_text(recipe_text(read, tmp_path), encoding="utf-8")
+        assert read_recipe(again).scene().reference == read.reference
+        assert "reference=pl.Reference(" in python_text(with_wavelength(read, None))
