@@ -22,12 +22,10 @@ from pellicle.fitting.curves import Curve
 from pellicle.fitting.film import (
     backface,
     default_bounds,
-    depolarisation,
     messages,
     other_readings,
     parts,
     summary,
-    sweep_scatter,
 )
 from pellicle.fitting.film.colour_summary import with_probabilities
 from pellicle.fitting.film.colour_targets import measured_colours
@@ -35,6 +33,7 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.summary import FilmMeasurements
+from pellicle.fitting.film.sweeps import with_sweeps
 from pellicle.fitting.film.targets import Target, measured, without_scale
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
@@ -172,16 +171,14 @@ def _fit(
     depth = ranked.problem.thickness_axis
     scans = {} if profile is None or depth is None else {depth: profile}
     judged = assemble(films, began, scans=scans, binding=wider.binding)
-    parameters, drifts = sweep_scatter.with_sweeps(
-        data, ranked, judged.jacobian, judged.conclusion.parameters
-    )
+    parameters, drifts = with_sweeps(data, ranked, judged.jacobian, judged.conclusion.parameters)
     rivals, probability = judged.conclusion.rivals, None
     if any(isinstance(view, ColoursView) for view in ranked.problem.views):
         rivals, probability = with_probabilities(rivals, ranked, judged.discrepancy)
     dark = summary.opaque(targets, ranked)
     unclear = [
         *drifts,
-        *depolarisation.unexplained(data, targets, ranked.problem.views),
+        *summary.unexplained_depolarisation(data, targets, ranked.problem.views),
         # the few residuals of colours have a cause in any case, where they are noise
         *(
             likely_cause(judged.discrepancy, ranked.problem.parameters)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.film.targets import Target, drifts
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import student
+from pellicle.fitting.noise import local_noise, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
@@ -35,6 +36,8 @@ from pellicle.scene.layers import Layer
 _RULED_OUT = 1e8
 _ABSORBS = 1e-3
 """An extinction above this is what makes a layer opaque."""
+_CHANCE = 5.0
+"""Standard errors by which a mean square must exceed that of the noise of a depolarisation."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -185,3 +188,34 @@ def _added_to_an_index(scene: Scene, ranked: RankedMinima) -> list[str]:
                 f"{name} is added to the index of {of}; the sum is {total:.4g} at {nm[middle]:.4g} nm"
             )
     return result
+
+
+def unexplained_depolarisation(
+    data: Sequence[Spectrum | Colours], spectra: Sequence[Any], views: Sequence[Any]
+) -> list[str]:
+    """A sentence for each spectrum with a depolarisation beyond its noise and the scene's uncertainty, where
+    the scene has none."""
+    sentences = []
+    for spectrum, measured, view in zip(data, spectra, views, strict=True):
+        if (
+            not isinstance(spectrum, Spectrum)
+            or spectrum.depolarisation is None
+            or view.signal.depolarisation
+        ):
+            continue
+        if spectrum.depolarisation_sigma is None:
+            parts = [local_noise(spectrum.depolarisation[rows]) for rows in view.sweeps()]
+            noise = math.sqrt(np.mean(np.concatenate(parts) ** 2))
+        else:
+            noise = math.sqrt(np.mean(spectrum.depolarisation_sigma**2))
+        mean_square = float(np.mean(spectrum.depolarisation**2))
+        by_chance = 1 + _CHANCE * math.sqrt(2 / len(spectrum))
+        excess = math.sqrt(max(mean_square - by_chance * noise**2, 0.0))
+        if excess > measured.scene.uncertainty.depolarisation:
+            own = f"{view.name}: " if view.name else ""
+            sentences.append(
+                f"{own}the measured depolarisation (rms {math.sqrt(mean_square):.2g}, noise {noise:.1g}) is"
+                " left out, since the scene has none: `thickness_spread`, `bandwidth`, `angle_spread` or a"
+                ' back face (`back="air"`) would cause it'
+            )
+    return sentences

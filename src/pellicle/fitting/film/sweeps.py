@@ -1,14 +1,30 @@
-"""Sweeps of a spectrum: rows that were measured one after the other at one angle of incidence."""
+"""Sweeps of a spectrum: rows that were measured one after the other at one angle of incidence.
+
+A fit of the mean of sweeps takes their noise from the residuals. These do not show what moves a whole sweep
+as a parameter does, such as a drift of the lamp or of the wavelengths. The sweeps do: each deviates from the
+mean, and the linearised fit turns its deviation into steps of the parameters. Their experimental standard
+deviation of the mean (GUM 4.2) replaces the stated noise where the two do not agree.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from pellicle.data.colours import Colours
+from pellicle.data.repeated_sweeps import deviations
+from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.noise import integrated_time
+from pellicle.fitting.normal_equations import by_singular_values
+from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
+from pellicle.fitting.result import Estimate
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.scene.content import remembered
 
 _SHORT = 5
@@ -70,3 +86,66 @@ def correlation_in_sweeps(
 
 def _count(values: np.ndarray) -> int:
     return len(np.unique(values))
+
+
+def with_sweeps(
+    data: Sequence[Spectrum | Colours],
+    ranked: RankedMinima,
+    jacobian: Scaled,
+    parameters: Mapping[str, Estimate],
+) -> tuple[dict[str, Estimate], list[str]]:
+    """Estimates whose errors include the scatter between sweeps, and sentences on those that it enlarges."""
+    result, sentences = dict(parameters), []
+    if not any(isinstance(each, Spectrum) and each.sweeps for each in data):
+        return result, []
+    for view, (shifts, stated) in zip(ranked.problem.views, _steps(data, ranked, jacobian), strict=True):
+        for name, own, noise in zip(jacobian.names, shifts.T, stated, strict=True):
+            p = result[name]
+            if len(own) < 2 or p.at_bound or not math.isfinite(p.stderr) or not noise > 0:
+                continue
+            each = (float(noise) * math.sqrt(len(own)),) * len(own)
+            repeated = RepeatedParameter(name, p.unit, tuple(own.tolist()), each)
+            if repeated.agreement is not Agreement.LARGER:
+                continue
+            more = repeated.sd_mean**2 - noise**2
+            noise_error = math.sqrt(p.stderr_noise**2 + more)
+            # Welch-Satterthwaite (GUM eq. G.2b) for the two parts of the noise
+            parts = p.stderr_noise**4 / p.degrees_of_freedom + more**2 / repeated.freedom
+            result[name] = replace(
+                p,
+                stderr=math.sqrt(p.stderr**2 + more),
+                stderr_noise=noise_error,
+                degrees_of_freedom=noise_error**4 / parts,
+            )
+            unit, of = f" {p.unit}" if p.unit else "", f" of {view.name}" if view.name else ""
+            sentences.append(
+                f"the sweeps{of} drift: {name} differs by {short(repeated.sd)}{unit} from one to the next, so"
+                f" the noise error of their mean is {short(noise_error)}{unit}, where the residuals alone say"
+                f" {short(p.stderr_noise)}{unit}"
+            )
+    return result, sentences
+
+
+def _steps(
+    data: Sequence[Spectrum | Colours], ranked: RankedMinima, jacobian: Scaled
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each spectrum the steps (sweeps, columns) of all parameters and nuisances that its sweeps make, and
+    the standard error (columns,) that its noise contributes, in their own units."""
+    inverse = jacobian.stretch @ by_singular_values(jacobian.jacobian)
+    result, first = [], 0
+    for spectrum, view, fit in zip(data, ranked.problem.views, ranked.fits, strict=True):
+        gain = inverse @ jacobian.jacobian[first : first + view.points].T
+        first += view.points
+        if not isinstance(spectrum, Spectrum) or not spectrum.sweeps:
+            result.append((np.zeros((0, len(gain))), np.zeros(len(gain))))
+            continue
+        apart = deviations(spectrum.sweeps)
+        if view.signal.depolarisation:
+            own = np.stack([sweep.depolarisation for sweep in spectrum.sweeps])  # type: ignore[misc]
+            apart = np.concatenate([apart, (own - own.mean(axis=0))[..., None]], axis=2)
+        if view.data.frame is not None:
+            apart = np.einsum("pij,spj->spi", np.asarray(view.data.frame)[: view.rows], apart)
+        weight = np.asarray(view.data.weight)[: view.points] / math.sqrt(fit.variance)
+        shifts = apart.reshape(len(apart), -1) * weight @ gain.T
+        result.append((shifts, np.sqrt(np.sum(gain**2, axis=1))))
+    return result
