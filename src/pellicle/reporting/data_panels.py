@@ -150,7 +150,7 @@ def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[lis
         assert q.model is not None
         assert q.missed is not None
         at, (name, colour, _) = x + _SHIFT * (c - 1), q.drawn
-        values.append(Line(at, q.data, f"data {name}", colour, "circle"))
+        values.append(Line(at, q.data, f"data {name}", colour, "ring"))
         values.append(Line(at, q.model, f"fit {name}", colour, "cross", model=True))
         residuals.append(Line(at, q.missed, name, colour, "circle", listed=False, model=True))
     differences = () if curve.difference is None else curve.difference
