@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import tmm
 
 import pellicle as pl
+from pellicle.data.options import SIGNALS, SPACES
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.effects.film_plan import exact, plan
@@ -16,6 +19,9 @@ from pellicle.recipes.python_text import python_text
 from pellicle.recipes.write import recipe_text
 from pellicle.reporting.figures import draw_spectrum
 from pellicle.scene.film import with_wavelength
+from pellicle.signals.registry import SIMULATED
+
+ROOT = Path(__file__).resolve().parents[2]
 
 NM = np.linspace(450.0, 750.0, 64)
 FILM, OXIDE, SILICON = 2.6 + 1.3j, 1.46, 3.9 + 0.02j
@@ -125,3 +131,12 @@ def test_a_recipe_both_ways(tmp_path):
         again.write_text(recipe_text(read, tmp_path), encoding="utf-8")
         assert read_recipe(again).scene().reference == read.reference
         assert "reference=pl.Reference(" in python_text(with_wavelength(read, None))
+
+
+def test_the_example_recipe():
+    """`docs/examples/flake.toml`; and the words of options are those of the registry."""
+    read = read_recipe(ROOT / "docs" / "examples" / "flake.toml").scene()
+    assert set(SIMULATED) == set(SIGNALS) - set(SPACES)
+    data = pl.simulate(read, NM, noise=0.004, seed=1)
+    assert data.signal == "contrast"
+    assert 0.2 < np.ptp(data.values) < 3
