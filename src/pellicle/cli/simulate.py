@@ -100,9 +100,7 @@ def simulate(
         return 0
     start()
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
-    said = f"{noise:g}" if isinstance(noise, float | int) else noise
-    source = f"recipe {Path(recipe).name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
-    comments = ["SYNTHETIC: simulated, not measured", source]
+    comments = ["SYNTHETIC: simulated, not measured", _source(recipe, noise, how.seed)]
     if isinstance(described, SurfaceRecipe):
         _write_samples(described, out, noise, how, comments)
     elif isinstance(noise, str):
@@ -114,6 +112,12 @@ def simulate(
     else:
         _write_spectrum(described, out, noise, how, comments)
     return 0
+
+
+def _source(recipe: str, noise: Any, seed: int) -> str:
+    """How a file was made, as a comment."""
+    said = f"{noise:g}" if isinstance(noise, float | int) else noise
+    return f"recipe {Path(recipe).name}, seed {seed}, noise {said}, pellicle {version('pellicle')}"
 
 
 def _wavelengths_of(text: str) -> list[float]:
