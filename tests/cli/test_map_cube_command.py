@@ -9,7 +9,7 @@ import pytest
 import xarray
 from PIL import Image
 
-from pellicle.mapping.pixels.minima import ORDERS
+from pellicle.mapping.pixels.data import ORDERS
 from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 
 RECIPE = """

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.mapping.pixels.minima import ORDERS
+from pellicle.mapping.pixels.data import ORDERS
 from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
 
 

@@ -15,9 +15,9 @@ from pellicle.fitting.film.search import search
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Fit
+from pellicle.mapping.pixels.data import ORDERS, PixelData, PixelMinima
 from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import PixelModel, prepare, spectrum
-from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
 from pellicle.mapping.pixels.results import STATUSES
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003

@@ -24,9 +24,8 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.pixels.data import pixel_data
+from pellicle.mapping.pixels.data import PixelMinima, pixel_data
 from pellicle.mapping.pixels.fit import prepare
-from pellicle.mapping.pixels.minima import PixelMinima
 from pellicle.mapping.pixels.search import minima
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import SLOW_SCALE, Drift

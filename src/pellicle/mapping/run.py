@@ -27,8 +27,8 @@ from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import fit as pixel_fit
+from pellicle.mapping.pixels.data import ORDERS
 from pellicle.mapping.pixels.fit import PixelModel
-from pellicle.mapping.pixels.minima import ORDERS
 from pellicle.mapping.store import FORMAT, begin, held
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift

@@ -122,3 +122,26 @@ def _sources() -> str:
     root = Path(__file__).resolve().parents[1]
     stats = [(p.relative_to(root).as_posix(), p.stat()) for p in sorted(root.rglob("*.py"))]
     return repr([(name, s.st_size, s.st_mtime_ns) for name, s in stats])
+
+
+def in_chunks(program: Callable[[Any], Any], rows: Any, size: int, few: int = 0) -> Any:
+    """Call a compiled program for rows, `size` of them at a time, so that one program serves any number.
+
+    **Arguments:** `rows`, a pytree of arrays (rows, ...); `few`, the size of the last chunk where no more
+    rows are left. A chunk with fewer rows is padded by the last of them.
+
+    **Returns:** the outputs of the program, a pytree of NumPy arrays (rows, ...).
+    """
+    count, pieces = len(jax.tree_util.tree_leaves(rows)[0]), []
+    for first in range(0, count, size):
+        left = min(size, count - first)
+        padding = (few if left <= few else size) - left
+
+        def chunk(
+            x: np.ndarray, here: slice = slice(first, first + left), padding: int = padding
+        ) -> np.ndarray:
+            return np.concatenate([x[here], np.repeat(x[here][-1:], padding, axis=0)])
+
+        found = jax.device_get(program(jax.tree_util.tree_map(chunk, rows)))
+        pieces.append(jax.tree_util.tree_map(lambda x, left=left: np.asarray(x)[:left], found))
+    return jax.tree_util.tree_map(lambda *each: np.concatenate(each), *pieces)

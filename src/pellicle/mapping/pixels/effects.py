@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
 from pellicle.fitting.discrepancy import Effect
@@ -19,6 +18,7 @@ from pellicle.fitting.film.systematic_effects import (
     simulations_of,
 )
 from pellicle.fitting.film.view import SpectrumView
+from pellicle.programs.cache import in_chunks
 from pellicle.scene.film import Scene
 
 _NODES = 48
@@ -109,12 +109,12 @@ class PixelEffects:
             for i, (row, relative) in enumerate(terms):
                 candidates[:, i, row.number.position] += relative * row.sizes(numbers)
             candidates = candidates[:, :, order]
-            for first in range(0, len(values), _LANES):
-                of = slice(first, first + _LANES)
-                lanes = None if frame is None else _lanes(frame[of]), _lanes(candidates[of])
-                found = simulated_side_by_side(form, scene, self._view.data, *lanes).signal
-                signal = np.asarray(jax.device_get(found))[: len(values) - first, :, : self._view.points]
-                changes[of] += weights @ signal
+
+            def changed(rows: tuple[Any, np.ndarray], form=form, scene=scene, weights=weights) -> np.ndarray:
+                signal = simulated_side_by_side(form, scene, self._view.data, *rows).signal
+                return weights @ np.asarray(signal)[..., : self._view.points]
+
+            changes += in_chunks(changed, (frame, candidates), _LANES)
         return changes
 
 
@@ -148,11 +148,6 @@ def _simulation(
     for (i, _, weight), key in zip(terms, keys, strict=True):
         weights[i, columns.index(key)] += weight
     return _Simulation(program, [(effects[i], relative) for i, relative in columns], weights)
-
-
-def _lanes(x: np.ndarray) -> np.ndarray:
-    """As many rows as the program takes."""
-    return np.concatenate([x, np.repeat(x[-1:], _LANES - len(x), axis=0)])
 
 
 def of_pixels(view: SpectrumView, frame: np.ndarray | None) -> SpectrumView:

@@ -13,9 +13,15 @@ from pellicle.fitting.normal_equations import solve
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Neighbourhood, by_curvature, flat_sides, limits
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.pixels.local_models import PixelArrays, deviances, in_lanes, locals_of, padded
-from pellicle.mapping.pixels.minima import PixelData, PixelMinima
-from pellicle.mapping.pixels.nuisances import Nuisances
+from pellicle.mapping.pixels.data import PixelData, PixelMinima
+from pellicle.mapping.pixels.local_models import (
+    Nuisances,
+    PixelArrays,
+    deviances,
+    in_lanes,
+    locals_of,
+    padded,
+)
 from pellicle.scene.film import Scene
 
 
@@ -47,7 +53,7 @@ class PixelLimits:
 
     def arrays(self, data: PixelData, which: np.ndarray, noise: NoiseEstimate) -> PixelArrays:
         """Arrays of the pixels `which` with the weights and the effective points of their `noise`."""
-        weight = data.weight[which] * noise.scale
+        weight = data.weight[which] * noise.scale[:, :1]
         frame = None if data.frame is None else data.frame[which]
         fraction = noise.fraction(self._view.noise)
         own = PixelArrays(data.values[which], weight, fraction, data.level[which], frame)

@@ -10,11 +10,12 @@ import numpy as np
 
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm
-from pellicle.fitting.film.nuisance import Data
+from pellicle.fitting.film.nuisance import Data, offset_prior, scale_prior
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.reported_layer import linearised
-from pellicle.programs.cache import kept
+from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
+from pellicle.scene.instrument import Drift
 
 LANES, FEW = 256, 16
 """Pixels that one call of a compiled program takes, and that of the last ones where they are few."""
@@ -94,20 +95,7 @@ def padded(view: SpectrumView, arrays: PixelArrays) -> PixelArrays:
 
 def in_lanes(program: Callable[..., Any], view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> Any:
     """Call a program for pixels, `LANES` at a time, and return NumPy arrays of all of them."""
-    pieces, kind = [], tuple
-    for first in range(0, len(at), LANES):
-        count = min(LANES, len(at) - first)
-        size = LANES if count > FEW else FEW
-
-        def lanes(x: np.ndarray, first: int = first, count: int = count, size: int = size) -> np.ndarray:
-            own = np.ascontiguousarray(x[first : first + count])
-            return np.concatenate([own, np.repeat(own[-1:], size - count, axis=0)])
-
-        own = jax.tree_util.tree_map(lanes, arrays)
-        found = jax.device_get(program(view.form, view.scene, view.data, own, lanes(at)))
-        kind = type(found)
-        pieces.append([np.asarray(x)[:count] for x in found])
-    return kind(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
+    return in_chunks(lambda own: program(view.form, view.scene, view.data, *own), (arrays, at), LANES, FEW)
 
 
 def locals_of(view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> tuple[Local, np.ndarray]:
@@ -115,3 +103,37 @@ def locals_of(view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> tuple[
     found: PixelLocals = in_lanes(local_models, view, arrays, at)
     local = Local(found.signal, found.slope, found.model, found.gain, found.offset, found.layer, np.zeros(0))
     return local, found.deviance
+
+
+class Nuisances:
+    """Scale and offset that drift: Chebyshev terms of each, and the standard deviations of their priors."""
+
+    def __init__(self, view: SpectrumView, scene: Scene):
+        position = np.asarray(view.data.position)[: view.points]
+        self._points, self._each = view.points, list[tuple[np.ndarray, np.ndarray, bool]]()
+        for number, prior, on_signal in (
+            (scene.instrument.scale, scale_prior, True),
+            (scene.instrument.offset, offset_prior, False),
+        ):
+            if isinstance(number, Drift):
+                basis = np.polynomial.chebyshev.chebvander(position, number.degree)
+                self._each.append((basis, prior(number)[1], on_signal))
+
+    @property
+    def count(self) -> int:
+        """Numbers that are fitted to each pixel."""
+        return sum(len(sd) for _, sd, _ in self._each)
+
+    def columns(self, at: Local, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (pixels, points, nuisances) in steps of their priors, and those steps."""
+        points, flat, steps = self._points, [], []
+        for basis, sd, on_signal in self._each:
+            curve = (at.gain if on_signal else at.offset)[:, :points]
+            numbers = curve @ np.linalg.pinv(basis).T
+            own = sd * (np.abs(numbers[:, :1]) if on_signal else level[:, None])
+            column = basis * own[:, None]
+            flat.append(column * at.signal[:, :points, None] if on_signal else column)
+            steps.append(own)
+        if not flat:
+            return np.zeros((len(level), points, 0)), np.zeros((len(level), 0))
+        return np.concatenate(flat, axis=2), np.concatenate(steps, axis=1)

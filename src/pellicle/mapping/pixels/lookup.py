@@ -22,7 +22,6 @@ from pellicle.fitting.film.nuisance import chebyshev, offset_prior, scale_prior
 from pellicle.fitting.film.search import design_points, thickness_grid
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
-from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.instrument import Drift
@@ -199,13 +198,8 @@ def table(
 
 def _simulated(problem: Problem, view: SpectrumView, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signals (nodes, points) and slopes by the unit cube (nodes, parameters, points) at nodes."""
-    values, pieces = np.asarray(problem.values(units)), []
-    for first in range(0, len(values), _BATCH):
-        chunk = values[first : first + _BATCH]
-        padded = np.concatenate([chunk, np.repeat(chunk[-1:], _BATCH - len(chunk), axis=0)])
-        found = _signals(view.form, view.arrays, padded)
-        pieces.append([np.asarray(x)[: len(chunk)] for x in found])
-    signal, slope = (np.concatenate(x) for x in zip(*pieces, strict=True))
+    values = np.asarray(problem.values(units))
+    signal, slope = in_chunks(lambda own: _signals(view.form, view.arrays, own), values, _BATCH)
     return np.nan_to_num(signal), np.nan_to_num(slope) * (problem.box.upper - problem.box.lower)[:, None]
 
 

@@ -14,9 +14,9 @@ from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
-from pellicle.mapping.pixels.minima import PixelData
+from pellicle.mapping.pixels.data import PixelData
 from pellicle.optics.hoisting import compute_once
-from pellicle.programs.cache import kept
+from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 
@@ -116,11 +116,6 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping
         def fn(unit, _):
             return _residual(static, common, row, unit)
 
-        def quadratic(state):
-            y, gradient, hessian, *_ = state
-            top = jnp.diagonal(hessian)
-            return QuadraticModel(y, gradient, hessian, 0 * hessian, top, jnp.zeros_like(y), jnp.ones_like(y))
-
         def advance(carry, _):
             state, trial, damping, promise = carry
             cost, gradient, hessian, aux = normal_equations(fn, trial, None)
@@ -179,14 +174,9 @@ def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best
     return jax.vmap(one)(rows, units)
 
 
-def in_rows(program: Any, static: Static, common: Common, rows: PixelData, *points: np.ndarray) -> list[Any]:
+def in_rows(program: Any, static: Static, common: Common, rows: PixelData, *points: np.ndarray) -> Any:
     """Outputs of a `program` of starts, `ROWS` of them at a time; `rows` are the data of each."""
-    pieces, count = [], len(points[0])
-    for first in range(0, count, ROWS):
-        take = np.minimum(np.arange(first, first + ROWS), count - 1)
-        found = program(static, common, rows.of(take), *(x[take] for x in points))
-        pieces.append([np.asarray(x)[: count - first] for x in found])
-    return [np.concatenate(x) for x in zip(*pieces, strict=True)]
+    return in_chunks(lambda own: program(static, common, *own), (rows, *points), ROWS)
 
 
 def settle(
@@ -214,7 +204,7 @@ def settle(
         if not len(left):
             break
         own = data.of(pixels[left])
-        found = Stepped(*in_rows(stepped, static, common, own, units[left], damping[left]))
+        found = in_rows(stepped, static, common, own, units[left], damping[left])
         units[left], deviance[left], misfit[left] = found.units, found.deviance, found.misfit
         promise[left], damping[left] = found.promise, found.damping
         enough = tolerance[left]

@@ -18,8 +18,9 @@ from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.mapping.pixels import polish
+from pellicle.mapping.pixels.data import ORDERS, PixelData, PixelMinima
 from pellicle.mapping.pixels.lookup import Layout, Lookup, scan, table
-from pellicle.mapping.pixels.minima import ORDERS, PixelData, PixelMinima
+from pellicle.programs.cache import in_chunks
 from pellicle.scene.instrument import Drift
 
 log = getLogger(__name__)
@@ -142,6 +143,15 @@ class _Points:
     misfit: np.ndarray
     promise: np.ndarray
 
+    @classmethod
+    def unpolished(
+        cls, search: PixelSearch, data: PixelData, units: np.ndarray, deviance: np.ndarray
+    ) -> _Points:
+        """Points of a known deviance."""
+        return cls(
+            search, data, units, np.array(deviance), np.array(deviance), np.full(deviance.shape, np.inf)
+        )
+
     def polish(self, where: np.ndarray, rounds: int, best: np.ndarray, *, coarse: bool = True) -> None:
         """Polish the points `where`, as far as their distance to the `best` (pixels,) asks if `coarse`."""
         at, which = np.nonzero(where)
@@ -157,9 +167,7 @@ class _Points:
     def end(self, lowest: np.ndarray) -> polish.Best:
         """The last steps of the `lowest` points (pixels,), and the model there."""
         static, common, pixels = self.search.static, self.search.common, np.arange(len(lowest))
-        best = polish.Best(
-            *polish.in_rows(polish.at_best, static, common, self.data, self.units[pixels, lowest])
-        )
+        best = polish.in_rows(polish.at_best, static, common, self.data, self.units[pixels, lowest])
         for _ in range(_LAST):
             left = np.flatnonzero(best.promise > _SETTLED * self.search.noise(best.deviance))
             if not len(left):
@@ -172,53 +180,90 @@ class _Points:
         return best
 
 
+class _Candidates(NamedTuple):
+    """Candidates of the scan: `units` (pixels, candidates, parameters), their `predicted` deviance (pixels,
+    candidates), the `profile` along the thickness (pixels, nodes), the `rounding` error (pixels,) of the
+    predictions, and whether the predictions are of the pixels' own weights (`alike`)."""
+
+    units: np.ndarray
+    predicted: np.ndarray
+    profile: np.ndarray
+    rounding: np.ndarray
+    alike: bool
+
+
 def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     """Minima of pixels that all have data."""
-    problem, pixels = search.problem, np.arange(len(data.values))
-    units, predicted, profile, rounding, alike = _candidates(search, data)
-    several = len(problem.parameters) > 1
+    candidates = _candidates(search, data)
+    points, tried = _polished(search, data, candidates)
+    factor = np.ones(len(data.values))
+    if search.has_priors:
+        points, tried, factor = _reweighted(points, tried, data)
+    best = np.where(tried, points.deviance, np.inf)
+    lowest, best = np.argmin(best, axis=1), best.min(axis=1)
+    first = np.arange(tried.shape[1]) == lowest[:, None]
+    near = _NEAR * search.noise(best)[:, None]
+    points.polish(first & (points.promise > near), _MORE_ROUNDS, best, coarse=False)
+    at_best = points.end(lowest)
+    settled = points.promise <= np.maximum(near, polish.COARSE * (points.deviance - best[:, None]) * ~first)
+    return _ordered(points, lowest, settled, factor, candidates.profile, at_best)
+
+
+def _polished(search: PixelSearch, data: PixelData, candidates: _Candidates) -> tuple[_Points, np.ndarray]:
+    """The candidates, polished where they could be the best of their pixel or its rival, and which were."""
+    units, predicted = candidates.units, candidates.predicted
+    several = len(search.problem.parameters) > 1
     optimistic = exact = predicted
-    if not alike:
-        exact = polish.in_rows(polish.explained, search.static, search.common, data, units)[0]
-        exact = np.where(np.isfinite(exact), exact, np.inf)
+    if not candidates.alike:
+        exact = _deviance(search, data, units)
         if not several:
             # the determinant of the nuisances, which predictions leave out, is much the same everywhere
-            at = pixels, np.argmin(exact, axis=1)
+            at = np.arange(len(exact)), np.argmin(exact, axis=1)
             predicted = predicted + (exact[at] - predicted[at])[:, None]
         optimistic = np.minimum(predicted, exact)
-    points = _Points(search, data, units, np.array(exact), np.array(exact), np.full(predicted.shape, np.inf))
+    points = _Points.unpolished(search, data, units, exact)
     if several:
         # along a valley of several parameters a linear step says little
         points.polish(np.isfinite(optimistic), 1, exact.min(axis=1))
         optimistic = np.where(np.isfinite(points.deviance), points.deviance, optimistic)
-    tried = _polish_all_near(points, optimistic, exact, rounding)
+    return points, _polish_all_near(points, optimistic, exact, candidates.rounding)
+
+
+def _reweighted(
+    points: _Points, tried: np.ndarray, data: PixelData
+) -> tuple[_Points, np.ndarray, np.ndarray]:
+    """The points polished again with weights by their residuals, which were, and the factors (pixels,) of the
+    weights."""
+    search, pixels = points.search, np.arange(len(data.values))
     factor = np.ones(len(pixels))
-    for _ in range(_REWEIGHTED if search.has_priors else 0):
+    for _ in range(_REWEIGHTED):
         lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
         before = points.units[pixels, lowest]
         factor = _weight_factor(points, lowest, data)
         weighted = data._replace(weight=data.weight * factor[:, None])
-        exact = polish.in_rows(polish.explained, search.static, search.common, weighted, points.units)[0]
-        exact = np.where(np.isfinite(exact), exact, np.inf)
-        points = _Points(
-            search, weighted, points.units, np.array(exact), np.array(exact), np.full(exact.shape, np.inf)
-        )
+        exact = _deviance(search, weighted, points.units)
+        points = _Points.unpolished(search, weighted, points.units, exact)
         tried = _polish_all_near(points, exact, exact, np.zeros(len(pixels)))
         lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
         if np.allclose(points.units[pixels, lowest], before, rtol=0.0, atol=1e-3):
             break
-    best = np.where(tried, points.deviance, np.inf)
-    lowest, best = np.argmin(best, axis=1), best.min(axis=1)
-    first = np.arange(tried.shape[1]) == lowest[:, None]
-    left = points.promise > _NEAR * search.noise(best)[:, None]
-    points.polish(first & left, _MORE_ROUNDS, best, coarse=False)
-    at_best = points.end(lowest)
-    near = _NEAR * search.noise(best)[:, None]
-    settled = points.promise <= np.maximum(near, polish.COARSE * (points.deviance - best[:, None]) * ~first)
+    return points, tried, factor
+
+
+def _ordered(
+    points: _Points,
+    lowest: np.ndarray,
+    settled: np.ndarray,
+    factor: np.ndarray,
+    profile: np.ndarray,
+    at_best: polish.Best,
+) -> PixelMinima:
+    """The distinct minima of each pixel, best first, with deviances by its given weights."""
+    search, problem = points.search, points.search.problem
     # along a valley of several parameters, points that have not settled are no minima
-    listed = settled if several else np.isfinite(points.deviance)
+    listed = settled if len(problem.parameters) > 1 else np.isfinite(points.deviance)
     order = _distinct(problem.parameters, points.units, points.deviance, lowest, listed)
-    rows, here, absent = pixels[:, None], np.maximum(order, 0), order < 0
+    rows, here, absent = np.arange(len(order))[:, None], np.maximum(order, 0), order < 0
     ordered = np.where(absent[..., None], np.nan, points.units[rows, here])
     with np.errstate(invalid="ignore"):  # of points that were not tried, which are infinite
         rest = points.deviance - points.misfit
@@ -240,6 +285,13 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     )
 
 
+def _deviance(search: PixelSearch, data: PixelData, units: np.ndarray) -> np.ndarray:
+    """Deviance (pixels, candidates) at points (pixels, candidates, parameters), infinite where there is
+    none."""
+    deviance = polish.in_rows(polish.explained, search.static, search.common, data, units).deviance
+    return np.where(np.isfinite(deviance), deviance, np.inf)
+
+
 def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.ndarray:
     """Factors (pixels,) of the weights of the `data`, from the residuals of the `lowest` points.
 
@@ -248,7 +300,7 @@ def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.n
     """
     search, view = points.search, points.search.view
     units = points.units[np.arange(len(lowest)), lowest]
-    best = polish.Best(*polish.in_rows(polish.at_best, search.static, search.common, points.data, units))
+    best = polish.in_rows(polish.at_best, search.static, search.common, points.data, units)
     residual = data.weight * (data.values - best.model)
     known = np.sum(data.weight > 0, axis=1) * view.independent / view.points
     nuisances = [
@@ -289,11 +341,8 @@ def _polish_all_near(
     return tried
 
 
-def _candidates(
-    search: PixelSearch, data: PixelData
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Candidates (pixels, candidates, parameters), their predicted deviance, the profile along the thickness,
-    the rounding error of the predictions, and whether the predictions are of the pixels' own weights."""
+def _candidates(search: PixelSearch, data: PixelData) -> _Candidates:
+    """The candidates of pixels by the lookup."""
     lookup, channels, count = search.lookup, search.view.channels, len(data.values)
     values, weight = data.values, _even_weight(data, channels)
     values = _filled(values, data.weight, lookup.weight, channels)
@@ -309,19 +358,15 @@ def _candidates(
     scale = np.sqrt(
         np.sum((seen * (common > 0)) ** 2, axis=1) / np.maximum(np.sum(common**2, axis=1), 1e-300)
     )
-    pieces = []
-    for first in range(0, count, search.block):
-        take = np.minimum(np.arange(first, first + search.block), count - 1)
-        found = scan(search.layout, lookup, values[take], scale[take])
-        pieces.append([np.asarray(x)[: count - first] for x in found])
-    units, deviance, profile = (np.concatenate(x) for x in zip(*pieces, strict=True))
+    found = in_chunks(lambda own: scan(search.layout, lookup, *own), (values, scale), search.block)
     square = np.sum((values * lookup.weight - lookup.known) ** 2, axis=1)
     alike = (
         len(search.problem.parameters) == 1
         and not (search.layout.relative or lookup.rotation.shape[1] or data.frame is not None)
         and np.allclose(seen, scale[:, None] * lookup.weight, rtol=1e-3, atol=0.0)
     )
-    return units, deviance.astype(float), profile, _ROUNDING * square * scale**2, bool(alike)
+    rounding = _ROUNDING * square * scale**2
+    return _Candidates(found.units, found.deviance.astype(float), found.profile, rounding, bool(alike))
 
 
 def _filled(values: np.ndarray, weight: np.ndarray, common: np.ndarray, channels: int) -> np.ndarray:
