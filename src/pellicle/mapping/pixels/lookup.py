@@ -22,6 +22,7 @@ from pellicle.fitting.film.nuisance import chebyshev, offset_prior, scale_prior
 from pellicle.fitting.film.search import design_points, thickness_grid
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
+from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 from pellicle.scene.instrument import Drift
