@@ -12,9 +12,9 @@ import json
 from itertools import pairwise
 from pathlib import Path
 
-from make_stacks import STACKS, case, natural, unpack
-from make_table import STEP
+from make_stacks import STACKS, case, natural
 from mpmath import mp, mpc, mpf
+from stack_truth import conditions, differences, unpack
 
 LAYERS = 3
 SHARES = (0.4, 0.3, 0.7)
@@ -72,17 +72,6 @@ def _of_one(letter, p, depth, eps, q, k0):
     return found
 
 
-def slopes(p, near):
-    table = []
-    for i in range(len(p)):
-        up, down = list(p), list(p)
-        up[i], down[i] = p[i] + STEP, p[i] - STEP
-        table.append(
-            [(x - y) / (2 * STEP) for x, y in zip(outputs(up, near), outputs(down, near), strict=True)]
-        )
-    return table
-
-
 def rounding(p):
     """What the error of each input is proportional to in a derivative.
 
@@ -103,26 +92,17 @@ def row(given):
     if not given["smooth"]:
         return out
     near = unpack(p, None)[2][-1]
-    first = slopes(p, near)
+    first = differences(lambda x: outputs(x, near), p)
     out["slope"] = [[float(x) for x in column] for column in first]
     spread = [
         abs(v) + sum(abs(x) * abs(column[i]) for x, column in zip(p, first, strict=True))
         for i, v in enumerate(value)
     ]
-    bends = [
+    floors = [
         [floor * abs(v) + abs(x) for v, x in zip(value, column, strict=True)]
         for floor, column in zip(natural(p), first, strict=True)
     ]
-    for j, size in enumerate(rounding(p)):
-        if size == 0:
-            continue
-        up, down = list(p), list(p)
-        up[j], down[j] = p[j] + STEP, p[j] - STEP
-        above, below = slopes(up, near), slopes(down, near)
-        for column, x, y in zip(bends, above, below, strict=True):
-            for i in range(len(value)):
-                column[i] += size * abs(x[i] - y[i]) / (2 * STEP)
-    out["slope_condition"] = [[float(f"{float(x):.3g}") for x in column] for column in bends]
+    out["slope_condition"] = conditions(lambda x: outputs(x, near), p, floors, rounding(p))
     out["condition"] = [float(f"{float(x):.3g}") for x in spread]
     return out
 

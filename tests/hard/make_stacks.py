@@ -1,10 +1,8 @@
 """Writes stacks.json: R, T, N, C and S of hard films and stacks with their derivatives, to 50 digits.
 
-The numbers put in are float32's own, so that both precisions share one truth. Two formulas must agree to
-1e-40 before a number is written: the product of characteristic matrices (H. A. Macleod, Thin-Film
-Optical Filters, chapter 2) and the recursion over reflections (P. Rouard, 1937). Beside each number stands
-its condition: by how much it changes, to first order, where every input changes by its own size. Run as
-`python tests/hard/make_stacks.py`; it takes some minutes.
+The numbers put in are float32's own, so that both precisions share one truth, `stack_truth`. Beside each
+number stands its condition: by how much it changes, to first order, where every input changes by its own
+size. Run as `python tests/hard/make_stacks.py`; it takes some minutes.
 """
 
 from __future__ import annotations
@@ -14,8 +12,9 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from make_table import AGREEMENT, CASES, NUDGE, STEP, root
+from make_table import CASES
 from mpmath import mp, mpc, mpf
+from stack_truth import agree, by_matrix, by_recursion, conditions, differences, unpack
 
 SIGNALS = ("Rs", "Rp", "Ts", "Tp", "N", "C", "S")
 
@@ -94,58 +93,6 @@ for _name, _case in CASES.items():
     FILMS[_name] = case(*film, **light, smooth=_case["smooth"], dark=_name == "film matched to both")
 
 
-def unpack(p, near):
-    """Depths, permittivities from the ambient to the substrate, normal components of the index, k₀."""
-    count = (len(p) - 5) // 3
-    depth, n, k = p[:count], p[count : 2 * count], p[2 * count : 3 * count]
-    n2, k2, n0, angle, wavelength = p[-5:]
-    theta = angle * mp.pi / 180
-    a = n0 * mp.sin(theta)
-    eps = [n0**2, *(mpc(*nk) ** 2 for nk in zip(n, k, strict=True)), mpc(n2, k2) ** 2]
-    # a root that is exactly 0 makes both formulas 0/0
-    eps = [eps[0], *(e + NUDGE if abs(e - a * a) < NUDGE else e for e in eps[1:])]
-    q = [n0 * mp.cos(theta), *(root(e - a * a) for e in eps[1:-1]), root(eps[-1] - a * a, near)]
-    return depth, eps, q, 2 * mp.pi / wavelength
-
-
-def by_matrix(p, near=None):
-    """r and T of s and p."""
-    depth, eps, q, k0 = unpack(p, near)
-    result = {}
-    for letter in "sp":
-        y = q if letter == "s" else [normal / e for normal, e in zip(q, eps, strict=True)]
-        electric, magnetic = mpf(1), y[-1]
-        for d, normal, tilted in reversed(list(zip(depth, q[1:-1], y[1:-1], strict=True))):
-            cosine, sine = mp.cos(k0 * d * normal), -1j * mp.sin(k0 * d * normal)
-            electric, magnetic = (
-                cosine * electric + sine / tilted * magnetic,
-                tilted * sine * electric + cosine * magnetic,
-            )
-        below = y[0] * electric + magnetic
-        result[letter] = (y[0] * electric - magnetic) / below, 4 * y[0] * mp.re(y[-1]) / abs(below) ** 2
-    return result
-
-
-def by_recursion(p, near=None):
-    """The same, face by face from the bottom, with Fresnel's coefficients."""
-    depth, eps, q, k0 = unpack(p, near)
-    result = {}
-    for letter in "sp":
-        # in p the magnetic field carries the amplitude
-        y = q if letter == "s" else [normal / e for normal, e in zip(q, eps, strict=True)]
-        r = t = None
-        for i in range(len(q) - 2, -1, -1):
-            face, into = (y[i] - y[i + 1]) / (y[i] + y[i + 1]), 2 * y[i] / (y[i] + y[i + 1])
-            if r is None:
-                r, t = face, into
-                continue
-            passage = mp.exp(1j * k0 * depth[i] * q[i + 1])
-            echoes = 1 + face * r * passage**2
-            r, t = (face + r * passage**2) / echoes, into * t * passage / echoes
-        result[letter] = r, abs(t) ** 2 * mp.re(y[-1]) / y[0]
-    return result
-
-
 def signals(formula, p, dark, near=None):
     """Every signal by name; N, C and S in the convention of `pellicle.optics.ellipsometry`."""
     found = formula(p, near)
@@ -155,20 +102,6 @@ def signals(formula, p, dark, near=None):
         return [Rs, Rp, Ts, Tp, mpf(0), mpf(0), mpf(0)]
     both = 2 * mp.conj(rp) * rs / (Rs + Rp)
     return [Rs, Rp, Ts, Tp, (Rs - Rp) / (Rs + Rp), mp.re(both), mp.im(both)]
-
-
-def slopes(formula, p, dark, near):
-    """[parameter][signal], central differences: their error is of order 1e-80.
-
-    `near` is the substrate's root, on whose branch all of them stay.
-    """
-    table = []
-    for i in range(len(p)):
-        up, down = list(p), list(p)
-        up[i], down[i] = p[i] + STEP, p[i] - STEP
-        above, below = signals(formula, up, dark, near), signals(formula, down, dark, near)
-        table.append([(x - y) / (2 * STEP) for x, y in zip(above, below, strict=True)])
-    return table
 
 
 def sizes(p):
@@ -187,12 +120,6 @@ def natural(p):
     return [*depths, *(1 / x for x in size[count : 3 * count + 3]), mp.pi / 180, 1 / p[-1]]
 
 
-def agree(name, ones, others):
-    for one, two in zip(ones, others, strict=True):
-        if abs(one - two) > AGREEMENT * (1 + abs(one)):
-            raise SystemExit(f"{name}: the formulas differ by {mp.nstr(abs(one - two), 3)}")
-
-
 def row(name, given):
     p, dark = [mpf(x) for x in given["at"]], given["dark"]
     size, floor = sizes(p), natural(p)
@@ -202,23 +129,17 @@ def row(name, given):
     if not given["smooth"]:
         return out
     near = unpack(p, None)[2][-1]
-    first = slopes(by_matrix, p, dark, near)
-    agree(name, chain(*first), chain(*slopes(by_recursion, p, dark, near)))
+
+    def by(formula):
+        return lambda x: signals(formula, x, dark, near)
+
+    first = differences(by(by_matrix), p)
+    agree(name, chain(*first), chain(*differences(by(by_recursion), p)))
     out["slope"] = [[float(x) for x in column] for column in first]
     spread = [sum(s * abs(c[i]) for s, c in zip(size, first, strict=True)) for i in range(len(SIGNALS))]
-    out["condition"] = [float(1 + x) for x in spread]
-    bends = [[f + abs(x) for x in column] for f, column in zip(floor, first, strict=True)]
-    for j, s in enumerate(size):
-        if s == 0:
-            continue
-        up, down = list(p), list(p)
-        up[j], down[j] = p[j] + STEP, p[j] - STEP
-        above, below = slopes(by_matrix, up, dark, near), slopes(by_matrix, down, dark, near)
-        for column, x, y in zip(bends, above, below, strict=True):
-            for i in range(len(SIGNALS)):
-                column[i] += s * abs(x[i] - y[i]) / (2 * STEP)
-    out["slope_condition"] = [[float(f"{float(x):.3g}") for x in column] for column in bends]
-    out["condition"] = [float(f"{x:.3g}") for x in out["condition"]]
+    floors = [[f + abs(x) for x in column] for f, column in zip(floor, first, strict=True)]
+    out["condition"] = [float(f"{float(1 + x):.3g}") for x in spread]
+    out["slope_condition"] = conditions(by(by_matrix), p, floors, size)
     return out
 
 

@@ -1,8 +1,6 @@
-"""Writes table.json: R and T of hard cases with their derivatives, to 50 digits.
+"""Writes table.json: R and T of hard cases with their derivatives, to 50 digits; see `stack_truth`.
 
-Two formulas that share nothing but Snell's law, the 2×2 transfer matrix (H. A. Macleod, Thin-Film
-Optical Filters, chapter 2) and the sum over reflections (G. B. Airy, 1833), must agree to 1e-40
-before a number is written. Run as `python tests/hard/make_table.py`.
+Run as `python tests/hard/make_table.py`.
 """
 
 from __future__ import annotations
@@ -10,12 +8,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from mpmath import mp, mpc, mpf
+from mpmath import mpf
+from stack_truth import agree, by_matrix, by_recursion, differences, unpack
 
-mp.dps = 160
-STEP = mpf(10) ** -40  # of the central difference: its error is of order 1e-80
-NUDGE = mpf(10) ** -90  # of an index whose root is exactly 0, where both formulas are 0/0
-AGREEMENT = mpf(10) ** -40
+SIGNALS = ("Rs", "Ts", "Rp", "Tp")
 
 PARAMETERS = (
     "thickness",
@@ -84,87 +80,27 @@ CASES = {
 }
 
 
-def root(square, near=None):
-    """√ with Im ≥ 0, or the root on the side of `near`: a derivative stays on one branch."""
-    q = mp.sqrt(square)
-    if near is not None:
-        return q if abs(q - near) <= abs(q + near) else -q
-    return -q if mp.im(q) < 0 else q
-
-
-def media(p, near=None):
-    """Permittivities, normal components of the index, and k₀d."""
-    d, n1, k1, n2, k2, n0, angle, wavelength = p
-    theta = angle * mp.pi / 180
-    a, q0 = n0 * mp.sin(theta), n0 * mp.cos(theta)
-    e1, e2 = mpc(n1, k1) ** 2, mpc(n2, k2) ** 2
-    e1, e2 = (e + NUDGE if abs(e - a * a) < NUDGE else e for e in (e1, e2))
-    return (n0**2, e1, e2), (q0, root(e1 - a * a), root(e2 - a * a, near)), 2 * mp.pi * d / wavelength
-
-
-def by_matrix(p, near=None):
-    """{Rs, Rp, Ts, Tp} from the characteristic matrix and the tilted admittances."""
-    e, q, k0d = media(p, near)
-    result = {}
-    for letter in "sp":
-        y = q if letter == "s" else [eps / normal for eps, normal in zip(e, q, strict=True)]
-        cosine, sine = mp.cos(k0d * q[1]), mp.sin(k0d * q[1])
-        electric = cosine - 1j * sine * y[2] / y[1]
-        magnetic = -1j * y[1] * sine + y[2] * cosine
-        below = abs(y[0] * electric + magnetic) ** 2
-        result["R" + letter] = abs(y[0] * electric - magnetic) ** 2 / below
-        result["T" + letter] = 4 * y[0] * mp.re(y[2]) / below
-    return result
-
-
-def by_sum(p, near=None):
-    """The same from Fresnel's coefficients and the geometric series of reflections."""
-    e, q, k0d = media(p, near)
-    passage = mp.exp(1j * k0d * q[1])
-    result = {}
-    for letter in "sp":
-        # in p the magnetic field carries the amplitude, u = ε_j q_i
-        weight = (1, 1, 1) if letter == "s" else e
-        r, t = [], []
-        for i, j in ((0, 1), (1, 2)):
-            u, v = weight[j] * q[i], weight[i] * q[j]
-            r.append((u - v) / (u + v))
-            t.append(2 * u / (u + v))
-        echoes = 1 + r[0] * r[1] * passage**2
-        reflected = (r[0] + r[1] * passage**2) / echoes
-        passed = t[0] * t[1] * passage / echoes
-        flux = [mp.re(normal / w) for normal, w in zip(q, weight, strict=True)]
-        result["R" + letter] = abs(reflected) ** 2
-        result["T" + letter] = abs(passed) ** 2 * flux[2] / flux[0]
-    return result
-
-
-def gradient(formula, p, near):
-    """Central differences of every signal in every parameter, kept on the branch of `near`."""
-    columns = []
-    for i in range(len(p)):
-        up, down = list(p), list(p)
-        up[i], down[i] = p[i] + STEP, p[i] - STEP
-        above, below = formula(up, near), formula(down, near)
-        columns.append({name: (above[name] - below[name]) / (2 * STEP) for name in above})
-    return {name: [column[name] for column in columns] for name in columns[0]}
-
-
 def row(name, given):
     p = [mpf(x) for x in given["at"]]
-    values, others = by_matrix(p), by_sum(p)
-    near = media(p)[1][2]
-    slopes = gradient(by_matrix, p, near) if given["smooth"] else {}
-    other_slopes = gradient(by_sum, p, near) if given["smooth"] else {}
-    for signal in values:
-        pairs = [(values[signal], others[signal])]
-        pairs += list(zip(slopes.get(signal, []), other_slopes.get(signal, []), strict=True))
-        for one, two in pairs:
-            if abs(one - two) > AGREEMENT * (1 + abs(one)):
-                raise SystemExit(f"{name}, {signal}: the formulas differ by {mp.nstr(abs(one - two), 3)}")
+    near = unpack(p, None)[2][-1]
+
+    def signals(formula, p, near=None):
+        return [x for r, T in formula(p, near).values() for x in (abs(r) ** 2, T)]
+
+    values = signals(by_matrix, p)
+    agree(name, values, signals(by_recursion, p))
+    slopes = []
+    if given["smooth"]:
+        slopes, others = (
+            differences(lambda x, formula=formula: signals(formula, x, near), p)
+            for formula in (by_matrix, by_recursion)
+        )
+        for one, other in zip(slopes, others, strict=True):
+            agree(name, one, other)
+    columns = zip(*slopes, strict=True) if slopes else []
     return given | {
-        "value": {signal: float(value) for signal, value in values.items()},
-        "gradient": {signal: [float(x) for x in column] for signal, column in slopes.items()},
+        "value": {signal: float(value) for signal, value in zip(SIGNALS, values, strict=True)},
+        "gradient": {s: [float(x) for x in c] for s, c in zip(SIGNALS, columns, strict=bool(slopes))},
     }
 
 

@@ -103,7 +103,7 @@ def by_matrix(monkeypatch):
     """The table's own formula."""
     monkeypatch.syspath_prepend(Path(__file__).parent)
     with mp.workdps(60):
-        yield importlib.import_module("make_stacks").by_matrix
+        yield importlib.import_module("stack_truth").by_matrix
 
 
 def test_fifty_layers_with_an_opaque_one_in_the_middle(by_matrix):
