@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.colour import integration_bands, sensor
-from pellicle.colour.encoding import camera_encoding, encoding
+from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.colour.film import Colour
 from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.colour.observers import sensor as observer
@@ -193,10 +193,7 @@ def simulate_colours(
     simulated = simulate_signal(
         with_wavelength(scene, grid, np.repeat(angles, nm.size)), grid, tolerance=tolerance
     )
-    white = weights.sum(axis=0)
-    coding = encoding(space, white) if space != "rgb" else camera_encoding(gamma)
-    if space == "rgb":
-        coding = coding._replace(linear=np.diag(1 / white) if camera is None else np.asarray(camera.matrix))
+    coding = _coding(space, weights.sum(axis=0), gamma, camera)
     channels = coding.channels(simulated.clean.reshape(angles.size, nm.size) @ weights)
     values = coding.encode(channels, coding.roots(channels))
     values = values + noise * np.random.default_rng(seed).normal(0.0, 1.0, values.shape)
@@ -214,3 +211,11 @@ def simulate_colours(
         camera=camera,
     )
     return colours, simulated.plan
+
+
+def _coding(space: str, white: np.ndarray, gamma: float, camera: CameraMatrix | None) -> Encoding:
+    """Encoding of a colour space under this white (3,), of a camera's with its matrix."""
+    if space != "rgb":
+        return encoding(space, white)
+    linear = np.diag(1 / white) if camera is None else np.asarray(camera.matrix)
+    return camera_encoding(gamma)._replace(linear=linear)
