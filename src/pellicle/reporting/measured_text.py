@@ -111,21 +111,10 @@ def _values(spectrum: Spectrum) -> dict[str, np.ndarray]:
     order = slice(None)
     if spectrum.setting is not None:
         order = np.lexsort((spectrum.wavelength, spectrum.setting))  # neighbours are of one angle
-    if spectrum.ratios and spectrum.delta is not None:
-        each = ("psi", spectrum.values), ("delta", spectrum.delta)
-        return {
-            f"{angle}_{ratio}": own[order, i]
-            for i, ratio in enumerate(spectrum.ratios)
-            for angle, own in each
-        }
-    if spectrum.elements:
-        return dict(zip(spectrum.elements, spectrum.values[order].T, strict=True))
-    if spectrum.delta is None:
+    kind = spectrum.kind
+    if not (kind.parts or kind.degrees):
         return {"values": spectrum.values[order]}
-    found = {"psi": spectrum.values[order], "delta": spectrum.delta[order]}
-    if spectrum.depolarisation is not None:
-        found["depolarisation"] = spectrum.depolarisation[order]
-    return found
+    return {quantity.name: quantity.measured(spectrum)[order] for quantity in kind.quantities}
 
 
 def _each(values: np.ndarray | None) -> list[float]:
