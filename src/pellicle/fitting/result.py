@@ -71,13 +71,6 @@ class Estimate:
             object.__setattr__(self, "stderr_noise", self.stderr)
 
     @property
-    def stderr_systematic(self) -> float:
-        """The part of the standard error that is not noise (type B)."""
-        if not math.isfinite(self.stderr):
-            return self.stderr
-        return math.sqrt(max(self.stderr**2 - self.stderr_noise**2, 0.0))
-
-    @property
     def effective_degrees_of_freedom(self) -> float:
         """Degrees of freedom of `stderr` (Welch-Satterthwaite: GUM 2008, eq. G.2b), systematic effects taken
         as known to infinitely many."""
