@@ -157,7 +157,7 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         axes.text(1.02, 1.0, names, transform=axes.transAxes, va="top", fontsize="small")
         axes.grid(alpha=0.2)
     axes.margins(x=0.02 if panel.title else 0.01)
-    axes.yaxis.get_offset_text().set_va("top")  # a factor such as 1e-6 stands inside
+    axes.yaxis.get_offset_text().set_verticalalignment("top")  # a factor such as 1e-6 stands inside
     _scale(axes, panel)
     if panel.empty:
         axes.set(xticks=[], yticks=[])
