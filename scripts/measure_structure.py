@@ -28,7 +28,7 @@ LONGEST = 50
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 KIND = re.compile(
     r"""["'](psi-delta|mueller|generalised-psi-delta|contrast)["']  # the word of a kind
-      | \.ellipsometric\b | \.of_power\b | \bELLIPSOMETRY\b       # a question about it
+      | \bELLIPSOMETRY\b
       # what only one kind has
       | \b(spectrum|data|first|sweep|view|part|s|one)\.(folded|elements|ratios|depolarisation)\b
       | \b(mueller|generalised|read_ellipsometry)\.SIGNAL\b
