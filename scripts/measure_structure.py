@@ -27,7 +27,8 @@ LONGEST = 50
 """Lines of a function, its signature and docstring included."""
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 KIND = re.compile(
-    r"""["'](psi-delta|mueller|generalised-psi-delta|contrast)["']  # the word of a kind
+    r"""["'](psi-delta|(?<!'jones',\ ')mueller|generalised-psi-delta|contrast)["']
+      # the word of a kind, not the public names "jones", "mueller"
       | \bELLIPSOMETRY\b
       # what only one kind has
       | \b(spectrum|data|first|sweep|view|part|s|one)\.(folded|elements|ratios|depolarisation)\b

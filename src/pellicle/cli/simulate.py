@@ -83,6 +83,7 @@ def simulate(
     """
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.signals.registry import KINDS
 
     if json and depth is None:
         raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
@@ -91,7 +92,8 @@ def simulate(
     described = read_recipe(recipe)
     if how.depolarisation_noise is not None:
         not_negative("--depolarisation-noise", how.depolarisation_noise)
-        if isinstance(described, SurfaceRecipe) or described.tables.data.signal != "psi-delta":
+        kind = None if isinstance(described, SurfaceRecipe) else KINDS.get(described.tables.data.signal or "")
+        if kind is None or "depolarisation" not in kind.keywords:
             raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
     if depth is not None:
         if spread or how.tolerance:
@@ -176,8 +178,9 @@ def _write_spectrum(
         raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
     grid = wavelengths(recipe, scene)
     scene, nm = each_setting(scene, grid)
-    elements, kind = recipe.tables.data.elements, scene.light.kind
-    kind = kind if elements is None or not kind.parts else of_parts(elements, scene.light.signal)
+    options, kind = recipe.tables.data, scene.light.kind
+    if options.elements is not None and kind.parts:
+        kind = of_parts(options.elements, scene.light.signal)
     result = simulate_signal(scene, nm, noise, how.seed, how.tolerance, how.depolarisation_noise, kind)
     log_plan(result.plan)
     write_text(out, _csv(scene, result, kind, noise, comments))

@@ -40,7 +40,7 @@ from pellicle.explorer.programs import (
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert
-from pellicle.signals.generalised import Generalised
+from pellicle.signals.registry import KINDS
 from pellicle.simulation.spectra import VISIBLE, default_wavelengths
 
 _FEWEST, _MOST, _POINTS = 100, 1500, 401
@@ -60,10 +60,13 @@ class FilmView:
     kind, parts = "spectrum", ("curves", "colour", "sphere", "plan")
 
     def __init__(self, scene: Scene, wavelength: Any = None, folded: bool = False) -> None:
-        if scene.light.signal == Generalised.word:
+        if not (kind := scene.light.kind).explored:
+            others = [
+                f'"{word}"' for word, x in KINDS.items() if x.explored and x.simulated == kind.simulated
+            ]
             raise UsageError(
-                "the explorer does not draw generalised psi and delta: give the scene another signal, such as"
-                ' "psi-delta" or "mueller"'
+                f"the explorer does not draw {kind.noun}: give the scene another signal, such as"
+                f" {' or '.join(others)}"
             )
         if np.ndim(scene.light.azimuth):
             raise UsageError("the explorer draws one azimuth of the sample: give the scene one")
@@ -183,8 +186,8 @@ class FilmView:
             raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
         azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
         light = Light(None, angle, data.signal, polarised, azimuth, data.transmission)
-        view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, bool(data.folded))
-        same = view.folded == self.folded and np.array_equal(nm, self.wavelength)
+        view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, data.kind.is_folded)
+        same = data.kind.is_folded == self.folded and np.array_equal(nm, self.wavelength)
         same = same and eqx.tree_equal(view.scene.light, own) is True
         return None if same else view
 

@@ -237,7 +237,7 @@ class Session:
         self, view: _View, values: Mapping[str, float], wait: bool, size: int
     ) -> list[dict[str, Any]] | None:
         curves = self._computed(view, "curves", values, wait)
-        measured = {name for spectrum in self.spectra for name in spectrum.elements}  # of a Mueller matrix
+        measured = {name for spectrum in self.spectra for name in spectrum.kind.parts}
         shown = [x for x in curves or () if not measured or x.signal in measured]
         return None if curves is None else [curve_to_json(curve) for curve in shown]
 

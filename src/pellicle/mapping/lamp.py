@@ -20,6 +20,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Layer
+from pellicle.signals.registry import kind
 from pellicle.simulation.spectra import simulate_signal
 
 _DARK = 1e-3
@@ -88,7 +89,7 @@ def lamp_curve(
 
     **Source:** of `pellicle.mapping.joint_lamp`.
     """
-    if cube.signal == "psi-delta":
+    if kind(cube.signal).ellipsometric:
         raise UsageError("ellipsometry compares polarisations of the same light and has no lamp curve")
     if region is None:
         return LampCurve(cube.wavelength, *joint_gain(cube, scene, pixels))

@@ -16,6 +16,7 @@ from pellicle.reporting.csv_text import csv_rows
 from pellicle.reporting.drawable import Line, Panel, Section, Style
 from pellicle.reporting.json_record import indented, versions
 from pellicle.reporting.plain_text import COLUMNS
+from pellicle.signals.registry import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +55,8 @@ def error_label(methods: Comparison, size: str = "") -> str:
         return f"relative error{of}"
     if size and methods.unit == "degrees":
         return f"error{of} degrees"
-    return f"error{of} in {'Mueller elements' if methods.unit == 'mueller' else methods.unit}"
+    kind = KINDS.get(methods.unit)
+    return f"error{of} in {kind.noun if kind is not None and kind().parts else methods.unit}"
 
 
 def time_unit(methods: Comparison) -> tuple[str, float]:

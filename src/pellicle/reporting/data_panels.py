@@ -112,15 +112,15 @@ def _values(q: Quantity, lines: list[Line], bands: list[Band], legend: Place) ->
 
 
 def _in_rows(spectrum: Spectrum, columns: Sequence[Quantity], panels: Sequence[Panel]) -> list[list[Panel]]:
-    """The panels in rows: one below the other; Ψ above Δ of each ratio; Mueller elements at their places of
-    the matrix, where those that were not measured stay empty."""
-    if columns[0].place is None:
+    """The panels in rows: one below the other, or at their places of the grid of the signal, where what was
+    not measured stays empty."""
+    if not (titles := spectrum.kind.grid):
         return [[panel] for panel in panels]
-    shape = (4, 4) if spectrum.elements else (2, len(spectrum.ratios))
-    at = {q.place: panel for q, panel in zip(columns, panels, strict=True)}
-    empty = {(i, j): Panel("", height=1.1, title=f"m{i + 1}{j + 1}") for i in range(4) for j in range(4)}
-    empty[0, 0] = Panel("", height=1.1, title="m11 = 1")
-    return [[at.get((i, j), empty[i, j]) for j in range(shape[1])] for i in range(shape[0])]
+    placed = {q.place: panel for q, panel in zip(columns, panels, strict=True)}
+    return [
+        [placed.get((i, j)) or Panel("", height=1.1, title=title) for j, title in enumerate(row)]
+        for i, row in enumerate(titles)
+    ]
 
 
 def _residuals(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) -> Panel:

@@ -15,18 +15,13 @@ from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.fitting.curves import BIREFRINGENCE
 from pellicle.reporting.csv_text import csv_text, written_by
 from pellicle.reporting.drawable import Table
+from pellicle.signals.one_column import OneColumn
 
 if TYPE_CHECKING:
     from pellicle.fitting.depth_profiles import FittedProfile
     from pellicle.fitting.result import Fit, Part
 
 _JOINT = ("file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma", "azimuth_deg")
-_KINDS = {
-    "psi": "fit of psi and delta in degrees: data, model, residual = data - model (of delta: -180 to 180)",
-    "ratios": "fit of generalised psi and delta in degrees: data, model, residual = data - model"
-    " (of delta: -180 to 180)",
-    "elements": "fit of normalised Mueller elements: data, model, sigma = standard deviation assumed",
-}
 
 
 def fit_csv(fit: Fit) -> str:
@@ -42,11 +37,7 @@ def fit_csv(fit: Fit) -> str:
     [part] = fit.parts
     if isinstance(part.data, Colours):
         return _colours(fit, part)
-    return (
-        _power(fit, part)
-        if part.spectral.delta_data is None and not part.spectrum.elements
-        else _columns(fit, part)
-    )
+    return _one_column(fit, part) if isinstance(part.spectrum.kind, OneColumn) else _columns(fit, part)
 
 
 def nk_csvs(fit: Fit) -> dict[str, str]:
@@ -80,7 +71,7 @@ def profile_csv(fit: Fit, profiles: Sequence[FittedProfile]) -> str:
     return _text(fit, about, columns)
 
 
-def _power(fit: Fit, part: Part) -> str:
+def _one_column(fit: Fit, part: Part) -> str:
     data, curve = part.spectrum, part.spectral
     settings = _settings(data)
     names = ["wavelength", data.signal if data.calibrated else "intensity", "_", "_", "sigma"]
@@ -103,22 +94,26 @@ def _columns(fit: Fit, part: Part) -> str:
     """Data, model, residual and known σ of each quantity; those of Ψ and Δ follow both."""
     from pellicle.reporting.quantities import quantities
 
-    data = part.spectrum
+    data, kind = part.spectrum, part.spectrum.kind
     known = quantities(data, part.curve)
-    groups = [[q] for q in known] if data.elements or data.ratios else [known[:2], known[2:]]
+    groups = [[q] for q in known] if kind.parts else [known[:2], known[2:]]
     columns: dict[str, Any] = {"wavelength_nm": part.spectral.wavelength, **_settings(data)}
     for group in groups:
         for q in group:
             assert q.residual is not None
             columns |= {f"{q.name}{'_deg' * ('degrees' in q.label)}": q.data, f"{q.name}_model": q.model}
-            columns |= {} if data.elements else {f"{q.name}_residual": q.residual}
+            columns |= {f"{q.name}_residual": q.residual} if kind.degrees else {}
         # σ of Ψ as stated: that of the fit may be the scatter of sweeps
         sigmas = {q.name: data.sigma if q.name == "psi" else q.sigma for q in group}
-        stated = data.elements or data.sigma is not None or "depolarisation" in sigmas
+        stated = not kind.degrees or data.sigma is not None or "depolarisation" in sigmas
         if stated and all(sigma is not None for sigma in sigmas.values()):
-            columns |= {f"sigma_{name}{'_deg' * bool(data.ratios)}": x for name, x in sigmas.items()}
-    kind = "elements" if data.elements else "ratios" if data.ratios else "psi"
-    return _text(fit, [_KINDS[kind]], columns)
+            columns |= {
+                f"sigma_{name}{'_deg' * bool(kind.degrees and kind.parts)}": x for name, x in sigmas.items()
+            }
+    about = f"fit of {kind.ordinate}s: data, model, sigma = standard deviation assumed"
+    if kind.degrees:
+        about = f"fit of {kind.noun} in degrees: data, model, residual = data - model (of delta: -180 to 180)"
+    return _text(fit, [about], columns)
 
 
 def _colours(fit: Fit, part: Part) -> str:

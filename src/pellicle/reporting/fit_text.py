@@ -100,7 +100,7 @@ def _spectrum(part: Part) -> str:
     """`R, 41 points from 400 to 800 nm`."""
     data, nm = part.spectrum, part.spectral.wavelength
     light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
-    names = (*data.elements, *data.ratios)
+    names = data.kind.parts
     own = f" ({', '.join(names)})" if names else ""
     text = f"{data.signal}{own}{light}, {nm.size} points"
     if nm.size:
@@ -180,10 +180,10 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     rows = [(f"rms residual{of}", rms), (f"noise{of}", noise)]
     if isinstance(curve, ColourCurve) and (apart := fitted_colours.differences(part)):
         rows.append((f"colour difference{of}", apart))
-    if isinstance(curve, Curve) and part.spectrum.ratios:
+    if isinstance(curve, Curve) and part.spectrum.kind.degrees and (ratios := part.spectrum.kind.parts):
         square = curve.residual**2 + weighted_delta(curve) ** 2
         each = ", ".join(f"{size:.4g}" for size in np.sqrt(np.mean(square, axis=0) / 2))
-        rows.append((f"of {', '.join(part.spectrum.ratios)}", f"{each} degrees of psi"))
+        rows.append((f"of {', '.join(ratios)}", f"{each} degrees of psi"))
     elif isinstance(curve, Curve) and curve.delta_data is not None:
         psi, delta = (np.sqrt(np.mean(r**2)) for r in (curve.residual, curve.delta_residual))
         rows.append(("of psi and of delta", f"{psi:.4g} and {delta:.4g} degrees"))

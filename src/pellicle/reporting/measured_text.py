@@ -80,7 +80,7 @@ def spectrum_json(spectrum: Spectrum) -> dict[str, Any]:
         "signal": spectrum.signal,
         "polarisation": spectrum.polarisation,
         "calibrated": spectrum.calibrated,
-        "folded": spectrum.folded,
+        "folded": spectrum.kind.is_folded,
         "transmission": spectrum.transmission,
         "points": len(spectrum),
         "sweeps": len(spectrum.sweeps),
@@ -225,8 +225,9 @@ def describe_cube(cube: Cube, notes: tuple[str, ...] | None = None) -> str:
     `notes` replace those of the cube. Values are of a sample of the pixels.
     """
     seen, nm = _sample(cube), cube.wavelength
-    quantity = KINDS[cube.signal].title + ("" if cube.calibrated else ", scale unknown")
-    if cube.signal != "psi-delta":
+    kind = KINDS[cube.signal]()
+    quantity = kind.title + ("" if cube.calibrated else ", scale unknown")
+    if not kind.ellipsometric:
         quantity += f", {cube.polarisation} light"
     pixels = ", ".join(f"{dim} {n}" for dim, n in zip(cube.dims, cube.shape, strict=True))
     some = np.unique(np.linspace(0, nm.size - 1, _BANDS_SHOWN).round().astype(int))

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pellicle.forward_model.plan import Plan, Row
+from pellicle.forward_model.plan import SURFACE, Plan, Row
 
 if TYPE_CHECKING:
     from pellicle.effects.differences import Savings
 
-_UNITS = {
-    "psi-delta": "degrees on the sphere of N, C, S",
-    "generalised-psi-delta": "degrees on the spheres of N, C, S",
-    "brdf": "of each value of the BRDF (of 0.01/π where that is more)",
-}
+_UNIT_OF_BRDF = "of each value of the BRDF (of 0.01/π where that is more)"
 
 
 def report(plan: Plan) -> str:
@@ -49,7 +45,7 @@ def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
 
 
 def _summary(plan: Plan) -> list[str]:
-    unit = _UNITS.get(plan.signal, f"of {plan.signal}")
+    unit = _UNIT_OF_BRDF if plan.signal == SURFACE else plan.kind.error_unit
     lines = [f"error at most {plan.error_bound:.1e} {unit}; the tolerance is {plan.tolerance:g}"]
     if plan.gradient_error:
         lines.append(f"derivatives change by at most {plan.gradient_error:.1e} of their largest value")

@@ -17,10 +17,6 @@ from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.reporting.drawable import CHANNELS, SERIES, Style
 from pellicle.signals.base import Quantity as Measured
 
-RATIOS = {"ane": "AnE", "aps": "Aps", "asp": "Asp"}
-"""Ratios as Woollam's programs write them."""
-FORMULAS = {"ane": "$r_{pp}/r_{ss}$", "aps": "$r_{ps}/r_{pp}$", "asp": "$r_{sp}/r_{ss}$"}
-
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
@@ -110,32 +106,27 @@ def _of_spectrum(data: Spectrum, curve: Curve | None, q: Measured, i: int) -> Qu
         if q.array == "values":
             values["sigma"] = curve.sigma if q.column is None else curve.sigma[:, q.column]
         if q.array != "depolarisation":  # it has another unit than the residuals of angles
-            weighted = bool(data.ratios) and q.wraps
+            weighted = q.wraps and q.column is not None
             values["missed"] = weighted_delta(curve)[:, q.column] if weighted else values["residual"]
-    label = q.axis if data.calibrated else f"{q.axis} × unknown scale"
-    for ratio in data.ratios:
-        label = label.replace(f" {ratio}", f" {RATIOS[ratio]}")
+    label = (q if q.cell is None else q._replace(label=q.cell.label)).axis
+    label = label if data.calibrated else f"{label} × unknown scale"
     return Quantity(q.name, label, **values, turns=q.wraps, **_style(data, q, i))
 
 
 def _style(data: Spectrum, q: Measured, i: int) -> dict[str, Any]:
-    """Label, place in a grid, and line of the residual of a quantity."""
-    if data.ratios:
-        ratio, row = data.ratios[i // 2], int(q.wraps)
-        name = RATIOS[ratio]
-        sign = q.label.split()[0]
+    """Place in a grid, and line of the residual, of the i-th quantity."""
+    if q.cell is not None:
+        row, column = q.cell.row, q.cell.column
+        # angles share the colour of their column
+        line = (
+            SERIES[column] if q.unit else f"C{i % 10}",
+            "dashed" if (row if q.unit else i >= 10) else "solid",
+        )
         return {
-            "drawn": (f"{'½ sin 2Ψ ' * row}{sign} {name}", SERIES[i // 2], ("solid", "dashed")[row]),
-            "place": (row, i // 2),
-            "title": f"{sign} of {name}{'' if row else f' = {FORMULAS[ratio]}'} (degrees)",
-            "smallest": 0.5,
-        }
-    if data.elements:
-        return {
-            "drawn": (q.name, f"C{i % 10}", "solid" if i < 10 else "dashed"),
-            "place": (int(q.name[1]) - 1, int(q.name[2]) - 1),
-            "title": q.name,
-            "smallest": 0.02,
+            "drawn": (q.cell.residual, *line),
+            "place": (row, column),
+            "title": data.kind.grid[row][column],
+            "smallest": q.cell.smallest,
         }
     if q.unit:
         return {"drawn": (q.label, *(("blue", "dashed") if q.wraps else ("residual", "solid")))}

@@ -16,7 +16,6 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Part
-from pellicle.signals.sphere import psi_delta
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""
@@ -52,8 +51,7 @@ def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
-    """Predictions of each spectrum, of Ψ and Δ (of each ratio of generalised ones), of each Mueller element,
-    or of each channel of colours and of BRDF samples.
+    """Predictions of each quantity of spectra, and of each channel of colours and of BRDF samples.
 
     `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
     """
@@ -77,40 +75,11 @@ def _spectrum(
     noisy = model + sigma * random.standard_normal(model.shape)
     curve, (prefix, suffix) = part.spectral, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
     axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
-    if part.spectrum.elements:
-        of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
-        return [
-            Prediction(e + suffix, prefix + e, axis, curve.data[:, i], of_model[..., i], of_noisy[..., i])
-            for i, e in enumerate(part.spectrum.elements)
-        ]
-    if curve.delta_data is None:
-        signal = part.spectrum.signal
-        return [Prediction(signal + suffix, prefix + part.spectrum.kind.noun, axis, curve.data, model, noisy)]
-    of_model, of_noisy = view.in_columns(model), view.in_columns(noisy)
-    if part.spectrum.ratios:
-        spheres = [own.reshape(*own.shape[:-1], -1, 3) for own in (of_model, of_noisy)]
-        drawn_psi, drawn_delta = zip(*map(psi_delta, spheres), strict=True)
-        result = []
-        for i, e in enumerate(part.spectrum.ratios):
-            for name, sign, own, (drawn, noise) in (
-                ("psi", "Ψ", curve.data, drawn_psi),
-                ("delta", "Δ", curve.delta_data, drawn_delta),
-            ):
-                about = f"{name}_{e}{suffix}", f"{prefix}{sign} {e} (degrees)", axis
-                result.append(Prediction(*about, own[:, i], drawn[..., i], noise[..., i]))
-        return result
-    result = []
-    if view.signal.depolarisation and curve.depolarisation_data is not None:
-        name, drawn = "depolarisation", (of_model[..., -1], of_noisy[..., -1])
-        result.append(Prediction(name + suffix, prefix + name, axis, curve.depolarisation_data, *drawn))
-        of_model, of_noisy = of_model[..., :-1], of_noisy[..., :-1]
-    angles = zip(*(psi_delta(own) for own in (of_model, of_noisy)), strict=True)
-    names, data = (("psi", "Ψ"), ("delta", "Δ")), (curve.data, curve.delta_data)
-    of_angles = [
-        Prediction(f"{name}{suffix}", f"{prefix}{sign} (degrees)", axis, measured, *drawn_angles)
-        for (name, sign), measured, drawn_angles in zip(names, data, angles, strict=True)
+    drawn, again = (view.signal.in_quantities(view.in_columns(columns)) for columns in (model, noisy))
+    return [
+        Prediction(q.name + suffix, prefix + q.axis, axis, q.curve(curve)[0], drawn[..., i], again[..., i])
+        for i, q in enumerate(view.signal.quantities)
     ]
-    return [*of_angles, *result]
 
 
 def _samples(

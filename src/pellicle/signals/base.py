@@ -39,12 +39,26 @@ class Arrays(Protocol):
     def __len__(self) -> int: ...
 
 
+class Cell(NamedTuple):
+    """Panel of a quantity in a grid of panels.
+
+    It has a `row` and a `column`, the `label` of its axis without unit, and at least the range `smallest`;
+    `residual` names the line of its residuals.
+    """
+
+    row: int
+    column: int
+    label: str
+    residual: str
+    smallest: float
+
+
 class Quantity(NamedTuple):
     """One measured quantity: a column of files, a curve of figures.
 
     `name` is that in files, `label` that of an axis without its unit, `unit` "" or "degrees", `array` the
     array of a spectrum that contains it ("values", "delta" or "depolarisation"), and `column` its column
-    there (None for arrays of one column).
+    there (None for arrays of one column). `cell` is its panel, where figures have a grid of them.
     """
 
     name: str
@@ -52,6 +66,7 @@ class Quantity(NamedTuple):
     unit: str = ""
     array: str = "values"
     column: int | None = None
+    cell: Cell | None = None
 
     @property
     def axis(self) -> str:
@@ -152,6 +167,8 @@ class Signal(ABC):
     """Names of a column of its own, in lower case."""
     ordinate: ClassVar[str]
     """Label of an axis that all quantities share."""
+    explored: ClassVar[bool] = True
+    """True where the explorer draws it."""
     keywords: ClassVar[frozenset[str]] = frozenset()
     """Arguments of `pellicle.Spectrum` that go with this kind, beside those of any."""
     required: ClassVar[frozenset[str]] = frozenset()
@@ -172,14 +189,34 @@ class Signal(ABC):
         return self.simulated == "T"
 
     @property
+    def is_folded(self) -> bool:
+        """True where Δ is known in 0 to 180 degrees only."""
+        return False
+
+    @property
+    def grid(self) -> tuple[tuple[str, ...], ...]:
+        """Titles of the panels of a figure, row by row; empty where they stand one below the other."""
+        return ()
+
+    @property
     def words(self) -> dict[str, Any]:
         """Arguments of `pellicle.Spectrum` that name this kind beside its word."""
         return {}
 
     @property
+    def error_unit(self) -> str:
+        """What an error of the simulated light is stated in: `of R`."""
+        return f"of {self.word}"
+
+    @property
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
         """The measured quantities, in the order of files."""
+
+    @property
+    def share(self) -> Quantity | None:
+        """The quantity that is the depolarisation; None where that was not measured."""
+        return next((q for q in self.quantities if q.array == "depolarisation"), None)
 
     # a spectrum
 
@@ -296,6 +333,10 @@ class Signal(ABC):
     def polarised(self, columns: Float[np.ndarray, "*lanes points columns"]) -> np.ndarray:
         """Return N, C, S as simulated, shorter than 1, of columns with their depolarisation."""
         raise NotImplementedError
+
+    def in_quantities(self, columns: Float[np.ndarray, "*lanes points columns"]) -> np.ndarray:
+        """Return `quantities`, (*lanes, points, quantities), of simulated columns."""
+        return columns
 
     @abstractmethod
     def curves(

@@ -28,6 +28,7 @@ from jaxtyping import Float
 from pellicle.errors import UsageError
 from pellicle.signals.base import (
     Arrays,
+    Cell,
     ChannelGroup,
     Channels,
     Offset,
@@ -51,6 +52,9 @@ from pellicle.signals.sphere import (
 RATIOS = ("ane", "aps", "asp")
 FORMULAS = {"ane": "r_pp/r_ss", "aps": "r_ps/r_pp", "asp": "r_sp/r_ss"}
 """Ratios in Woollam's indices, the first of them incident."""
+NAMES = {"ane": "AnE", "aps": "Aps", "asp": "Asp"}
+"""Ratios as Woollam's programs write them."""
+_IN_FIGURES = {"ane": "$r_{pp}/r_{ss}$", "aps": "$r_{ps}/r_{pp}$", "asp": "$r_{sp}/r_{ss}$"}
 CHANNELS = 3
 """N, C and S."""
 _ALIKE = 1.5
@@ -72,6 +76,7 @@ class Generalised(Signal):
     keywords: ClassVar[frozenset[str]] = frozenset({"ratios", "delta", "delta_sigma"})
     required: ClassVar[frozenset[str]] = frozenset({"ratios", "delta"})
     degrees: ClassVar[bool] = True
+    explored: ClassVar[bool] = False
     parts: tuple[str, ...] = RATIOS
 
     def __post_init__(self) -> None:
@@ -83,17 +88,31 @@ class Generalised(Signal):
         if len(set(self.parts)) < len(self.parts):
             raise UsageError(f"`elements` are repeated: {', '.join(self.parts)}")
 
+    @property
+    def error_unit(self) -> str:
+        return "degrees on the spheres of N, C, S"
+
     @classmethod
     def of(cls, data: Any) -> Generalised:
         return Generalised(tuple(data.ratios))
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        each = (("psi", "Ψ", "values"), ("delta", "Δ", "delta"))
-        return tuple(
-            Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i)
-            for i, name in enumerate(self.parts)
-            for angle, sign, array in each
+        each = (("psi", "Ψ", "values", ""), ("delta", "Δ", "delta", "½ sin 2Ψ "))
+        result = []
+        for i, name in enumerate(self.parts):
+            for row, (angle, sign, array, weight) in enumerate(each):
+                shown = f"{sign} {NAMES[name]}"
+                cell = Cell(row, i, shown, f"{weight}{shown}", 0.5)
+                result.append(Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i, cell))
+        return tuple(result)
+
+    @property
+    def grid(self) -> tuple[tuple[str, ...], ...]:
+        """Ψ of each ratio above its Δ."""
+        return (
+            tuple(f"Ψ of {NAMES[name]} = {_IN_FIGURES[name]} (degrees)" for name in self.parts),
+            tuple(f"Δ of {NAMES[name]} (degrees)" for name in self.parts),
         )
 
     def check(self, data: Arrays, place: Place, remedy: str) -> None:
@@ -212,6 +231,10 @@ class Generalised(Signal):
                     Offset(f"offset of {angle} of {name}", size, "deg", change.reshape(columns.shape))
                 )
         return result
+
+    def in_quantities(self, columns: np.ndarray) -> np.ndarray:
+        spheres = columns.reshape(*columns.shape[:-1], -1, CHANNELS)
+        return np.stack(psi_delta(spheres), axis=-1).reshape(*columns.shape[:-1], -1)
 
     def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
         sigma = 1 / weight[:, [2 * i for i in range(len(self.parts))]]

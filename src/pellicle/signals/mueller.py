@@ -17,6 +17,7 @@ from jaxtyping import Float
 from pellicle.errors import UsageError
 from pellicle.signals.base import (
     Arrays,
+    Cell,
     ChannelGroup,
     Channels,
     Offset,
@@ -69,7 +70,17 @@ class Mueller(Signal):
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        return tuple(Quantity(name, name, column=i) for i, name in enumerate(self.parts))
+        return tuple(
+            Quantity(name, name, column=i, cell=Cell(int(name[1]) - 1, int(name[2]) - 1, name, name, 0.02))
+            for i, name in enumerate(self.parts)
+        )
+
+    @property
+    def grid(self) -> tuple[tuple[str, ...], ...]:
+        """The matrix."""
+        titles = [[f"m{row}{column}" for column in range(1, 5)] for row in range(1, 5)]
+        titles[0][0] = "m11 = 1"
+        return tuple(map(tuple, titles))
 
     def check(self, data: Arrays, place: Place, remedy: str) -> None:
         for i, element in enumerate(self.parts):

@@ -58,6 +58,14 @@ class PsiDelta(Signal):
     folded: bool = False
     depolarisation_known: bool = False
 
+    @property
+    def is_folded(self) -> bool:
+        return self.folded
+
+    @property
+    def error_unit(self) -> str:
+        return "degrees on the sphere of N, C, S"
+
     @classmethod
     def of(cls, data: Any) -> PsiDelta:
         share = data.depolarisation is not None, data.depolarisation_sigma is not None
@@ -229,6 +237,11 @@ class PsiDelta(Signal):
 
     def polarised(self, columns: np.ndarray) -> np.ndarray:
         return self._sphere(columns) * np.sqrt(np.maximum(1 - columns[..., -1], 0.0))[..., None]
+
+    def in_quantities(self, columns: np.ndarray) -> np.ndarray:
+        sphere = columns[..., :-1] if self.depolarisation else columns
+        angles = np.stack(psi_delta(sphere), axis=-1)
+        return np.concatenate([angles, columns[..., sphere.shape[-1] :]], axis=-1)
 
     def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
         result = {}

@@ -71,7 +71,7 @@ def interference_spectra(
 
     The rest as for `interference_colours`.
     """
-    if scene.light.signal == "psi-delta":
+    if scene.light.kind.ellipsometric:
         raise UsageError("ellipsometry has no colour: chart a recipe with signal R or T")
     with jax.enable_x64(True):
         position = varied_layer(scene, layer)
@@ -100,7 +100,7 @@ def colour_table(
 
     **Raises:** as `interference_colours` and `FilmColourTable.from_colours` do.
     """
-    if scene.light.signal == "psi-delta":
+    if scene.light.kind.ellipsometric:
         raise UsageError("ellipsometry has no colour: use a recipe with signal R or T")
     eye = sensor(observer, illuminant) if eye is None else eye
     position = varied_layer(scene, layer)
@@ -179,7 +179,7 @@ def simulate_colours(
     **Raises:** UsageError for ellipsometry and an unknown space; ValueError where a material has no data at a
     wavelength of the sensor.
     """
-    if scene.light.signal == "psi-delta":
+    if scene.light.kind.ellipsometric:
         raise UsageError("ellipsometry has no colour: use a scene with signal R or T")
     if space not in SPACES:
         raise UsageError(f"`space` must be one of {', '.join(SPACES)}, not {space!r}")

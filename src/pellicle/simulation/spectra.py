@@ -21,7 +21,7 @@ from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import insert, is_free, start_values
 from pellicle.scene.instrument import Drift
 from pellicle.signals.base import Signal
-from pellicle.signals.registry import of_parts
+from pellicle.signals.registry import KINDS, of_parts
 
 VISIBLE = (380.0, 780.0, 2.0)
 """Default wavelengths: start, stop and step in nm."""
@@ -65,7 +65,8 @@ def simulate_spectrum(
     nm = default_wavelengths(scene) if wavelength is None else np.asarray(wavelength, dtype=float)
     light, kind = scene.light, scene.light.kind
     if depolarisation_noise is not None and "depolarisation" not in kind.keywords:
-        raise UsageError('`depolarisation_noise` goes with `signal="psi-delta"`: leave it out')
+        [word] = [word for word, x in KINDS.items() if "depolarisation" in x.keywords]
+        raise UsageError(f'`depolarisation_noise` goes with `signal="{word}"`: leave it out')
     kind = kind if elements is None else of_parts(elements, light.signal)
     for name, given in (("angle", light.angle), ("azimuth", light.azimuth)):
         if np.ndim(given) and np.shape(given) != nm.shape:

@@ -125,9 +125,9 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
     arrays = view.signal.curves(data, model, weight)
-    if spectrum.depolarisation is not None:
+    if (share := spectrum.kind.share) is not None:
         # a scene without depolarisation has none at any wavelength
-        arrays["depolarisation_data"] = spectrum.depolarisation
+        arrays["depolarisation_data"] = share.measured(spectrum)
         arrays.setdefault("depolarisation_model", np.zeros(rows))
     return Curve(
         wavelength=wavelength,

@@ -197,18 +197,14 @@ def unexplained_depolarisation(
     the scene has none."""
     sentences = []
     for spectrum, measured, view in zip(data, spectra, views, strict=True):
-        if (
-            not isinstance(spectrum, Spectrum)
-            or spectrum.depolarisation is None
-            or view.signal.depolarisation
-        ):
+        share = spectrum.kind.share if isinstance(spectrum, Spectrum) else None
+        if share is None or view.signal.depolarisation:
             continue
-        if spectrum.depolarisation_sigma is None:
-            parts = [local_noise(spectrum.depolarisation[rows]) for rows in view.sweeps()]
-            noise = math.sqrt(np.mean(np.concatenate(parts) ** 2))
-        else:
-            noise = math.sqrt(np.mean(spectrum.depolarisation_sigma**2))
-        mean_square = float(np.mean(spectrum.depolarisation**2))
+        values, sigma = share.measured(spectrum), share.error(spectrum)
+        if sigma is None:
+            sigma = np.concatenate([local_noise(values[rows]) for rows in view.sweeps()])
+        noise = math.sqrt(np.mean(sigma**2))
+        mean_square = float(np.mean(values**2))
         by_chance = 1 + _CHANCE * math.sqrt(2 / len(spectrum))
         excess = math.sqrt(max(mean_square - by_chance * noise**2, 0.0))
         if excess > measured.scene.uncertainty.depolarisation:

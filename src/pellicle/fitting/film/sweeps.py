@@ -140,9 +140,9 @@ def _steps(
             result.append((np.zeros((0, len(gain))), np.zeros(len(gain))))
             continue
         apart = deviations(spectrum.sweeps)
-        if view.signal.depolarisation:
-            own = np.stack([sweep.depolarisation for sweep in spectrum.sweeps])  # type: ignore[misc]
-            apart = np.concatenate([apart, (own - own.mean(axis=0))[..., None]], axis=2)
+        if (share := view.signal.share) is not None:
+            shares = np.stack([share.measured(sweep) for sweep in spectrum.sweeps])
+            apart = np.concatenate([apart, (shares - shares.mean(axis=0))[..., None]], axis=2)
         if view.data.frame is not None:
             apart = np.einsum("pij,spj->spi", np.asarray(view.data.frame)[: view.rows], apart)
         weight = np.asarray(view.data.weight)[: view.points] / math.sqrt(fit.variance)
