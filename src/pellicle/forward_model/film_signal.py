@@ -123,7 +123,7 @@ def build(plan: Plan) -> Simulate:
         rows = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
         rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
-        return stack_rows(rows).T.reshape(-1) if ellipsometric else rows[0]
+        return stack_rows(rows).T.reshape(-1) if ellipsometric else kind.of_power(rows[0])
 
     return simulate if plan.reference is None else _against(simulate, build(plan.reference))
 

@@ -274,6 +274,10 @@ class Signal(ABC):
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
         """Return the rows of the signal, of averaged sums of intensities (traced)."""
 
+    def of_power(self, power: Any) -> Any:
+        """Return the signal of the simulated R or T (points,), behind the averages (traced)."""
+        return power
+
     @abstractmethod
     def drawn(self, rows: Any) -> Any:
         """Return the quantities (quantities, points) of simulated rows (points, rows) (traced)."""
