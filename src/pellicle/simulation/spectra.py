@@ -77,6 +77,7 @@ def simulate_spectrum(
     given = {"depolarisation_noise": depolarisation_noise, "kind": kind}
     simulated = simulate_signal(scene, nm, noise, seed, **given)
     share, share_noise = simulated.depolarisation, simulated.depolarisation_noise
+    share_sigma = np.full(nm.shape, share_noise) if share is not None and share_noise > 0 else None
     arrays = kind.arrays(simulated.values.reshape(nm.size, -1))
     return Spectrum(
         nm,
@@ -86,9 +87,7 @@ def simulate_spectrum(
         azimuth=None if light.azimuth is None else np.broadcast_to(light.azimuth, nm.shape),
         folded=False,
         depolarisation=share,
-        depolarisation_sigma=np.full(nm.shape, share_noise)
-        if share is not None and share_noise > 0
-        else None,
+        depolarisation_sigma=share_sigma,
         transmission=light.transmission,
         **arrays,
         **(kind.errors(arrays["values"], noise) if noise > 0 else {}),
