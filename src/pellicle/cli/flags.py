@@ -14,7 +14,7 @@ from pellicle.data.options import CameraOptions, FileOptions, FitOptions, Option
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.scene.film import Scene
+    from pellicle.scene.film import Light, Scene
 
 SCENE = Group("Scene", sort_key=1)
 INSTRUMENT = Group("Instrument", sort_key=2)
@@ -171,7 +171,6 @@ class SceneFlags(Flags):
 
     def scene(self, reading: FileOptions) -> Scene:
         """Build the scene that the flags describe, in the light of `reading`. Raises UsageError."""
-        from pellicle.cli.reading import light
         from pellicle.recipes import media_words as w
         from pellicle.scene.film import Scene
         from pellicle.scene.free import Free
@@ -218,6 +217,20 @@ class SceneFlags(Flags):
         if self.plate_mm is not None and not 0 < self.plate_mm < inf:
             raise UsageError(f"--plate-mm must be a finite number above zero, got {self.plate_mm:g}")
         return self.layer, self.substrate
+
+
+def light(reading: FileOptions, azimuth: Any = None) -> Light:
+    """Signal, angle and polarisation of a scene, where the file does not give them.
+
+    `azimuth` of the sample in degrees is that of a recipe: films that have one cannot be described by flags.
+    """
+    from pellicle.recipes.film import incidence, light_signal
+    from pellicle.scene.film import Light
+
+    signal = light_signal(reading.signal, reading.transmitted)
+    through = bool(reading.transmission and reading.signal)
+    polarisation = reading.polarisation or "unpolarised"
+    return Light(None, incidence(reading.angle), signal, polarisation, azimuth, through)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,11 @@ from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, named
+from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, light, named
 from pellicle.cli.reading import (
     check_camera,
     check_words,
     is_of_colours,
-    light,
     of_kind,
     read,
     read_films,

@@ -11,14 +11,31 @@ import re
 import shlex
 from dataclasses import replace
 from functools import cache
-from inspect import signature
 from typing import TYPE_CHECKING
+
+from pellicle.cli.flags import Flags
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
 
 _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
+_COMMAND_ARGUMENTS = (
+    "depth",
+    "invert",
+    "joint",
+    "no_browser",
+    "numbers",
+    "port",
+    "posterior",
+    "recipe",
+    "repeats",
+    "strip",
+    "thickness_map",
+    "to",
+    "view",
+)
+"""Flags that one command has outside the groups of `pellicle.cli.flags`."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
 
 _QUOTED = re.compile(r"`([^`]+)`")
@@ -27,17 +44,11 @@ _QUOTED = re.compile(r"`([^`]+)`")
 @cache
 def flag_names() -> dict[str, str]:
     """The flag of each argument that a message may name: that of a command, of the same name."""
-    from pellicle.cli import COMMANDS
-    from pellicle.cli.flags import Flags
-
     groups = [Flags]
     for group in groups:
         groups += group.__subclasses__()
     names = {name for group in groups for name in getattr(group, "__dataclass_fields__", ())}
-    for command in COMMANDS:
-        for name, about in signature(command).parameters.items():
-            if about.kind is about.KEYWORD_ONLY and "name='*'" not in about.annotation:
-                names.add(name)
+    names.update(_COMMAND_ARGUMENTS)
     return {name: f"--{name.replace('_', '-')}" for name in names} | _OTHER_NAMES
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from pellicle.cli.flags import named
+from pellicle.cli.flags import light, named
 from pellicle.cli.session import say
 from pellicle.data.options import COLOURS, SPACES, CameraOptions, FileOptions, SpectrumOptions
 from pellicle.errors import UsageError
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
     from pellicle.recipes.film import FilmRecipe
-    from pellicle.scene.film import Light
 
 _PIXELS = ("region", "points")
 
@@ -24,20 +23,6 @@ _PIXELS = ("region", "points")
 def of_kind(kind: str) -> set[str]:
     """Names of the reading options that apply to a kind of data."""
     return {name for name, (_, option) in FileOptions.declared().items() if kind in option.kinds}
-
-
-def light(reading: FileOptions, azimuth: Any = None) -> Light:
-    """Signal, angle and polarisation of a scene, where the file does not give them.
-
-    `azimuth` of the sample in degrees is that of a recipe: films that have one cannot be described by flags.
-    """
-    from pellicle.recipes.film import incidence, light_signal
-    from pellicle.scene.film import Light
-
-    signal = light_signal(reading.signal, reading.transmitted)
-    through = bool(reading.transmission and reading.signal)
-    polarisation = reading.polarisation or "unpolarised"
-    return Light(None, incidence(reading.angle), signal, polarisation, azimuth, through)
 
 
 def read(path: str, options: FileOptions, *, free_scale: bool) -> list[Spectrum]:

@@ -60,7 +60,8 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     import equinox as eqx
     import numpy as np
 
-    from pellicle.cli.reading import light, read
+    from pellicle.cli.flags import light
+    from pellicle.cli.reading import read
     from pellicle.scene.film import Light
     from pellicle.scene.instrument import Drift
 
