@@ -11,8 +11,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-
-from .test_plates import ANGLE, GLASS, NM, TO_STOKES, ncs
+from tests.forward_model.test_plates import ANGLE, GLASS, NM, TO_STOKES, ncs
 
 FILM, DEPTH, BULK = 1.46, 1000.0, 3.9 + 0.02j
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(15)

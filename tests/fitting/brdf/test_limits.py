@@ -150,7 +150,8 @@ def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
     surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,))
     monkeypatch.setattr(module, "search", search_from([0.6, 0.7]))
-    monkeypatch.setattr(shared, "limits", lambda around, scans: [tilt, azimuth])
+    of_one_fit = [np.array([pair], float) for pair in zip(tilt, azimuth, strict=True)]
+    monkeypatch.setattr(shared, "limits", lambda around, scans: Limits(*of_one_fit))
     result = fit(turned, surface)
     assert result["deviation"].value == pytest.approx(8.0, abs=0.1)
     estimate = result["azimuth"]
