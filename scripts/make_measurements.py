@@ -14,7 +14,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from pellicle.cli.simulate import simulate
+from pellicle.cli.simulate import SimulationFlags, simulate
 from pellicle.files import write_text
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,7 +27,7 @@ def main(folder: Path) -> None:
     for seed, recipe in enumerate(sorted((ROOT / "measurements" / "recipes").glob("*.toml")), start=1):
         target = folder / f"{recipe.stem}.csv"
         if not target.exists():
-            simulate(str(recipe), out=str(target), seed=seed)
+            simulate(str(recipe), out=str(target), how=SimulationFlags(seed=seed))
         rows.append(_row(recipe, target, seed))
     rows += _other_rows(folder / "INDEX.csv")
     text = io.StringIO()

@@ -345,9 +345,8 @@ def test_noise_that_is_none(write, noise):
 
 def test_flags_with_unknown_words(write):
     path = write("wl,R\n" + GOOD)
-    with pytest.raises(
-        UsageError, match="`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, not 'X'"
-    ):
+    words = "R, T, psi-delta, mueller, generalised-psi-delta, contrast"
+    with pytest.raises(UsageError, match=f"`signal` must be one of {words}, not 'X'"):
         read_spectrum(path, signal="X")
     with pytest.raises(UsageError, match="`polarisation` must be one of s, p, unpolarised, not 'q'"):
         read_spectrum(path, polarisation="q")

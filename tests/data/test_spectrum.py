@@ -60,7 +60,7 @@ def test_impossible_values(values, changes, message):
     [
         (
             {"signal": "Rs"},
-            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, counts, not",
+            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, contrast, counts, not",
         ),
         ({"polarisation": "x"}, "`polarisation` must be one of s, p, unpolarised, not 'x'"),
         ({"signal": "psi-delta"}, "`delta` goes with `signal"),

@@ -67,7 +67,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: pl.Plate(1.5, 0), "`plate_mm` must be above 0 mm"),
         (
             lambda: pl.Light(signal="A"),
-            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, not 'A'",
+            "`signal` must be one of R, T, psi-delta, mueller, generalised-psi-delta, contrast, not 'A'",
         ),
         (lambda: pl.Light(polarisation="TE"), "`polarisation` must be one of unpolarised, s, p, not 'TE'"),
         (lambda: pl.Light(angle=95), "`angle` of incidence must lie in 0 to 90 degrees, got 95"),

@@ -15,6 +15,7 @@ from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.evaluation import Static, explained
 from pellicle.fitting.problem import Explained, Problem
 from pellicle.programs.cache import kept
+from pellicle.signals.base import Signal
 
 
 class Systematics(NamedTuple):
@@ -126,14 +127,16 @@ def log_density(problem: Problem, effects: Systematics | None = None) -> LogDens
 def fingerprint(parts: Sequence[tuple[Any, ...]], *settings: Any) -> str:
     """SHA-256 hash of everything that a posterior depends on, to match a chain with its problem.
 
-    `parts` are data and scenes with bounds and priors, as pytrees of numbers and strings.
+    `parts` are data and scenes with bounds and priors, as pytrees of numbers, strings and kinds of signals.
     """
     digest = hashlib.sha256(",".join(map(repr, settings)).encode())
     for part in parts:
         leaves, structure = jax.tree_util.tree_flatten(tuple(part))
         digest.update(str(structure).encode())
         for leaf in leaves:
-            digest.update(leaf.encode() if isinstance(leaf, str) else np.asarray(leaf).tobytes())
+            # the bytes of an object are its address, which differs between runs
+            named = isinstance(leaf, str | Signal)
+            digest.update(repr(leaf).encode() if named else np.asarray(leaf).tobytes())
     return digest.hexdigest()
 
 
