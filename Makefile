@@ -95,7 +95,9 @@ browser-tests: $(VENV)/.dev
 
 # long statistical tests, and tests that a cheaper one covers
 slow: $(VENV)/.dev
-	$(KEEP_MEMORY) $(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow --durations 8
+	$(KEEP_MEMORY) $(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow $(EXACT)
+	$(KEEP_MEMORY) $(QUICK_COMPILE) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow --durations 8 \
+	  $(addprefix --ignore=,$(EXACT))
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
