@@ -25,7 +25,7 @@ ROUNDS, SECONDS = 40, 15.0
 """Most rounds in which the methods are timed in turn, and about how long all of them may take together."""
 
 SAMPLES = {"forward": "spectrum", "colour": "colour", "brdf": "sample"}
-"""What one evaluation of a method of a kind computes."""
+"""Result of one evaluation of a method, for each kind of method."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Comparison:
 
     @property
     def sample(self) -> str:
-        """What one evaluation computes: a spectrum, a colour, a sample of a BRDF."""
+        """Result of one evaluation: a spectrum, a colour, a sample of a BRDF."""
         return SAMPLES[self.kind]
 
     @property
@@ -209,7 +209,7 @@ def measure(
 
 
 class OnData(NamedTuple):
-    """How methods of one kind are measured on simulated data sets.
+    """Measurement of methods of one kind on simulated data sets.
 
     `problem` is what a method is applied to, whose computation is not timed. `score` returns the score of an
     answer on a data set. `summary` turns all scores of a method into its error and details.

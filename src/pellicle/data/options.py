@@ -178,7 +178,7 @@ def _declared(record: type[Options]) -> dict[str, tuple[Any, Option]]:
 
 @dataclass(frozen=True, kw_only=True)
 class CameraOptions(Options):
-    """What sees the colours of a film, and under which light; `[camera]` of a recipe. Files are CSV."""
+    """Observer or camera of the colours of a film, and its light; `[camera]` of a recipe. Files are CSV."""
 
     observer: Annotated[
         str | None, Option("1931 (2 degrees) or 1964 (10 degrees).", kinds=(COLOURS,), words=("1931", "1964"))
@@ -226,7 +226,7 @@ class CameraOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumOptions(Options):
-    """How a spectrum is read: arguments of `pellicle.read_spectrum`."""
+    """Options of reading a spectrum: arguments of `pellicle.read_spectrum`."""
 
     spectrum: Annotated[str | None, Option("Name of one of several spectra or films in a file, or all.")] = (
         None
@@ -301,7 +301,7 @@ class SpectrumOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingOptions(SpectrumOptions):
-    """How files of data are read; `[data]` and `[[data.file]]` of a recipe."""
+    """Options of reading files of data; `[data]` and `[[data.file]]` of a recipe."""
 
     noise: Annotated[
         float | str | None,
@@ -347,7 +347,7 @@ class ReadingOptions(SpectrumOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class FitOptions(Options):
-    """How data are fitted; keys of `[data]` of a recipe."""
+    """Options of a fit; keys of `[data]` of a recipe."""
 
     loss: Annotated[
         str | None,

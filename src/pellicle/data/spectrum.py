@@ -136,7 +136,7 @@ class Spectrum:
 
     @property
     def kind(self) -> Signal:
-        """What the numbers are, and how a fit compares them."""
+        """Kind of the signal: quantities, units, and their comparison in a fit."""
         return KINDS[self.signal].of(self)
 
     def _find_folding(self) -> None:

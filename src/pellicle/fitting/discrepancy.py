@@ -448,7 +448,7 @@ class _Balance:
 
 
 def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.ndarray]:
-    """What remains of the residuals of a view, with numbers (fits,), and the noise (fits,) of its points."""
+    """Remaining residuals of a view, with numbers (fits,), and the noise (fits,) of its points."""
     noise, left = np.array(view.noise, float), balance.rest * view.sigma
     # a signal of its own, such as one ratio, is not diluted by others that the scene has right
     signals = [list(group) for group in view.signals] or [slice(None)]

@@ -47,17 +47,17 @@ class Parameter:
     levels: int | None = None
 
     def on_ends(self, values: Any) -> tuple[Any, Any]:
-        """Whether values (...) lie on the lower and on the upper bound."""
+        """Test if values (...) lie on the lower and on the upper bound."""
         margin = ON_BOUND * (self.upper - self.lower)
         return values - self.lower <= margin, self.upper - values <= margin
 
     def on_bound(self, values: Any) -> Any:
-        """Whether values (...) rest on a bound."""
+        """Test if values (...) rest on a bound."""
         lower, upper = self.on_ends(values)
         return (lower | upper) & (not self.periodic)
 
     def on_natural_bound(self, values: Any) -> Any:
-        """Whether values (...) lie on a bound that physics sets, an absence or a whole. A thickness of 0 is
+        """Test if values (...) lie on a bound that physics sets, an absence or a whole. A thickness of 0 is
         none of them: no layer."""
         none = self.natural[0] and self.lower == 0 and self.key != "thickness"
         whole = self.natural[1] and self.upper == 1

@@ -40,7 +40,7 @@ _OTHERWISE = {
     "scene": "is of another scene",
     "options": "was made with other options",
 }
-"""What is stated of a store whose identity differs in one of its parts."""
+"""Messages on a store whose identity differs in one of its parts."""
 STATUS = "status"
 ORDER = "order"
 """Name of the axis of the minima of a pixel, best first."""

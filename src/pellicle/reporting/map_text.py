@@ -23,7 +23,7 @@ ERRORS = (
     "The standard error (`stderr`) contains systematic effects, which are common to all pixels: use it for"
     " the value at a pixel. Differences between pixels have the error of the noise alone (`stderr_noise`)."
 )
-"""Which error to use for what."""
+"""Explanation of the errors of a map, and when to use which."""
 _ADVICE = {str(status): text for status, text in ADVICE.items()} | {
     BY_NEIGHBOURS: "Use the numbers where the thickness cannot jump: the order follows from the neighbours'.",
 }

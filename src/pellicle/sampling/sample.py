@@ -132,7 +132,7 @@ def _columns(samples: Sequence[BrdfSamples]) -> list[tuple[Any, ...]]:
 
 
 def _subject(fitted: _Fitted) -> Subject:
-    """What is sampled: the log posterior with its systematic effects, its minima and its predictions."""
+    """Subject of sampling: the log posterior with its systematic effects, its minima and its predictions."""
     fit, ranked = fitted.fit, fitted.ranked.counted
     jacobian, covariance = linearised(ranked)
     residuals, problem = fitted.measurements(ranked).evidence(jacobian), ranked.problem.affine()

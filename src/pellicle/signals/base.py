@@ -1,4 +1,4 @@
-"""What every kind of signal answers."""
+"""Abstract kind of signal: the interface of all kinds."""
 
 from __future__ import annotations
 
@@ -151,9 +151,9 @@ class Signal(ABC):
     word: ClassVar[str]
     """The word of recipes, flags and files."""
     title: ClassVar[str]
-    """What a summary calls it."""
+    """Its name in summaries."""
     noun: ClassVar[str]
-    """What a sentence calls it."""
+    """Its name in sentences."""
     simulated: ClassVar[str]
     """Quantity of the simulated light: "R", "T" or "Stokes"."""
     has_scale: ClassVar[bool] = False

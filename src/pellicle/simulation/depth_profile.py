@@ -1,4 +1,4 @@
-"""Where a film absorbs light: absorptance of each layer, |E|² and absorbed power density against depth."""
+"""Absorption of light in a film: absorptance of each layer, |E|² and absorbed power density against depth."""
 
 from __future__ import annotations
 

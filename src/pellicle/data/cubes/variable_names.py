@@ -29,7 +29,7 @@ class Chosen:
 
     @property
     def stated(self) -> dict[str, Any]:
-        """What the names state, as arguments of a `RawCube`."""
+        """Statements of the names, as arguments of a `RawCube`."""
         about = {"signal": self.signal, "polarisation": self.polarisation}
         return {**about, "signal_unit": self.unit, "calibrated": self.calibrated}
 

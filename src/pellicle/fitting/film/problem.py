@@ -31,7 +31,7 @@ def shortest_wavelength(problem: Problem) -> float:
 
 
 class Structure(NamedTuple):
-    """What a scene and its grid alone determine about a view: the same for every spectrum.
+    """Structure of a view that scene and grid alone determine: the same for every spectrum.
 
     `scene` has padded wavelengths, sampled media and anonymous parameters; `largest_index` is that of its
     coherent layers over the bounds.

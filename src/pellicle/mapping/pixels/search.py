@@ -29,7 +29,7 @@ _MOST_PRODUCTS = 4_000_000
 """Numbers of the product of a block of pixels with the table, 16 MB: larger tables have smaller blocks."""
 _MOST_PIXELS, _FEWEST_PIXELS = 1024, 64
 _CHANCE, _REACH = 20.0, 1.25
-"""Which candidates are polished: as in `fitting.film.search`."""
+"""Candidates that are polished, chosen as in `fitting.film.search`."""
 _SCALE = 0.02
 """Relative error of a scene or an instrument: candidates that it could put before the best are polished too,
 because differences of χ² count less by what a scene may leave out."""

@@ -83,7 +83,7 @@ def fit_page(
 
 
 def _tables(fit: Fit) -> dict[str, Any]:
-    """What the template takes of a fit beside its figures: words, tables and swatches."""
+    """Words, tables and swatches of a fit for the template, beside its figures."""
     return {
         "tone": TONES[fit.status],
         "status": str(fit.status),

@@ -1,4 +1,4 @@
-"""What repeats a fit, and the sources to cite with it."""
+"""Recipe and command that repeat a fit, and the sources to cite with it."""
 
 from __future__ import annotations
 
