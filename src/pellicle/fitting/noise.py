@@ -88,7 +88,7 @@ def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
     """
     points = values.shape[-1]
     if points < 5:
-        return np.maximum(np.ptp(values, axis=-1), 1e-12)
+        return np.asarray(np.maximum(np.ptp(values, axis=-1), 1e-12))
     rough, reach = _roughness(values.reshape(-1, points)), min(window, points) // 2
     around = np.pad(rough, [(0, 0), (reach, reach)], mode="reflect")
     ordered = np.sort(rough, axis=1)
