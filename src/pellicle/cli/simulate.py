@@ -117,7 +117,7 @@ def simulate(
 
 
 def _source(recipe: str, noise: Any, seed: int) -> str:
-    """How a file was made, as a comment."""
+    """Comment on the origin of a simulated file."""
     said = f"{noise:g}" if isinstance(noise, float | int) else noise
     return f"recipe {Path(recipe).name}, seed {seed}, noise {said}, pellicle {version('pellicle')}"
 

@@ -154,7 +154,7 @@ class NoiseEstimate(NamedTuple):
         return length * size * self.inflation
 
     def fraction(self, source: Noise) -> Any:
-        """How much (...) of an independent point each point counts for in the ranking."""
+        """Share (...) of an independent point that each point counts for in the ranking."""
         return np.minimum(1 / self.length, 1 / DRIFT_CORRELATION if source.drifting else 1.0)
 
     def effective_freedom(self, source: Noise) -> Any:

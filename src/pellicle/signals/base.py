@@ -205,7 +205,7 @@ class Signal(ABC):
 
     @property
     def error_unit(self) -> str:
-        """What an error of the simulated light is stated in: `of R`."""
+        """Unit in which an error of the simulated light is stated: `of R`."""
         return f"of {self.word}"
 
     @property

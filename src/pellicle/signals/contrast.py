@@ -16,7 +16,7 @@ FORMS = {"relative": "(R - R0)/R0", "normalised": "(R - R0)/(R + R0)"}
 LIMITS = (-1.0, 50.0)
 """Least contrast, that of a black sample, and a largest one: above, the values are in percent."""
 _NOISE = 0.05, 5.0
-"""What calibration may take a contrast below its least value, or noise in σ."""
+"""Distance by which calibration may take a contrast below its least value, and noise in σ."""
 
 
 @final

@@ -92,8 +92,8 @@ class Program(NamedTuple):
 
 
 class _Judged(NamedTuple):
-    """What the indices of a scene allow: which layers and whether its substrate are no gas, whether that
-    oxidises, and whether the last layer is like an oxide already."""
+    """Effects that the indices of a scene allow: which layers and whether its substrate are no gas, whether
+    that oxidises, and whether the last layer is like an oxide already."""
 
     layers: tuple[bool, ...]
     substrate: bool
@@ -116,7 +116,7 @@ def extended(view: SpectrumView | ColoursView, values: np.ndarray) -> ExtendedSc
 
 @remembered
 def _depends(scene: Scene) -> tuple[bool, bool]:
-    """Whether the free numbers of a scene change what its media are, and whether they change its plan."""
+    """Test if the free numbers of a scene change what its media are, and if they change its plan."""
     blurred = scene.instrument.bandwidth is not None or any(
         isinstance(layer, Layer) and thickness_spread(scene, layer) is not None for layer in scene.layers
     )
@@ -127,7 +127,7 @@ def _depends(scene: Scene) -> tuple[bool, bool]:
 
 @remembered
 def _judged(scene: Scene, values: tuple[float, ...] | None) -> _Judged:
-    """What the indices allow at these values of the free numbers; None where no medium has any."""
+    """Effects that the indices allow at these values of the free numbers; None where no medium has any."""
     free = free_leaves(scene)
     at = insert(scene, [0.5] * len(free) if values is None else values)
     nm, foot = np.asarray(at.light.wavelength), at.layers[-1]

@@ -15,6 +15,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.result import Fit, Status
 from pellicle.signals.folded_delta import can_be_folded
+from pellicle.signals.mueller import reversed_elements
 
 _NO_FIT = (Status.FAILED, Status.NOT_CONVERGED, Status.MISFIT)
 _LARGE = 3.0
@@ -39,7 +40,7 @@ def remarks(spectra: Data, rms: Sequence[float], fitted: Callable[[Data], Fit]) 
             f"delta lies within 0 to 180, and read as folded it would fit, with {value}: give `folded=True`"
         )
     if (other := _with_other_signs(spectra)) is not None and (value := _explaining(fitted(other))):
-        each = [reversed_elements(s) for s in other if isinstance(s, Spectrum)]
+        each = [reversed_elements(s.elements) for s in other if isinstance(s, Spectrum)]
         names = ", ".join(dict.fromkeys(name for elements in each for name in elements))
         sentences.append(
             f"with the opposite signs of {names} it would fit, with {value}: the file follows the other "
@@ -79,17 +80,14 @@ def as_folded(spectra: Sequence[Spectrum | Colours]) -> Data | None:
 
 def _with_other_signs(spectra: Sequence[Spectrum | Colours]) -> Data | None:
     """The spectra with the opposite sign of m14, m24, m34, m41, m42, m43; None where none has one of them."""
-    turned = [_reversed(s) if isinstance(s, Spectrum) and reversed_elements(s) else s for s in spectra]
+    turned = [
+        _reversed(s) if isinstance(s, Spectrum) and reversed_elements(s.elements) else s for s in spectra
+    ]
     return None if all(a is b for a, b in zip(turned, spectra, strict=True)) else turned
 
 
-def reversed_elements(spectrum: Spectrum) -> list[str]:
-    """The elements that have the fourth Stokes parameter on one side."""
-    return [name for name in spectrum.elements if ("4" in name[1]) != ("4" in name[2])]
-
-
 def _reversed(spectrum: Spectrum) -> Spectrum:
-    signs = np.where(np.isin(spectrum.elements, reversed_elements(spectrum)), -1.0, 1.0)
+    signs = np.where(np.isin(spectrum.elements, reversed_elements(spectrum.elements)), -1.0, 1.0)
     sweeps = tuple(_reversed(sweep) for sweep in spectrum.sweeps)
     return replace(spectrum, values=spectrum.values * signs, sweeps=sweeps)
 
