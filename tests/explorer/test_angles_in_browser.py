@@ -64,8 +64,7 @@ def opened(browser, address):
 def settle(page):
     page.wait_for_selector(".plot[data-ready]")
     page.wait_for_selector(".plan li")
-    page.wait_for_selector("main:not(.compiling)", timeout=60_000)
-    page.wait_for_timeout(500)
+    page.wait_for_selector("main:not([data-busy])", timeout=60_000)
 
 
 def traces(page, mode="lines"):
@@ -130,7 +129,7 @@ def test_a_slider_moves_every_curve_and_the_list_is_edited_by_keys(opened):
     slider(page).focus()
     for _ in range(3):
         page.keyboard.press("PageUp")
-    page.wait_for_timeout(700)
+    settle(page)
     value = float(page.get_by_role("spinbutton", name="thickness (nm)").input_value())
     assert value > 250
     assert agrees(page, (65, 70, 75), value)
@@ -218,7 +217,7 @@ def test_a_dropped_file_of_several_angles_is_fitted_and_one_wavelength_is_drawn_
     assert data["Δ 65°"]["color"] == traces(page)["Δ 65°"]["color"] != data["Δ 55°"]["color"]
     page.get_by_role("button", name="Fit", exact=True).click()
     page.wait_for_selector(".fitted p", timeout=120_000)
-    page.wait_for_timeout(500)
+    settle(page)
     thickness = page.get_by_role("spinbutton", name="thickness (nm)")
     assert float(thickness.input_value()) == pytest.approx(320.0, abs=0.3)
     drop(page, "laser.csv", measured(np.arange(50.0, 71.0, 2.0), np.array([633.0])))

@@ -96,8 +96,7 @@ def settle(page):
     page.wait_for_selector(".plot[data-ready]")
     page.wait_for_selector(".plan li")
     page.wait_for_selector(".sphere:not([hidden])")
-    page.wait_for_selector("main:not(.compiling)")
-    page.wait_for_timeout(400)
+    page.wait_for_selector("main:not([data-busy])")
 
 
 def curve(page, name="R", axis="y"):
@@ -190,7 +189,7 @@ def test_keys_on_a_slider_move_everything(opened):
     slider(page).focus()
     for _ in range(3):
         page.keyboard.press("PageUp")
-    page.wait_for_timeout(600)
+    settle(page)
     after = shown(page)
     value = float(number(page).input_value())
     assert value > 250
@@ -199,7 +198,7 @@ def test_keys_on_a_slider_move_everything(opened):
     assert all(after[key] != before[key] for key in before)
     assert f"thickness={value:g}" in after["address"]
     page.keyboard.press("Delete")
-    page.wait_for_timeout(600)
+    settle(page)
     assert np.allclose(curve(page), before["curve"])
     assert page.url == before["address"]
 
@@ -214,14 +213,14 @@ def test_a_drag_moves_everything_and_a_double_click_resets(opened):
     page.wait_for_timeout(500)
     assert page.url == before["address"]  # the address follows the release
     page.mouse.up()
-    page.wait_for_timeout(600)
+    settle(page)
     after = shown(page)
     value = float(number(page).input_value())
     assert 400 < value < 520
     assert agrees(page, value)
     assert all(after[key] != before[key] for key in before)
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
-    page.wait_for_timeout(600)
+    settle(page)
     assert number(page).input_value() == "250"
     assert np.allclose(curve(page), before["curve"])
 
@@ -237,7 +236,7 @@ def test_a_number_is_typed(opened):
     box = number(page)
     box.fill("123.4")
     box.press("Enter")
-    page.wait_for_timeout(500)
+    settle(page)
     assert agrees(page, 123.4)
     box.fill("9999")
     box.press("Tab")
@@ -253,7 +252,7 @@ def test_a_dropped_file_is_drawn_and_fitted(opened):
     fit = page.get_by_role("button", name="Fit", exact=True)
     fit.click()
     page.wait_for_selector(".fitted p", timeout=120_000)
-    page.wait_for_timeout(500)
+    settle(page)
     box = number(page)
     assert float(box.input_value()) == pytest.approx(320.0, abs=1.0)
     assert "±" in page.locator(".error-of-fit").first.inner_text()
@@ -284,7 +283,7 @@ def test_a_bad_file_gives_one_sentence_and_the_page_lives_on(opened, name):
     assert "\n" not in said
     assert "Traceback" not in said
     slider(page).press("PageUp")
-    page.wait_for_timeout(600)
+    settle(page)
     value = float(number(page).input_value())
     assert agrees(page, value)
     drop(page, "wafer.csv", csv())
@@ -334,7 +333,7 @@ def test_one_request_is_sent_at_a_time_and_the_newest_next(browser, address):
     slider(page).focus()
     for _ in range(10):
         page.keyboard.press("ArrowRight")
-    page.wait_for_timeout(1500)
+    settle(page)
     last = float(number(page).input_value())
     assert bodies[-1] == last
     assert len(bodies) < 10
@@ -364,7 +363,7 @@ def test_a_surface_shows_its_lobes_in_one_panel_and_takes_no_data(browser, tmp_p
     assert page.evaluate("document.querySelector('.plot').data.map((t) => t.yaxis)") == ["y"] * 3
     assert min(map(min, lobes)) >= 0
     slider(page).press("PageUp")
-    page.wait_for_timeout(1000)
+    settle(page)
     assert curve(page, "645 nm") != lobes[0]
     assert page.locator(".patch").is_hidden()
     assert page.get_by_role("button", name="Open data").is_hidden()

@@ -49,10 +49,18 @@ export async function explore(element, call, options = {}) {
   }
   /** The answer; what is wrong is shown, and removed by the next answer of its kind. */
   async function ask(request, body = {}) {
-    const answer = await call(request, angles === null ? body : { angles, ...body }).catch((error) => ({ error: error.message }));
+    const sent = call(request, angles === null ? body : { angles, ...body }).catch((error) => ({ error: error.message }));
+    const answer = await during(sent);
     trouble(request, answer.error);
     return answer;
   }
+  /** The promise; `data-busy` says until it ends, and while a slider is moved, that what is shown may be old. */
+  function during(promise) {
+    pending += 1;
+    showBusy();
+    return promise.finally(() => { pending -= 1; showBusy(); });
+  }
+  const showBusy = () => element.toggleAttribute("data-busy", gesture || pending > 0 || planTimer !== null || againTimer !== null);
 
   // ---- elements ----
   const status = make("p", { class: "status soft", role: "status" });
@@ -80,6 +88,7 @@ export async function explore(element, call, options = {}) {
   let gesture = false; // a slider is being moved
   let planTimer = null;
   let againTimer = null;
+  let pending = 0; // requests and drawings under way
   const unfinished = new Set(); // parts of the view whose programs are being compiled
   const values = () => Object.fromEntries(controls.map((each) => [each.about.name, each.value]));
   const view = (...want) => () => ({ values: values(), want, serial: ++serial, moving: gesture });
@@ -92,12 +101,12 @@ export async function explore(element, call, options = {}) {
     if (answer.colour) showColour(answer.colour);
     showWarnings(answer.warnings ?? []);
     compiling(answer, asked);
-    plot.draw(asked.moving).then(() => requestAnimationFrame(() => {
+    during(plot.draw(asked.moving)).then(() => requestAnimationFrame(() => {
       element.dispatchEvent(new CustomEvent("drawn", { detail: { values: asked.values, parts: Object.keys(answer) } }));
     }));
     askSphere(view("sphere"));
     clearTimeout(planTimer);
-    planTimer = setTimeout(() => askPlan(view("plan")), PLAN_AFTER);
+    planTimer = setTimeout(() => { planTimer = null; askPlan(view("plan")); }, PLAN_AFTER);
   });
   const askSphere = newestOf(asView, (answer, asked) => {
     compiling(answer, asked);
@@ -118,7 +127,7 @@ export async function explore(element, call, options = {}) {
     if (!unfinished.size) return was && say("");
     say(`Compiling for these effects: ${[...unfinished].join(", ")} …`);
     clearTimeout(againTimer);
-    againTimer = setTimeout(refresh, AGAIN_AFTER);
+    againTimer = setTimeout(() => { againTimer = null; refresh(); }, AGAIN_AFTER);
   }
 
   function showColour(colour) {
