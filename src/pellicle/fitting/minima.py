@@ -139,19 +139,14 @@ def settled(
 
 def distinct(problem: Problem, minima: Minima, most: int) -> Minima:
     """At most `most` minima, best first, those of one place once."""
-    order = np.argsort(minima.deviance, kind="stable")
+    order, units = np.argsort(minima.deviance, kind="stable"), minima.units
+    columns = zip(problem.parameters, units.T, strict=True)
+    resolution = np.stack([p.resolutions_at(column) for p, column in columns], axis=1)
     kept: list[int] = []
-    for i in order:
-        if np.isfinite(minima.deviance[i]) and all(
-            _apart(problem, minima.units[i], minima.units[j]) for j in kept
-        ):
+    for i in order[np.isfinite(minima.deviance[order])]:
+        if np.all(np.any(np.abs(units[i] - units[kept]) > resolution[i], axis=1)):
             kept.append(int(i))
     kept = (kept or [int(order[0])])[:most]
     return replace(
         minima, units=minima.units[kept], deviance=minima.deviance[kept], converged=minima.converged[kept]
     )
-
-
-def _apart(problem: Problem, one: np.ndarray, other: np.ndarray) -> bool:
-    pairs = zip(problem.parameters, one.tolist(), other.tolist(), strict=True)
-    return any(abs(x - y) > p.resolution_at(x) for p, x, y in pairs)

@@ -64,10 +64,6 @@ class Parameter:
         on_whole = values >= 1 - ON_BOUND * (1 - self.lower)
         return (none & (values <= ON_BOUND * self.upper)) | (whole & on_whole)
 
-    def resolution_at(self, unit: float) -> float:
-        """Distance from a point of the unit interval within which minima are one."""
-        return float(self.resolutions_at(np.array(unit)))
-
     def resolutions_at(self, units: np.ndarray) -> np.ndarray:
         """Distances from points of the unit interval within which minima are one."""
         if self.resolution is None:

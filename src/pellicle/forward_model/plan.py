@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 from pellicle.signals.base import Signal
@@ -94,7 +95,7 @@ class Plan:
         """Bound on the error of the signal by everything that the plan leaves out or averages."""
         return sum(row.error_bound for row in self.rows)
 
-    @property
+    @cached_property
     def static_key(self) -> Plan:
         """The plan without reasons and bounds: everything that a compiled program depends on."""
         rows = tuple(Row(row.effect, row.on, "", count=row.count, around=row.around) for row in self.rows)

@@ -19,6 +19,7 @@ from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.positive_definite import nonnegative
+from pellicle.scene.content import remembered
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0
@@ -170,14 +171,21 @@ def coefficients(
             continue
         _, sd = prior(drift)
         degree = len(sd) - 1
-        numbers = np.polynomial.chebyshev.chebfit(position, np.asarray(curve)[:points], degree)
-        basis = np.polynomial.chebyshev.chebvander(position, degree).T
+        basis, inverse = _basis(position, degree)
+        numbers = inverse @ np.asarray(curve)[:points]
         prior_sd = sd * (abs(numbers[0]) if name == "scale" else float(data.level))
         not_negative = name == "offset" and degree == 0
         for j, (number, column, own_sd) in enumerate(zip(numbers.tolist(), basis, prior_sd, strict=True)):
             full = f"instrument.{name}" + (f"_{j}" if j else "") + suffix
             result.append(Coefficient(full, number, column, own_sd, name == "scale", not_negative))
     return result
+
+
+@remembered
+def _basis(position: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Chebyshev polynomials (degree + 1, points), and the inverse that takes a curve to its coefficients."""
+    basis = np.polynomial.chebyshev.chebvander(position, degree).T
+    return basis, np.linalg.pinv(basis.T)
 
 
 def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[int, int]):

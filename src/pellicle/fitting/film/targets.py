@@ -15,6 +15,7 @@ from pellicle.fitting import noise
 from pellicle.fitting.film.colour_targets import MeasuredColours
 from pellicle.fitting.problem import Noise
 from pellicle.forward_model.film_signal import depolarises
+from pellicle.scene.content import remembered
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
@@ -56,10 +57,15 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
     _check(data, scene)
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
-    signal = data.kind.seen_in(scene, depolarises(exact(scene)))
+    signal = data.kind.seen_in(scene, _depolarised(scene))
     values, sigma, frame = signal.channels(data, _guess(data, source))
     known = values, sigma, signal, independent_fraction, source, name, frame
     return Measured(scene, data.wavelength, *known)
+
+
+@remembered
+def _depolarised(scene: Scene) -> bool:
+    return depolarises(exact(scene))
 
 
 def seen_as(scene: Scene, data: Spectrum) -> Scene:

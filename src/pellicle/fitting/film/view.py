@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -47,7 +48,7 @@ class SpectrumView:
     largest_index: float
     signal: Signal
 
-    @property
+    @cached_property
     def form(self) -> SpectrumForm:
         return SpectrumForm(self.plan.static_key, self.signal)
 
@@ -55,17 +56,17 @@ class SpectrumView:
     def arrays(self) -> tuple[Scene, Data]:
         return self.scene, self.data
 
-    @property
+    @cached_property
     def channels(self) -> int:
         """Data values at each wavelength."""
         return len(self.data.values) // len(self.scene.light.wavelength)
 
-    @property
+    @cached_property
     def rows(self) -> int:
         """Wavelengths without padding."""
         return self.points // self.channels
 
-    @property
+    @cached_property
     def measured_channels(self) -> int:
         """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
         return self.channels if self.data.frame is None else self.channels - self.signal.outwards
@@ -75,7 +76,7 @@ class SpectrumView:
         """Independent data values: N, C and S lie on a sphere, so two of the three; elements count each."""
         return sum(group.independent for group in self.noise_groups)
 
-    @property
+    @cached_property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
         """The channels of each noise."""
         return tuple(
