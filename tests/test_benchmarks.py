@@ -84,6 +84,7 @@ def test_device_that_is_absent_ends_with_code_2(benchmark, capsys):
     assert "no GPU on this machine, only cpu" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_device_table_shows_rate_limit_and_error(benchmark, capsys, monkeypatch):
     before = jax.config.jax_default_device
     film = benchmark("film")

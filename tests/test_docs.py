@@ -336,6 +336,7 @@ def test_slow_commands_run(page, run_page):
     run_page(page, slow=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
     [

@@ -28,6 +28,7 @@ def fixed(lower, upper, fit):
     return np.array([lower]), np.array([upper])
 
 
+@pytest.mark.slow
 def test_the_share_of_truths_inside_is_counted(several):
     methods = (
         Method("all", "", partial(fixed, 0.0, 1.0)),

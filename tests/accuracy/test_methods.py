@@ -41,6 +41,7 @@ def by_library(case, thickness=None, **changes):
     return np.asarray(reflectance(case.draws[:, 1:], layer, given["substrate"], given["angle"]))
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_left_out(oblique):
     k, d = oblique.draws.T
     assert np.all(k <= 0.2)

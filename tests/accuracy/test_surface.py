@@ -44,6 +44,7 @@ def films():
         return films_of(STEEL, random_draws(STEEL, 8))
 
 
+@pytest.mark.slow
 def test_the_error_of_a_method_is_true(films):
     """Against the textbook formula at steps of 1 nm."""
     eye = sensor("1931", "D65")
@@ -70,6 +71,7 @@ def renderer_errors(films, *names):
         return [colour_methods.error(eye, true, rungs[name].apply(films).run()) for name in names]
 
 
+@pytest.mark.slow
 def test_renderers_are_rungs(films):
     """glTF leaves out the extinction of steel, which MaterialX knows."""
     gltf, materialx = renderer_errors(films, "glTF, as it is", "MaterialX, as it is")

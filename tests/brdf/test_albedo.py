@@ -73,6 +73,7 @@ def test_a_narrow_lobe_reflects_as_much_as_a_mirror(albedo, alpha):
         assert float(albedo(alpha, theta)) == pytest.approx(_fresnel(np.cos(np.deg2rad(theta))), rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [3e-3, 0.01])
 def test_narrow_facets_give_no_false_warning(alpha):
     steel = {**model("microfacet-film").defaults(), "thickness": 0.0, "roughness": alpha, "diffuse": 0.0}

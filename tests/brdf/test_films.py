@@ -113,6 +113,7 @@ def test_the_published_shader_counts_the_phase_twice():
     assert float(film_colour.reflectance(SHADER, up)[0]) == pytest.approx(truth, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 0.9])
 def test_phase_average_is_the_mean_over_a_period(angle):
     cosine = np.sqrt(1 - np.sin(angle) ** 2 / 1.5**2)
@@ -123,6 +124,7 @@ def test_phase_average_is_the_mean_over_a_period(angle):
     assert float(average[0]) == pytest.approx(float(mean), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_film_without_interference_is_the_mean_over_its_phase():
     period = 550 / 2 / np.sqrt(2.2**2 - np.sin(0.6) ** 2)
     film = {**STEEL, "n": 2.2, "wavelengths": np.array([550.0])}
@@ -153,6 +155,7 @@ _SLOW = pytest.mark.slow  # compile for 3 to 5 s each
 _LONGEST = ("clear-coat-film", "microfacet-film")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=_SLOW) if name in _LONGEST else name for name in MODELS]
 )

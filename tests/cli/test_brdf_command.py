@@ -142,6 +142,7 @@ def posterior(monkeypatch, fits):
     monkeypatch.setattr(verbs, "sample", sample)
 
 
+@pytest.mark.slow
 def test_a_posterior_of_a_surface(folder, posterior, pellicle):
     out = folder / "out"
     ran = pellicle("sample", "--recipe", folder / "paint.toml", "--json", "--out", out, "--walkers", 32)

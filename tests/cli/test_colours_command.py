@@ -31,6 +31,7 @@ def recipe(tmp_path):
     return tmp_path / "film.toml"
 
 
+@pytest.mark.slow
 def test_simulated_colours_are_read_and_fitted(pellicle, recipe, tmp_path):
     out = tmp_path / "c.csv"
     assert pellicle("simulate", recipe, "--out", out, "--seed", "3").code == 0

@@ -41,6 +41,7 @@ def wrong_index(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tmp_path):
     a, b = (
         recipe("a.toml"),

@@ -17,6 +17,7 @@ def ran(pellicle, tmp_path, monkeypatch):
     return pellicle("demo")
 
 
+@pytest.mark.slow
 def test_it_leaves_a_folder_to_look_at(ran, tmp_path):
     folder = tmp_path / "pellicle-demo"
     assert ran.code == 0, ran.err

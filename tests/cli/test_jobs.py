@@ -31,6 +31,7 @@ def _slowest_first(seconds):
     return seconds, os.environ["NPROC"], os.getpid()
 
 
+@pytest.mark.slow
 def test_results_come_in_order_from_several_processes():
     results = list(in_order(_slowest_first, [4.0, 0.0, 0.1], 2))
     assert [task for task, *_ in results] == [4.0, 0.0, 0.1]

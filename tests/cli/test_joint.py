@@ -17,6 +17,7 @@ def files(spectrum_file):
     return [spectrum_file(f"{name}.csv", seed=seed) for seed, name in enumerate("ab")]
 
 
+@pytest.mark.slow
 def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
     out = tmp_path / "out"
     ran = pellicle("fit", *files, *scene, "--joint", "--json", "--out", out)

@@ -79,6 +79,7 @@ def test_the_folder_of_a_map(pellicle, words, fits, tmp_path):
     assert xarray.open_zarr(tmp_path / "out/map.zarr").status.shape == (24, 20)
 
 
+@pytest.mark.slow
 def test_the_same_command_goes_on_after_ctrl_c(pellicle, words, fits, tmp_path):
     blocks = []
 
@@ -170,6 +171,7 @@ def test_a_cube_that_cannot_be_read_leaves_no_folder(pellicle, words, fits, tmp_
     assert {*words[-1].iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_path):
     with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
         lit = cube.R.values[2:8, 4:9]
@@ -188,6 +190,7 @@ def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_pa
     assert "another input" in again.err
 
 
+@pytest.mark.slow
 def test_counts_with_a_white_of_a_material(pellicle, words, fits, tmp_path):
     np.save(tmp_path / "white.npy", np.full(30, 1.0))
     with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
@@ -210,6 +213,7 @@ def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):
         assert text in ran.err
 
 
+@pytest.mark.slow
 def test_a_series_has_rates(pellicle, words, fits, tmp_path):
     values = 0.5 - 0.01 * np.arange(6.0)[:, None, None, None] + np.zeros((1, 4, 5, 30))
     coords = {

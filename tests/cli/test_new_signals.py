@@ -31,6 +31,7 @@ layer = [{ material = "2.1+0.01j", thickness = { lower = 10, upper = 400, value 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("recipe", "noise", "name", "truth"),
     [(CONTRAST, 0.004, "flake.thickness", 3.35), (TRANSMISSION, 0.02, "thickness", 180.0)],

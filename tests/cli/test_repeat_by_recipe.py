@@ -10,6 +10,7 @@ def numbers(record):
     return {name: np.array([x["value"], x["stderr"]], float) for name, x in record["parameters"].items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flags",
     [
@@ -27,6 +28,7 @@ def test_of_flags(pellicle, spectrum_file, scene, tmp_path, flags):
     assert again.objects[0]["warnings"] == first.objects[0]["warnings"]
 
 
+@pytest.mark.slow
 def test_of_a_recipe_with_files_and_flags(pellicle, spectrum_file, tmp_path):
     one, other = spectrum_file("one.csv"), spectrum_file("other.csv", seed=1)
     (tmp_path / "film.toml").write_text(f"""

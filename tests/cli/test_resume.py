@@ -104,6 +104,7 @@ def test_what_changed_is_fitted_again(batch, fitted, scene, tmp_path):
     assert fitted() == ["b"]
 
 
+@pytest.mark.slow
 def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
     # in this process: test_jobs.py starts others
     monkeypatch.setattr("pellicle.cli.processes.in_order", lambda function, tasks, jobs: map(function, tasks))
@@ -132,6 +133,7 @@ def full(request):
     return lambda: request.getfixturevalue("small_files")
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_no_result(batch, full, fitted, tmp_path):
     full()
     ran = batch()
@@ -158,6 +160,7 @@ def test_results_without_all_their_files_are_computed_again(batch, full, fitted,
     assert (tmp_path / "out" / "b" / "figure.png").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_results_that_cannot_be_printed():
     with open("/dev/full", "w") as full_disk:

@@ -27,6 +27,7 @@ def sampled(pellicle, spectrum_file, scene, folder):
     return lambda *more: pellicle("sample", spectrum_file(), *scene, "--out", folder, *more)
 
 
+@pytest.mark.slow
 def test_the_interval_is_that_of_least_squares(sampled):
     """One minimum, many points, a flat prior: the posterior is normal, and as wide as the covariance says."""
     ran = sampled("--json")
@@ -50,6 +51,7 @@ def test_the_report_has_the_interval_and_the_checks(sampled):
     assert max(map(len, ran.out.splitlines())) <= 100
 
 
+@pytest.mark.slow
 def test_files_open_in_the_programs_they_are_for(sampled, folder):
     [found] = sampled("--json").objects
     assert json.loads((folder / "result.json").read_text())["posterior"] == found["posterior"]
@@ -99,6 +101,7 @@ def test_what_cannot_be_is_refused_in_a_sentence(pellicle, spectrum_file, scene,
     pellicle("sample", spectrum_file(), *scene, *flags).refused(code, words)
 
 
+@pytest.mark.slow
 def test_a_chain_of_another_problem_is_left_alone(sampled, pellicle, spectrum_file, scene, folder):
     sampled()
     before = (folder / "chain.h5").read_bytes()

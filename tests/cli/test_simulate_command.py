@@ -138,6 +138,7 @@ def test_a_depolarisation_is_a_column(pellicle, recipe, tmp_path):
     pellicle("simulate", recipe, *flags).refused(2, "is for a film with the signal psi-delta")
 
 
+@pytest.mark.slow
 def test_depth_profile(pellicle, recipe, tmp_path):
     """Figure, tables and JSON of where the light goes; the film is transparent, and the substrate takes T."""
     recipe.write_text(

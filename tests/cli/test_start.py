@@ -55,6 +55,7 @@ sys.exit(code)"""
 """A command in a process that prints what JAX traced, lowered, compiled or took from its own cache."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["reflectance", pytest.param("psi-delta", marks=pytest.mark.slow)])
 def test_a_second_process_traces_nothing_and_neither_imports_what_is_slow(
     kind, spectrum_file, scene, tmp_path
@@ -90,6 +91,7 @@ def test_a_second_process_traces_nothing_and_neither_imports_what_is_slow(
     assert not loaded & {"pandas", "matplotlib", "optimistix", "lineax", "scipy.linalg"}
 
 
+@pytest.mark.slow
 def test_a_folder_that_others_can_write_keeps_no_machine_code(spectrum_file, tmp_path):
     flags = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "299:301")
     cache = tmp_path / "programs"

@@ -42,6 +42,7 @@ def test_none_leaves_the_noise(thickness, scene):
     assert (bare["value"], bare["stderr_noise"]) == (plain["value"], plain["stderr_noise"])
 
 
+@pytest.mark.slow
 def test_an_index_of_a_recipe_counts_as_one_that_is_fitted(thickness, tmp_path):
     """With a prior as wide; the value stays that of the given index, and its error includes the distance."""
     recipe = tmp_path / "film.toml"

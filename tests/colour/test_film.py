@@ -98,6 +98,7 @@ def test_error_of_the_constants_of_belcour_and_barla():
         film_colour(100.0, 2.0 + 0.1j, 1.5, method="belcour-barla")
 
 
+@pytest.mark.slow
 def test_dispersive_media():
     """Samples are accurate for hematite and gold (measured: 0.009 at most).
 
@@ -127,6 +128,7 @@ def test_the_documented_example():
     assert doctest.testmod(film, extraglobs={"film_colour": film_colour}) == (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["uniform-4", "gaussians-4"])
 def test_gradients(name):
     """∂Lab/∂(thickness, n, k, angle) against central differences; jit and vmap."""

@@ -36,6 +36,7 @@ def measured(thickness, angles, exposure=1.0):
     return np.clip(np.round(255 * (coded + rng.normal(0, SIGMA, coded.shape))), 0, 255) / 255
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angles", "exposure", "least"),
     [((0.0,), 1.0, 0.92), ((0.0,), (0.5, 2.0), 0.7), ((0.0, 35.0, 60.0), (0.5, 2.0), 0.98)],

@@ -59,6 +59,7 @@ def test_white_is_white_under_every_illuminant(illuminant):
     np.testing.assert_allclose(lab(white, white), [100, 0, 0], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_differences():
     """ΔE2000: the first pair of Sharma, Wu and Dalal 2005, table 1."""
     one, other = np.array([50.0, 2.6772, -79.7751]), np.array([50.0, 0.0, -82.7485])

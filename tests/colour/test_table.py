@@ -50,6 +50,7 @@ def test_colours_in_single_precision(tables, name):
     assert np.max(missed) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILMS)
 def test_derivatives(tables, name):
     """Of the sum of X, Y and Z, within 1 % of the largest, against differences of the exact colours."""

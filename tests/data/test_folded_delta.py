@@ -32,6 +32,7 @@ def films() -> list[tuple[np.ndarray, np.ndarray]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.02, 0.2])
 def test_films(noise):
     """No alarm where nothing is folded; of folded ones those with several points in a fringe are found."""

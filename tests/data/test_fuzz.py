@@ -10,6 +10,7 @@ def fuzz(load_script):
     return load_script("benchmarks/fuzz_readers.py")
 
 
+@pytest.mark.slow
 def test_every_file_is_read_or_refused_in_one_sentence(fuzz, tmp_path):
     outcomes, failures = fuzz.run(150, tmp_path)
     assert not failures

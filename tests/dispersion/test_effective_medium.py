@@ -92,6 +92,7 @@ def test_two_transparent_media_stay_real(rule):
     assert not is_real(rule(glass, Constant(1.0, 0.0), 0.3).index(AT))
 
 
+@pytest.mark.slow
 @EVERY_RULE
 @pytest.mark.parametrize("f", [0.0, 1e-9, 0.3, 1 / 3, 2 / 3, 1.0])
 @pytest.mark.parametrize("inclusion", [(1.0, 0.0), (0.2, 3.4), (1.46, 0.0)], ids=["air", "metal", "same"])

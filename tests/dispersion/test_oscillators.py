@@ -179,6 +179,7 @@ def _parts(term, energy):
     return found.re, found.im
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", [np.float64, np.float32])
 @pytest.mark.parametrize("name", HARD)
 def test_value_and_gradient_are_finite_at_the_hard_points(name, precision):

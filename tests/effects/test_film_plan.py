@@ -53,6 +53,7 @@ def plan_of(name):
     return pl.plan(LEFT_OUT[name][0], TOLERANCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_what_changes_little_is_left_out(name):
     """With its error told, and less to compute."""
@@ -72,6 +73,7 @@ def operations(plan, thing):
         return jax.jit(build(plan.static_key)).lower(numbers).cost_analysis()["flops"]
 
 
+@pytest.mark.slow
 def test_savings_are_measured():
     """Each alternative has an error and takes some time."""
     thing = scene(thickness=pl.Free(3000, 3300), instrument=pl.Instrument(bandwidth=20.0))
@@ -152,6 +154,7 @@ def test_a_tolerance_needs_wavelengths():
         pl.plan(scene(wavelength=None), 1e-3)
 
 
+@pytest.mark.slow
 def test_ellipsometry_counts_in_degrees():
     thing = scene(1.46 + 1e-4j, signal="psi-delta", angle=70.0)
     plan = pl.plan(thing, 0.5)

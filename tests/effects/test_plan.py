@@ -235,6 +235,7 @@ ORDERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ORDERS)
 @pytest.mark.parametrize("signal", "RT")
 def test_the_bound_on_what_the_orders_leave_out_is_true(name, signal):

@@ -114,6 +114,7 @@ def plans():
 _SLOW = pytest.mark.slow  # compiles for 6 s; the plans of the other surfaces are made in the same way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=_SLOW) if name == "facets" else name for name in GONE]
 )

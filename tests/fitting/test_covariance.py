@@ -108,6 +108,7 @@ def test_errors_cover_the_truth(film, measured):
     assert inside >= 33
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("truth", [1000.0, 3000.0])
 @pytest.mark.parametrize("sigma", [True, False])
 def test_opaque_gold_is_not_known_to_zero_nanometres(film, measured, truth, sigma):

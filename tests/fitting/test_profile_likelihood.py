@@ -57,6 +57,7 @@ def test_an_extinction_beside_zero(film, measured):
         assert np.isfinite(fit["k"].stderr)
 
 
+@pytest.mark.slow
 def test_an_extinction_that_is_seen_has_no_limit(film, measured):
     scene = film(material=pl.dispersion.Constant(1.46, pl.Free(0.0, 1.0)))
     fit = pl.fit(measured(scene, 0.01, 430.0, sigma=True), scene)

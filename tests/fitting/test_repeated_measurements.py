@@ -89,6 +89,7 @@ def test_types_a_and_b_combined():
     assert both.expanded == pytest.approx(both.coverage_factor * math.sqrt(2.0))
 
 
+@pytest.mark.slow
 def test_levels_by_simulation():
     """Of 4000 sets of four, 1 % scatter too much and 1 % too little, within four standard deviations of such
     a count; 95 % of the expanded uncertainties reach the truth."""

@@ -43,6 +43,7 @@ def expected(jones: np.ndarray) -> np.ndarray:
     return np.stack([pp / ss, sp / pp, ps / ss], axis=1).conj()
 
 
+@pytest.mark.slow
 def test_ratios_are_those_of_the_jones_matrix_at_each_azimuth():
     """An azimuth adds to that of every axis."""
     azimuth = np.repeat(TURNS, 8)

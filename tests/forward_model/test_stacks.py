@@ -46,6 +46,7 @@ SANDWICH = [
 COHERENCE = ["i", "c", "i", "c", "c", "i"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal", "RT")
 @pytest.mark.parametrize(("angle", "polarisation"), [(0.0, "s"), (50.0, "s"), (50.0, "p")])
 def test_layers_on_both_faces_of_a_plate(signal, angle, polarisation):
@@ -184,6 +185,7 @@ def test_a_cone_at_normal_incidence_is_an_average_over_the_pupil():
     assert np.max(np.abs(predict(scene(pl.Layer(1.46, 1500.0))) - truth)) > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("polarisation", ["s", "p", "unpolarised"])
 def test_a_cone_at_an_angle(polarisation):
     """Brute rays with vectors: each is turned about its own axis, and its field with it."""

@@ -49,32 +49,46 @@ LOOSER32 = {
     CRITICAL: (VALUE32, np.nan),
 }
 
+FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 SIGNALS = [(signal, letter) for signal in "RT" for letter in "sp"]
 
 
 @cache
-def compiled(signal, letter, transparent):
-    """value, forward and reverse derivatives for rows of PARAMETERS; `transparent` ignores k."""
-    function = pl.reflectance if signal == "R" else pl.transmittance
+def compiled(transparent):
+    """Values, forward and reverse derivatives for rows of PARAMETERS, of each of SIGNALS; `transparent` ignores k.
 
-    def one(row):
+    One program of all compiles in two thirds of the time of four.
+    """
+
+    def each(row):
         d, n1, k1, n2, k2, ambient, angle, wavelength = row
         layer, substrate = (n1, n2) if transparent else (jax.lax.complex(n1, k1), jax.lax.complex(n2, k2))
-        return function(wavelength, d, layer, substrate, ambient=ambient, angle=angle, polarisation=letter)
+        media = {"ambient": ambient, "angle": angle}
+        found = [
+            FUNCTIONS[signal](wavelength, d, layer, substrate, **media, polarisation=letter)
+            for signal, letter in SIGNALS
+        ]
+        return jnp.stack(found)
 
-    return jax.jit(jax.vmap(lambda row: (one(row), jax.jacfwd(one)(row), jax.grad(one)(row))))
+    return jax.jit(jax.vmap(lambda row: (each(row), jax.jacfwd(each)(row), jax.jacrev(each)(row))))
 
 
 @cache
 def computed(signal, letter, dtype, transparent=False):
-    """The same by name of case."""
-    columns = map(np.asarray, compiled(signal, letter, transparent)(POINTS.astype(dtype)))
+    """The same of one signal, by name of case."""
+    columns = (x[:, SIGNALS.index((signal, letter))] for x in _all(dtype, transparent))
     return {name: row for name, *row in zip(CASES, *columns, strict=True)}
+
+
+@cache
+def _all(dtype, transparent):
+    return [np.asarray(x) for x in compiled(transparent)(POINTS.astype(dtype))]
 
 
 def alone(signal, letter, row, transparent=False):
     """The same of a row that is not in the table, in the shape that is compiled already."""
-    return [np.asarray(x)[0] for x in compiled(signal, letter, transparent)(np.tile(row, (len(POINTS), 1)))]
+    found = compiled(transparent)(np.tile(row, (len(POINTS), 1)))
+    return [np.asarray(x)[0, SIGNALS.index((signal, letter))] for x in found]
 
 
 def slope_error(found, truth):
@@ -169,7 +183,7 @@ def test_nothing_between_equal_media_reflects_nothing_at_90_degrees_too(letter, 
         row[0] = 0.0
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("dtype", [np.float32, pytest.param(np.float64, marks=pytest.mark.slow)])
 def test_equal_media_have_no_psi_and_delta_but_zeros(dtype):
     """Nothing is reflected, by one film and by a list, and no rounding is taken for a reflection."""
 

@@ -111,6 +111,7 @@ def test_equal_indices_are_an_isotropic_medium_to_the_last_digits():
                 np.testing.assert_allclose(transmittance(a), transmittance(b), rtol=1e-12)
 
 
+@pytest.mark.slow  # test_equal_indices: the same functions, of media that are isotropic
 def test_four_layers_with_rough_faces_take_the_same_indices():
     """The loop of `stack` against the product of `few_layers`, each with the same stack cut in two."""
     with jax.enable_x64(True):

@@ -78,7 +78,7 @@ def ratios(case, value, slope, dtype):
 RUNS = [
     ("one film", np.float64),
     ("one film", np.float32),
-    ("one film by matrices", np.float32),
+    pytest.param("one film by matrices", np.float32, marks=pytest.mark.slow),  # the loop over three is the same
     ("three layers", np.float64),
     pytest.param("three layers", np.float32, marks=pytest.mark.slow),  # compiles for 10 s; the loop takes 4
     ("three layers by a loop", np.float32),
@@ -144,7 +144,7 @@ def test_fifty_layers_with_an_opaque_one_in_the_middle(by_matrix):
     np.testing.assert_allclose(slope[1], slopes[:, 1], rtol=1e-10)
 
 
-@pytest.mark.parametrize("angle", [0.0, 60.0])
+@pytest.mark.parametrize("angle", [pytest.param(0.0, marks=pytest.mark.slow), 60.0])
 def test_a_roughness_free_from_zero_is_smooth_and_flat_there(angle):
     """Its first order vanishes; the other slopes are those of the smooth stack."""
     light = pl.Light(np.linspace(400.0, 800.0, 5), angle=angle, polarisation="p" if angle else "unpolarised")

@@ -111,6 +111,7 @@ def test_all_numbers_of_a_pixel_are_those_of_its_minimum(wedge):
     np.testing.assert_array_equal(again["thickness"], made["thickness"])
 
 
+@pytest.mark.slow
 def test_maps_in_chunks_are_changed_chunk_by_chunk(wedge):
     before = constructed(*wedge)
     made, lazy = decided_by_neighbours(before), decided_by_neighbours(before.chunk({"y": 10, "x": 17}))

@@ -53,6 +53,7 @@ def finished_blocks(store):
     return sum(len(files) for _, _, files in os.walk(store / "progress/done/c"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_blocks")
 @pytest.mark.parametrize(
     ("kills", "workers"),

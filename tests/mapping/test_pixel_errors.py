@@ -173,6 +173,7 @@ def test_thickness_and_index():
     check(cube, pl.Scene(pl.Layer(pl.Free(1.3, 2.3), pl.Free(0, 1600)), "Si"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_psi_and_delta_at_two_angles(given):
     rng, nm, angles = np.random.default_rng(5), np.linspace(400, 900, 40), np.array([65.0, 75.0])

@@ -3,6 +3,8 @@
 import gc
 import json
 
+import pytest
+
 import pellicle as pl
 from pellicle.mapping.pixels.results import CODES
 from pellicle.mapping.run import run_map
@@ -29,6 +31,7 @@ def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):
     assert {row["effect"] for row in record["plan"]} > {"absorption", "dispersion"}
 
 
+@pytest.mark.slow
 def test_arrays_of_a_map_in_a_temporary_folder_outlive_it(cube, scene, fake_fits, monkeypatch):
     """Zarr takes a chunk whose file is absent as one without values, and says nothing."""
     monkeypatch.setattr("pellicle.mapping.pixels.fit.fit_pixels", fake_fits.fit)

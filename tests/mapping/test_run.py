@@ -94,6 +94,7 @@ def test_workers_that_do_not_come_back_are_an_error(cube, scene, fake_fits, tmp_
         run_map(cube, scene, tmp_path / "map.zarr", scheduler=cluster.scheduler_address, fit=fake_fits.deadly)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):
     monkeypatch.setattr("pellicle.mapping.cluster.ANSWER", 0.2)
     with pytest.raises(UsageError, match="no dask scheduler answers at tcp://"):

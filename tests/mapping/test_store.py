@@ -127,6 +127,7 @@ def test_a_finished_map_is_not_fitted_again(mapped, fake_fits):
     assert (made.run.pixels, made.run.earlier) == (0, 45 * 32)
 
 
+@pytest.mark.slow
 def test_blocks_of_an_earlier_run_keep_their_size(mapped, fake_fits, same_files, monkeypatch):
     whole = mapped("whole.zarr")
     with pytest.raises(Killed):
@@ -135,6 +136,7 @@ def test_blocks_of_an_earlier_run_keep_their_size(mapped, fake_fits, same_files,
     same_files(whole.path, mapped().path)
 
 
+@pytest.mark.slow
 def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube):
     mapped()
     other = dataclasses.replace(cube, arrays={"values": cube.arrays["values"] + 1e-9})
@@ -158,6 +160,7 @@ def test_a_map_is_not_continued_unasked(mapped):
         mapped(resume=False)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be locked")
 def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
     """The run is within its first block; the other one would remove its store."""

@@ -184,6 +184,7 @@ def signals(layer, substrate, angle=ANGLE, propagating=False, ambient=AMBIENT):
     return np.array([f(x) for x in responses for f in functions])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [0.0, 0.3])
 @pytest.mark.parametrize("angle", [ANGLE, None], ids=["oblique", "normal"])
 def test_number_types_agree(k, angle):

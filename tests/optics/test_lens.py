@@ -65,6 +65,7 @@ FILMS = [  # angle, half angle, indices, angles of the axis, nm, foot
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("angle", "half", "indices", "axis", "depth", "foot"), FILMS)
 def test_the_stated_error_is_that_of_real_films(angle, half, indices, axis, depth, foot):
     """All orders of interference, not only the few of the model."""

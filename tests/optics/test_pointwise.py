@@ -34,6 +34,7 @@ def by_slopes(values):
 VALUES = np.array([1.5, 0.2, 4.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "derivative",
     [

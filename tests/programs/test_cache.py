@@ -37,6 +37,7 @@ def test_a_kept_program_computes_what_was_compiled(path):
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
 
+@pytest.mark.slow
 def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
     """Without the initialisation of LAPACK that process is killed by a signal."""
     path, matrix = tmp_path / "programs" / "one", [jax.ShapeDtypeStruct((2, 2), np.float64)]

@@ -121,6 +121,7 @@ def test_only_the_ratio_of_thickness_and_wavelength_counts(
     np.testing.assert_allclose(one, two, atol=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.integers(0, 2**32 - 1))
 @pytest.mark.parametrize("letter", "sp")
@@ -155,6 +156,7 @@ def draw(rng, count):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("letter", "sp")
 def test_every_value_and_gradient_is_finite(letter, dtype):

@@ -131,6 +131,7 @@ def test_refused_in_one_sentence(tmp_path, material, said):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_every_bare_model_is_a_scene_whose_index_is_finite_over_its_bounds(name):
     """At both ends of every default bound and at the start; Sellmeier's pole is at 245 nm at most."""

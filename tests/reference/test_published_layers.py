@@ -10,6 +10,7 @@ def published(load_script):
     return load_script("benchmarks/published.py")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", ["gooch_tarry", "sapphire_window", "brewster_angles", "rugate_filters"])
 def test_numbers_are_those_published(published, study):
     for row in getattr(published, study)():

@@ -52,6 +52,7 @@ def by_colour_science(index, base, thickness):
     return colour.XYZ_to_Lab(xyz, white)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("film", FILMS)
 def test_straw_then_purple_then_blue(film):
     index, base, thickness = FILMS[film]

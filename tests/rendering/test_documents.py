@@ -66,6 +66,7 @@ def value(node, name):
     return np.array(found.asTuple()) if hasattr(found, "asTuple") else found
 
 
+@pytest.mark.slow
 def test_materialx_has_a_conductor_in_nm(folder, library):
     made = pl.export(STEEL, to="materialx", path=folder / "steel.mtlx", numbers="physical")
     found = document(folder / "steel.mtlx", library)

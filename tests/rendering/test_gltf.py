@@ -25,6 +25,7 @@ def soap(tmp_path_factory):
     return made, pygltflib.GLTF2().load(str(folder / "soap.glb"))
 
 
+@pytest.mark.slow
 def test_a_transparent_film_has_a_map_in_nm(soap):
     made, model = soap
     [material] = model.materials

@@ -85,6 +85,7 @@ def steel():
     return look, physical(GLTF, look), effective(GLTF, look)
 
 
+@pytest.mark.slow
 def test_colours_are_exact(steel):
     """Against steps of 1 nm of the colour package."""
     look = steel[0]

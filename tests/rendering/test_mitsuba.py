@@ -119,6 +119,7 @@ def test_rendered_colours_are_the_exact_ones(exported, kind):
     assert np.max(delta_e2000(lab(np.array(found), white), lab(np.array(exact), white))) < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["measured", "lookup"])
 def test_rendered_spectra_are_the_exact_ones(exported, kind):
     mi.set_variant("scalar_spectral")
@@ -200,6 +201,7 @@ def spread_directions(count):
         ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("surface", "median"),
     [

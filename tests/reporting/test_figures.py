@@ -151,6 +151,7 @@ def test_odd_fits_are_drawn_too(fit, with_part, tmp_path):
     assert labels(draw(odd))[0] == "transmittance × unknown scale"
 
 
+@pytest.mark.slow
 def test_matplotlib_waits_until_a_figure_is_drawn():
     code = (
         "import sys, pellicle.reporting.figures, pellicle.reporting.fit_text, pellicle.reporting.folders;"

@@ -230,6 +230,7 @@ def test_a_map_without_a_usable_pixel_is_drawn():
     assert any("no pixel has numbers" in text.get_text() for axes in figure.axes for text in axes.texts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "preview"), [((30, 40), 8), ((4, 200), 1), ((200, 4), 8), ((30, 240), 8), ((200, 30), 1)]
 )

@@ -34,6 +34,7 @@ sample.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r}
 """
 
 
+@pytest.mark.slow
 def test_a_killed_chain_goes_on_as_if_nothing_had_happened(bands, film, tmp_path, monkeypatch):
     """A real process, killed without warning while it samples, against one that was left alone."""
     path = tmp_path / "chain.h5"

@@ -114,6 +114,7 @@ def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
     assert np.all(np.isfinite(band.model))
 
 
+@pytest.mark.slow
 def test_a_chain_is_resumed_and_belongs_to_its_problem(fitted_before, known, tmp_path):
     path = tmp_path / "chain.h5"
     assert not pl.sample(known.samples, FREE, chain=path, steps=20).trusted

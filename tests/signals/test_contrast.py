@@ -80,6 +80,7 @@ def test_a_bare_reference_and_a_plan_within_a_tolerance():
     assert plan(bare, 1e-3).error_bound <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["relative", "normalised"])
 def test_the_fit_finds_the_thickness(form):
     data = pl.simulate(scene(form), NM, noise=0.004, seed=2)

@@ -53,6 +53,7 @@ def reference(i, letter):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("letter", "sp")
 def test_random_stacks_as_tmm(computed, letter):
     absorbed, R, _, field = computed[letter]
@@ -171,6 +172,7 @@ def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
     assert slope > 1
 
 
+@pytest.mark.slow
 def test_a_second_call_compiles_nothing(caplog):
     calls = [
         lambda k: pl.absorptance(500.0, 30.0, 2.0 + 1j * k, 1.5),

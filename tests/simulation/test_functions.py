@@ -50,6 +50,7 @@ def moved(function):
     return signal
 
 
+@pytest.mark.slow
 @BOTH
 def test_every_argument_is_traced(function):
     """jit, vmap, jacfwd and grad, against the plain call and its central differences."""
@@ -90,6 +91,7 @@ def test_an_integer_is_a_number_too(function):
     assert float(found) == pytest.approx(float(function(550.0, 100.0, 2.0, 4.0, angle=30.0)), rel=1e-13)
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_precision_follows_the_input(function, dtype):
@@ -261,6 +263,7 @@ print(caught[0].message)
 """
 
 
+@pytest.mark.slow
 def test_lost_precision_is_said_once():
     """float64 input while JAX computes in float32; Python numbers and float32 say nothing."""
     run = subprocess.run([sys.executable, "-c", ONCE], capture_output=True, text=True, check=True)

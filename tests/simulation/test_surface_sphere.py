@@ -73,6 +73,7 @@ def steel():
     return {at: render(UNEVEN, at, SIZE, count=2048).linear for at in (WHITE, studio())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [(5, 5), (3, 7), (8, 2)])
 def test_pixels_of_a_rough_uneven_film(steel, at):
     """The thickness is that of the noise at the pixel."""

@@ -93,6 +93,7 @@ def test_decimal_commas_are_read_as_points(read, text):
     assert_same(read(with_commas), read(text), "decimal commas")
 
 
+@pytest.mark.slow
 def test_a_sample_with_a_damaged_line_is_read_or_refused_in_one_sentence(read, text, tmp_path):
     lines, messages = text.splitlines(keepends=True), []
     for i, line in enumerate(lines):

@@ -14,6 +14,7 @@ from pellicle.fitting.comparison import compare
 pytestmark = pytest.mark.usefixtures("no_search")
 
 
+@pytest.mark.slow
 def test_the_right_index_is_better_by_the_criteria(grey, grey_samples):
     samples = grey_samples()
     result = pl.compare(samples, {"1.5": grey(), "1.3": grey(n=1.3)})

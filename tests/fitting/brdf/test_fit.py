@@ -71,6 +71,7 @@ def known():
     return fit(noisy(rho, seed=3), FREE)
 
 
+@pytest.mark.slow
 def test_a_known_surface_is_found_within_its_errors(known):
     assert known.status is Status.CONVERGED
     assert known.layer_test.layered

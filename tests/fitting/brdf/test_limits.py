@@ -100,6 +100,7 @@ def profile(simulated, name):
     return chi2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "side"), [("deviation", 1), ("exponent_transmission", -1)])
 def test_a_limit_is_where_the_profile_has_risen(simulated, judged, name, side):
     p, chi2 = judged.conclusion.parameters[name], profile(simulated, name)
@@ -161,6 +162,7 @@ def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     assert (estimate.lower_limit, estimate.upper_limit, estimate.at_bound) == (None, None, False)
 
 
+@pytest.mark.slow
 def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     """Values of another shape altogether, with a σ that no model can reach: errors of the noise are those of
     the covariance, and residuals enlarge them."""

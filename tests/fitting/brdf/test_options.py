@@ -155,6 +155,7 @@ def test_a_joint_fit_is_that_of_all_samples(grey, two, truth):
         joint.samples  # noqa: B018
 
 
+@pytest.mark.slow
 def test_a_set_in_two_halves_is_the_whole_set(grey, grey_samples):
     whole = grey_samples()
     halves = [dataclasses.replace(whole.at(np.arange(n, 120, 2)), path=f"{n}.csv") for n in (0, 1)]

@@ -53,6 +53,7 @@ def expected(problem: Problem, shapes: np.ndarray) -> tuple[np.ndarray, float]:
     return weights, chi2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [lambda p: p, without_layer], ids=["layer", "two lobes"])
 def test_weights_are_the_nonnegative_least_squares(layered, kind):
     """Of all channels together where a weight is grey, else of each channel."""

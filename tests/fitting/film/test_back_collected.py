@@ -22,6 +22,7 @@ def measured() -> pl.Spectrum:
     return pl.simulate(scene(180.0, back_collected=SHARE), NM, noise=NOISE, seed=3)
 
 
+@pytest.mark.slow
 def test_a_free_share_is_found(measured):
     fit = pl.fit(measured, scene(pl.Free(50, 400), back_collected=pl.Free(0, 1)))
     assert fit.status == "converged"

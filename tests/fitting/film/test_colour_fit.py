@@ -123,6 +123,7 @@ def test_a_chart_says_what_an_unknown_camera_sees():
     assert one == pytest.approx(other, rel=0.3)
 
 
+@pytest.mark.slow
 def test_clipped_channels_are_limits():
     bright = colours(300.0, exposure=3.0)
     assert np.any(bright.values == 1.0)

@@ -135,6 +135,7 @@ def evaluations(scene: pl.Scene):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_nothing_is_computed_twice(name):
     case = CASES[name]

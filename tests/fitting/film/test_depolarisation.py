@@ -116,6 +116,7 @@ def test_without_depolarisation_the_spread_is_less_determined(together, without)
     assert without.curve.depolarisation_data is None
 
 
+@pytest.mark.slow
 def test_the_spread_is_better_determined(together, measured):
     """By as much as the bound of Cramér and Rao says."""
     psi_and_delta, all_three = bounds()
@@ -162,6 +163,7 @@ def test_a_scene_without_depolarisation(measured, together):
     assert not fit.curve.depolarisation_model.any()
 
 
+@pytest.mark.slow
 def test_a_comparison_counts_the_depolarisation(measured):
     """Ψ and Δ of next to no weight, of which even and uneven films are alike."""
     vague = replace(measured, sigma=np.full(64, 20.0), delta_sigma=np.full(64, 20.0))

@@ -38,6 +38,7 @@ def scene(**options) -> pl.Scene:
     return pl.Scene(pl.Layer("SiO2", pl.Free(0, 1000)), "Si", **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thickness", [2.0, 100.0])
 def test_oxides_thin_and_thick(thickness):
     found = pl.fit(measured(thickness), scene())

@@ -169,6 +169,7 @@ def compilations():
     listening[0] = False
 
 
+@pytest.mark.slow
 def test_a_second_file_compiles_nothing(film, measured, compilations):
     scene = film(material=Cauchy(pl.Free(1.3, 1.7), pl.Free(0.0, 3e4)))
     nm = np.linspace(400.0, 900.0, 192)  # a length of its own: programs of other tests do not serve

@@ -58,6 +58,7 @@ def test_a_fit_that_misses_the_fringes_says_what_they_suggest(film, measured, si
     assert right == []
 
 
+@pytest.mark.slow
 def test_fringes_with_dispersion_and_a_wrong_start_raise_no_alarm(film, measured):
     cauchy = pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 4e4))
     scene = film(pl.Free(10, 3000), cauchy)

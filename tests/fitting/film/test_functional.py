@@ -66,6 +66,7 @@ def test_vmapped_fits_agree_with_a_loop_of_fits(spectra, programs):
         assert np.allclose(values, expected, rtol=1e-5, atol=0)
 
 
+@pytest.mark.slow
 def test_prepared_problems_stack_and_deviances_are_chi_squared(spectra):
     """The deviance of a spectrum with given σ is χ², up to the same constant at every start."""
     with jax.enable_x64(True):
@@ -107,6 +108,7 @@ def test_wrong_shapes_are_refused(spectra):
         psi.with_data(np.zeros(120))
 
 
+@pytest.mark.slow
 def test_a_second_fit_of_the_same_kind_compiles_nothing(programs):
     """Other data, wavelengths, number of points, noise, bounds and constants; the padded length is one."""
     one = pl.simulate(film(1.5, 300.0), NM, noise=0.002)

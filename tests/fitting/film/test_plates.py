@@ -38,6 +38,7 @@ def residual(data: pl.Spectrum) -> np.ndarray:
     return (view.data.values - np.asarray(view.local(np.array([120.0])).model))[: view.points]
 
 
+@pytest.mark.slow
 def test_psi_and_delta_say_nothing_of_the_unpolarised_part(ncs):
     assert np.linalg.norm(ncs, axis=0).max() < 0.999
     np.testing.assert_allclose(residual(spectrum(ncs)), 0, atol=1e-12)

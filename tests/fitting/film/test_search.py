@@ -159,6 +159,7 @@ def recovered(film, measured, case, films, noise):
     return np.array(right), np.array(identifiable)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_identifiable_films_are_recovered(film, measured, case):
     right, identifiable = recovered(film, measured, case, films=12, noise=0.005)

@@ -59,6 +59,7 @@ LINEAR = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LINEAR)
 def test_linear_effects_are_derivatives(reflectance, name):
     size, function = LINEAR[name]
