@@ -54,7 +54,7 @@ fits: $(VENV)/.fit
 # pyright takes one core for a minute, and shares the two with the first tests
 test: $(VENV)/.dev
 	$(MAKE) --jobs 2 lint exact
-	$(KEEP_MEMORY) $(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT))
+	$(KEEP_MEMORY) $(QUICK_COMPILE) $(PYTEST) $(addprefix --ignore=,$(EXACT) $(BROWSER_TESTS))
 
 exact: $(VENV)/.dev
 	$(KEEP_MEMORY) $(ONE_THREAD) $(PYTEST) $(EXACT)

@@ -292,25 +292,21 @@ def test_commands_parse_and_their_files_exist(page):
         written |= out
 
 
-IN_EVERY_RUN = ("README.md", "docs/howto/uncertainty.md")
-"""Pages whose commands run in every run of the tests; the others take two minutes, in `make slow`."""
 LONG_BLOCKS = (
+    "docs/howto/absorption.md",
+    "docs/howto/colours.md",
     "docs/howto/loops.md",
     "docs/howto/maps.md",
     "docs/howto/mueller.md",
     "docs/howto/repeats.md",
+    "docs/howto/uncertainty.md",
     "docs/reference/colour.md",
 )
-"""Pages whose Python blocks compile for 3 to 5 s each: run in `make slow`."""
+"""Pages whose Python blocks compile for 2 to 5 s each: run in `make slow`."""
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        page if page in IN_EVERY_RUN else pytest.param(page, marks=pytest.mark.slow)
-        for page in PAGES_WITH_COMMANDS
-    ],
-)
+@pytest.mark.slow  # two minutes
+@pytest.mark.parametrize("page", PAGES_WITH_COMMANDS)
 def test_commands_run(page, run_page):
     run_page(page)
 
@@ -336,7 +332,6 @@ def test_slow_commands_run(page, run_page):
     run_page(page, slow=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "page",
     [

@@ -65,6 +65,7 @@ def test_changes_are_reported(script):
     assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 5.0", "n is new"]
 
 
+@pytest.mark.slow
 def test_one_study_is_reproduced(script, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
     assert script.rerun(FITS / QUICK) == []

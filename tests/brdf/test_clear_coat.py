@@ -88,6 +88,7 @@ def test_a_perfect_metal_under_a_coat_returns_what_the_face_lets_pass_twice():
         assert float(albedo(theta)) == pytest.approx(reflected + (1 - reflected) ** 2, abs=4e-3)
 
 
+@pytest.mark.slow
 def test_a_coat_of_no_contrast_leaves_the_film_in_air():
     i, o = direction(np.array([20.0, 50.0]), 0.0), direction(np.array([35.0, 40.0]), 170.0)
     bare = {key: x for key, x in NUMBERS.items() if not key.startswith("coat")}

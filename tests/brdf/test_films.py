@@ -104,6 +104,7 @@ def test_microfacets_reflect_at_most_as_much_as_the_film():
 SHADER = {"ambient_n": 1.0, "n": 1.5, "base_n": 2.0, "thickness": 250.0, "wavelengths": np.array([550.0])}
 
 
+@pytest.mark.slow
 def test_the_published_shader_counts_the_phase_twice():
     """0.0942 as published, 0.0239 by tmm."""
     up = jnp.array(0.0)

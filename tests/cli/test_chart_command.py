@@ -28,6 +28,7 @@ def test_one_layer_is_the_film(oxide):
     assert np.max(np.asarray(delta_e2000(oxide[1].lab, own.lab))) < 0.1
 
 
+@pytest.mark.slow
 def test_a_stack_varies_the_layer_that_is_named(oxide):
     """An oxide on nothing at all is the oxide; a fixed layer of no thickness is chosen by name only."""
     nothing = pl.Layer(2.0, 0.0, name="nothing")

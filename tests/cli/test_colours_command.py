@@ -141,6 +141,7 @@ def test_a_flag_of_colours_goes_to_the_files_that_have_them(pellicle, tmp_path, 
     assert pellicle("read", "s.csv", "c.csv", "--illuminant", "A").code == 0
 
 
+@pytest.mark.slow
 def test_a_fit_states_what_its_colours_are(pellicle, tmp_path, monkeypatch):
     """fit.csv is read back in its space, and not for another observer or illuminant."""
     monkeypatch.chdir(tmp_path)

@@ -71,6 +71,7 @@ def test_what_cannot_be_asked(pellicle, recipe, tmp_path):
     pellicle("cost", recipe).refused(2, "nothing to compute")
 
 
+@pytest.mark.slow
 def test_wavelengths_of_the_first_file(pellicle, recipe, tmp_path, monkeypatch):
     """Where the recipe gives none; and 50 digits are told from 16."""
     rows = "".join(f"{nm},0.2\n" for nm in (450, 500, 560, 640, 700))

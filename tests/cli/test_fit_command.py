@@ -204,6 +204,7 @@ def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, tmp_
     assert by_recipe == by_flags == named
 
 
+@pytest.mark.slow
 def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, tmp_path):
     file, recipe = spectrum_file(), tmp_path / "film.toml"
     recipe.write_text(RECIPE.replace("[scene]", "angle = 20\n[scene]"))

@@ -33,6 +33,7 @@ def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
     assert not (out / "summary.csv").exists()
 
 
+@pytest.mark.slow
 def test_a_recipe_says_so_too(pellicle, files, tmp_path):
     path = tmp_path / "film.toml"
     path.write_text(

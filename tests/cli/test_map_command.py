@@ -66,6 +66,7 @@ def test_a_strip_across_a_wedge(pellicle, recipe, colours, tmp_path):
     assert (tmp_path / "out" / "map.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_a_map_in_python_with_a_white_and_a_free_exposure(colours, tmp_path):
     """A photograph at 0.6 of the exposure, beside a white of 0.6."""
     linear = np.vstack([0.6 * colours, np.full((8, 3), 0.6)])

@@ -51,6 +51,7 @@ def test_simulate_plan_and_fit(pellicle, tmp_path, recipe, noise, name, truth):
     assert again["parameters"][name]["value"] == pytest.approx(found["value"], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_flags_of_transmission(pellicle, tmp_path):
     path, data = tmp_path / "film.toml", tmp_path / "film.csv"
     path.write_text(TRANSMISSION, encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
 from pellicle.data.read_brdf import read_brdf_samples
 
@@ -83,6 +84,7 @@ diffuse = 0.2
 """
 
 
+@pytest.mark.slow
 def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
     (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
@@ -109,6 +111,7 @@ thickness = { lower = 200, upper = 300 }
 """
 
 
+@pytest.mark.slow
 def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
     rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
     (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)

@@ -62,6 +62,7 @@ def test_derivatives(tables, name):
         assert np.max(np.abs(slope - expected)) < 0.01 * np.max(np.abs(expected))
 
 
+@pytest.mark.slow
 def test_its_stated_error_and_size(tables):
     for table in tables.values():
         assert table.nbytes < 1_000_000

@@ -69,6 +69,7 @@ def test_round_trip(path, spectrum, separator, unit, percent, falling, header, c
     np.testing.assert_array_equal(read.lines, expected[::-1] if falling else expected)
 
 
+@pytest.mark.slow
 @given(spectrum=spectra(), lo=st.floats(0, 3000), width=st.floats(1, 3000))
 def test_a_cut_keeps_what_lies_inside_and_nothing_else(path, spectrum, lo, width):
     wavelength, values = spectrum

@@ -83,6 +83,7 @@ def test_savings_are_measured():
     assert min(found.exact, found.planned, *(saving.seconds for saving in found.effects.values())) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_bound_holds_and_no_gradient_is_lost(name):
     """At thicknesses that the plan did not look at."""

@@ -159,6 +159,7 @@ def test_k_fixed_at_zero_costs_what_no_k_costs():
     assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
 
 
+@pytest.mark.slow
 def test_k_free_from_zero_keeps_its_slope():
     """The trap of judging by values: at k = 0 the model must still know that R falls with k."""
     thing = scene(Constant(1.46, pl.Free(0, 1, start=0.0)))

@@ -55,7 +55,7 @@ SIGNALS = [(signal, letter) for signal in "RT" for letter in "sp"]
 
 @cache
 def compiled(transparent):
-    """Values, forward and reverse derivatives for rows of PARAMETERS, of each of SIGNALS; `transparent` ignores k.
+    """Values, forward and reverse derivatives of SIGNALS for rows of PARAMETERS; `transparent` ignores k.
 
     One program of all compiles in two thirds of the time of four.
     """

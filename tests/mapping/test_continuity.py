@@ -162,6 +162,7 @@ def test_a_converged_pixel_with_a_close_rival_is_overruled_only_by_clear_neighbo
     assert made["thickness"][20, 20] == before["thickness"][20, 20]
 
 
+@pytest.mark.slow
 def test_islands_behind_gaps_and_forbidden_orders_stay_ambiguous():
     truth = np.fromfunction(lambda y, x: 600 + 2.0 * x + y, (40, 60))
     y, x = np.mgrid[:40, :60]

@@ -121,6 +121,7 @@ def noisy(rows, rng, size=SIGMA):
     return np.clip(rows + size * rng.normal(size=np.shape(rows)), 0, None)
 
 
+@pytest.mark.slow
 def test_status_and_errors_are_those_of_a_fit_of_each_pixel():
     rng = np.random.default_rng(0)
     rows = noisy([reflectance(d) for d in (0.5, 3.0, 12.0, 90.0, 200.0, 700.0, 1400.0)], rng)

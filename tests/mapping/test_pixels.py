@@ -70,6 +70,7 @@ def test_thickness_is_that_of_fit(wedge):
     assert np.all(np.abs(best.values[known, 0, 0] - truth[known]) < 1.0)
 
 
+@pytest.mark.slow
 def test_a_pixel_without_data_has_no_numbers(wedge):
     cube, _, model, best = wedge
     assert np.isnan(best.values[5]).all()

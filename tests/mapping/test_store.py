@@ -85,7 +85,7 @@ def test_netcdf_has_the_same_values_and_flags(mapped, tmp_path):
         made.to_netcdf(tmp_path / "map.nc")
 
 
-@pytest.mark.parametrize("die_at", [1, 7, 24])
+@pytest.mark.parametrize("die_at", [7, *(pytest.param(at, marks=pytest.mark.slow) for at in (1, 24))])
 def test_a_killed_map_goes_on_and_is_equal(mapped, fake_fits, same_files, tmp_path, die_at):
     whole = mapped("whole.zarr")
     with pytest.raises(Killed):

@@ -73,6 +73,7 @@ def test_no_layer_is_the_bare_interface():
         np.testing.assert_allclose(response.transmittance(result), interface.transmittance(*face), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_zero_roughness_by_matrices_equals_the_smooth_film():
     layer, phase = Pair(2.1, 0.3), 1.2
     smooth = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE)

@@ -45,6 +45,7 @@ def test_one_layer_is_the_film_from_both_sides():
             assert float(signal(b)) == pytest.approx(float(signal(a)), abs=1e-14)
 
 
+@pytest.mark.slow
 def test_an_opaque_layer_among_fifty_keeps_its_transmittance():
     """tmm clamps such a transmittance; the reference in 200 digits does not."""
     index = [complex(1.46 if i % 2 else 2.3) for i in range(50)]

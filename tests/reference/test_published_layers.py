@@ -10,8 +10,14 @@ def published(load_script):
     return load_script("benchmarks/published.py")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("study", ["gooch_tarry", "sapphire_window", "brewster_angles", "rugate_filters"])
+@pytest.mark.parametrize(
+    "study",
+    [
+        "sapphire_window",
+        "brewster_angles",
+        *(pytest.param(long, marks=pytest.mark.slow) for long in ("gooch_tarry", "rugate_filters")),
+    ],
+)
 def test_numbers_are_those_published(published, study):
     for row in getattr(published, study)():
         assert row.computed == pytest.approx(row.published, abs=row.tolerance), row.quantity

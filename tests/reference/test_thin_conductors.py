@@ -20,6 +20,7 @@ def on_glass(function, name, thickness, wavelength=VISIBLE):
     return np.asarray(function(wavelength, thickness, material(name)(wavelength), 1.52))
 
 
+@pytest.mark.slow
 def test_hematite_runs_through_the_temper_colours_three_times():
     """Figure 1, by what is reflected as the layer grows to 300 nm: the order that oxide on heated steel
     is known for, straw, red, purple, blue, green; paler each time, as hematite takes the blue.

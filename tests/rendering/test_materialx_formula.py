@@ -34,6 +34,7 @@ def test_a_grey_base_is_exact(ior, base, thickness):
     np.testing.assert_allclose(found, np.clip(exact @ materialx.XYZ_TO_RGB.T, 0, 1), atol=1.2e-3)
 
 
+@pytest.mark.slow
 def test_a_tint_multiplies_the_dielectric():
     grey = {"ior": 1.5, "n": np.full(3, 1.33), "k": np.zeros(3)}
     white = conductor(grey, np.array(400.0), COSINES)

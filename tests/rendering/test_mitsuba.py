@@ -170,6 +170,7 @@ def test_scenes_load_and_show_the_film(exported):
     np.testing.assert_allclose(images[0], images[1], rtol=0.2)
 
 
+@pytest.mark.slow
 def test_an_uneven_film_takes_its_thickness_from_an_image(tmp_path):
     nm = np.linspace(10.0, 60.0, 8)[None, :] + np.zeros((4, 1))
     made = pl.export(STEEL, to="mitsuba", path=tmp_path / "uneven.xml", thickness_map=nm)

@@ -90,6 +90,7 @@ def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_text_needs_no_plotting_library():
     program = (
         "import sys; from pellicle.reporting.materials import table, describe; table(); describe('HfO2');"

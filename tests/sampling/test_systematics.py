@@ -142,6 +142,7 @@ def test_an_uncertain_index_widens_a_posterior_as_it_does_the_error(bands, film,
     assert posterior["thickness"].sd == pytest.approx(expected, rel=0.08)
 
 
+@pytest.mark.slow
 def test_effects_bring_back_minima_that_noise_rules_out(bands, film):
     """Scale, its slope and curvature, and offset are badly known: five bands are next to one number.
 

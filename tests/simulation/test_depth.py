@@ -155,6 +155,7 @@ def test_precision_follows_the_input(dtype):
     assert found.electric.dtype == found.magnetic.dtype == np.result_type(dtype, np.complex64)
 
 
+@pytest.mark.slow
 def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
     """At k = 0 the absorptance is 0 and its derivative is not; at 1e-12 all digits are there."""
 

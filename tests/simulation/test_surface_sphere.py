@@ -87,6 +87,7 @@ def test_pixels_of_a_rough_uneven_film(steel, at):
         np.testing.assert_allclose(rendering[at], seen(pixel(at), nm, environment), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_few_directions_are_within_four_per_cent(steel):
     found, expected = render(UNEVEN, WHITE, SIZE).linear, steel[WHITE]
     assert 0 < np.max(np.abs(found - expected)) < 0.04 * expected.max()

@@ -93,6 +93,7 @@ def test_outliers_move_a_plain_fit_and_not_a_robust_one(grey, grey_samples, trut
     assert robust.status is pl.Status.CONVERGED
 
 
+@pytest.mark.slow
 def test_huber_against_scipy(grey, grey_samples):
     samples = spoiled(grey_samples())
     values, _ = independent([samples], grey(), loss="huber")
@@ -165,6 +166,7 @@ def test_a_set_in_two_halves_is_the_whole_set(grey, grey_samples):
     assert both.rms == pytest.approx(one.rms, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_incidences_of_all_sets_count_together(grey, grey_samples):
     """Each set at one incidence: together they are at two."""
     sets = [grey_samples(0.02, n, (angle,)) for n, angle in ((1, 20.0), (2, 50.0))]

@@ -34,6 +34,7 @@ def test_a_free_share_is_found(measured):
     assert abs(fit["thickness"].value - 180.0) < 4 * fit["thickness"].stderr_noise
 
 
+@pytest.mark.slow
 def test_a_share_of_all_is_a_limit():
     """1 is a bound that physics sets: the answer stands, with a limit on one side."""
     data = pl.simulate(scene(180.0), NM, noise=NOISE, seed=2)

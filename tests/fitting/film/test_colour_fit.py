@@ -50,6 +50,7 @@ def colours(thickness, code=None, angles=ANGLES, exposure=1.0, seed=0, sigma=SIG
     return Colours(values, SENSOR, **{"angle": angles, "sigma": noise, **words})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("space", "sigma"), [("srgb", SIGMA), ("lab", 0.5), ("xyz", 0.003)])
 def test_three_angles_determine_the_thickness(space, sigma):
     data = colours(432.0, encoding(space, SENSOR[1].sum(axis=0)), sigma=sigma, space=space)

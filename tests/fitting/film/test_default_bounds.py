@@ -20,6 +20,7 @@ def said(fit, words):
     return [warning for warning in fit.warnings if words in warning]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("n", "lower", "upper"),
     [

@@ -194,6 +194,7 @@ def test_predictions(ranked):
     assert np.std(psi.noisy - psi.model) == pytest.approx(PSI, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_mean_of_sweeps(measured):
     """A drift of the depolarisation between sweeps widens the error of what it determines."""
     sweeps = [

@@ -62,6 +62,7 @@ def test_a_fit_finds_the_profile(fit, tmp_path):
     assert any("depth" in label for label in panels), panels
 
 
+@pytest.mark.slow
 def test_errors_of_a_profile_follow_from_those_of_its_numbers():
     top, bottom, correlation = 0.02, 0.05, -0.5
     estimates = {"thickness": (THICKNESS, 1.0), "top": (TOP, top), "bottom": (BOTTOM, bottom)}

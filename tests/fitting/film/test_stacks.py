@@ -39,6 +39,7 @@ def test_both_thicknesses_come_out(bandwidth, oxide, nitride):
     assert found.plan.on("stack")
 
 
+@pytest.mark.slow
 def test_quadrature_equals_the_series_for_a_layer_split_in_two():
     """Two halves of one layer are a stack; the whole of it is a series. The window must be the same."""
     instrument = pl.Instrument(bandwidth=5.0)
