@@ -75,12 +75,12 @@ def operations(plan, thing):
 
 @pytest.mark.slow
 def test_savings_are_measured():
-    """Each alternative has an error and takes some time."""
+    """Each alternative has an error; one that saves little may seem to save less than nothing."""
     thing = scene(thickness=pl.Free(3000, 3300), instrument=pl.Instrument(bandwidth=20.0))
     found = savings(thing, pl.plan(thing))
     assert set(found.effects) >= {"coherence", "precision"}
     assert found.effects["coherence"].error > 0.01
-    assert min(found.exact, found.planned, *(saving.seconds for saving in found.effects.values())) > 0
+    assert min(found.exact, found.planned, found.effects["coherence"].seconds) > 0
 
 
 @pytest.mark.slow

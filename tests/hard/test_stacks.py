@@ -78,9 +78,7 @@ def ratios(case, value, slope, dtype):
 RUNS = [
     ("one film", np.float64),
     ("one film", np.float32),
-    pytest.param(
-        "one film by matrices", np.float32, marks=pytest.mark.slow
-    ),  # the loop over three is the same
+    pytest.param("one film by matrices", np.float32, marks=pytest.mark.slow),  # as the loop over three
     ("three layers", np.float64),
     pytest.param("three layers", np.float32, marks=pytest.mark.slow),  # compiles for 10 s; the loop takes 4
     ("three layers by a loop", np.float32),
