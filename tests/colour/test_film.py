@@ -60,7 +60,9 @@ def error(layer, substrate, name, illuminant="D65", **films):
     return delta_e2000(np.asarray(result), reference(layer, substrate, illuminant, **films))
 
 
-@pytest.mark.parametrize("film", MEDIA)
+@pytest.mark.parametrize(
+    "film", ["soap", *(pytest.param(f, marks=pytest.mark.slow) for f in MEDIA if f != "soap")]
+)
 def test_every_method_is_near_the_reference(film):
     for name, limit in LIMITS.items():
         assert np.mean(error(*MEDIA[film], name)) < limit, name

@@ -225,7 +225,7 @@ def _rotation(axis, angle):
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-@pytest.mark.parametrize("angle", [0.0, 40.0])
+@pytest.mark.parametrize("angle", [0.0, pytest.param(40.0, marks=pytest.mark.slow)])
 def test_a_free_cone_has_a_finite_slope_at_zero(angle):
     free = pl.Instrument(angle_spread=pl.Free(0, 15, start=0.0))
     thing = scene(pl.Layer(1.46, 900.0), angle=angle, instrument=free)

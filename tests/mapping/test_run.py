@@ -83,6 +83,7 @@ def test_pixels_that_end_every_worker_are_an_error(cube, scene, fake_fits, tmp_p
         run_map(cube, scene, tmp_path / "map.zarr", workers=2, fit=fake_fits.deadly)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_blocks")
 def test_workers_that_do_not_come_back_are_an_error(cube, scene, fake_fits, tmp_path, monkeypatch):
     monkeypatch.setattr("pellicle.mapping.cluster.WAIT", 0.1)

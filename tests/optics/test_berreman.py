@@ -90,6 +90,7 @@ def compare(n, turns, k, n0, angle):
         np.testing.assert_allclose(T[i], expected[1], rtol=0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_absorbing_stacks(stacks):
     compare(*stacks)
 

@@ -47,6 +47,7 @@ def test_a_transparent_film_has_a_map_in_nm(soap):
     np.testing.assert_allclose(100 + 300 * green, np.linspace(100, 400, 32).reshape(4, 8), atol=300 / 255)
 
 
+@pytest.mark.slow
 def test_the_record_has_both_sets(soap):
     made, model = soap
     record = json.loads(made.files[1].read_text("utf-8"))

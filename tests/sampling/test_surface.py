@@ -151,6 +151,7 @@ def test_a_prior_narrows_the_fit_and_its_posterior_alike(known, monkeypatch):
     assert posterior["specular"].mean == pytest.approx(narrowed.value, abs=0.2 * p.stderr)
 
 
+@pytest.mark.slow
 def test_correlated_samples_count_as_fewer(monkeypatch, known):
     """Where four count as one, the posterior is twice as wide."""
     [view] = known.ranked.problem.views

@@ -71,6 +71,7 @@ def test_random_stacks_as_tmm(computed, letter):
             assert field.absorbed[j, i] == pytest.approx(at["absor"], rel=1e-10, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_the_magnetic_field_has_the_poynting_vector_of_tmm(computed):
     """Its part along z, E_x H_y* − E_y H_x*, over the incident n₀ cos θ₀."""
     incident = AMBIENT * np.cos(np.deg2rad(ANGLE))

@@ -44,6 +44,7 @@ def test_psi_and_delta_say_nothing_of_the_unpolarised_part(ncs):
     np.testing.assert_allclose(residual(spectrum(ncs)), 0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_rotating_analyser_sees_n_and_c_as_they_are(ncs):
     """N = cos 2Ψ and C = sin 2Ψ cos Δ, as from α and β (`data.ellipsometry_angles`), whatever S was."""
     n, c, _ = ncs
