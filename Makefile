@@ -93,7 +93,7 @@ browser-tests: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-compile --editable ".[browser,explore]"
 	$(KEEP_MEMORY) $(QUICK_COMPILE) $(BIN)/python -m pytest -n 2 --dist loadfile -ra $(BROWSER_TESTS)
 
-# long statistical tests, and tests that a cheaper one covers
+# long statistical tests, tests that a cheaper one covers or that compile for seconds
 slow: $(VENV)/.dev
 	$(KEEP_MEMORY) $(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow $(EXACT)
 	$(KEEP_MEMORY) $(QUICK_COMPILE) $(BIN)/python -m pytest -n 2 --dist loadfile -m slow --durations 8 \
