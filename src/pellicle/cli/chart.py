@@ -72,11 +72,7 @@ def chart(
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
-        if not (layer is thickness is invert is None and view == "chart"):
-            raise UsageError(
-                "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
-            )
-        return _surface(described, out, sphere)
+        return _surface(described, out, sphere, layer is thickness is invert is None and view == "chart")
     scene = described.scene()
     angles = _range("--angle", angle, 90.0)
     nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
@@ -156,7 +152,11 @@ def _objects(
     return 0
 
 
-def _surface(recipe: SurfaceRecipe, out: str, flags: SphereFlags) -> int:
+def _surface(recipe: SurfaceRecipe, out: str, flags: SphereFlags, none_of_films: bool) -> int:
+    if not none_of_films:
+        raise UsageError(
+            "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
+        )
     if not 0 <= flags.light <= 180:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {flags.light:g}")
     surface = recipe.scene()

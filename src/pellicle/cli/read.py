@@ -72,11 +72,7 @@ def read(
     for measurement in found:
         _show(measurement, json)
     if out is not None:
-        from pellicle.data.colours import Colours
-
-        if formats != ["csv"] and any(isinstance(one, Colours) for one in found):
-            raise UsageError(f"--to {to}: colours are written as csv; leave it out")
-        _write(Path(out), found, [SUFFIXES[word] for word in formats])
+        _write(Path(out), found, formats)
     return worst
 
 
@@ -161,13 +157,15 @@ def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
     print(text, flush=True)
 
 
-def _write(folder: Path, found: list[Any], suffixes: list[str]) -> None:
+def _write(folder: Path, found: list[Any], formats: list[str]) -> None:
     from pellicle.data.colours import Colours, write_colours
     from pellicle.data.write_spectrum import write_spectrum
     from pellicle.reporting.figures import draw_spectrum as draw
     from pellicle.reporting.folders import distinct_stems
     from pellicle.reporting.matplotlib_figure import save_figure
 
+    if formats != ["csv"] and any(isinstance(one, Colours) for one in found):
+        raise UsageError(f"--to {','.join(formats)}: colours are written as csv; leave it out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -179,6 +177,6 @@ def _write(folder: Path, found: list[Any], suffixes: list[str]) -> None:
         if isinstance(one, Colours):
             written = [write_colours(folder / f"{stem}.csv", [one])]
         else:
-            written = [write_spectrum(folder / f"{stem}{suffix}", one) for suffix in suffixes]
+            written = [write_spectrum(folder / f"{stem}{SUFFIXES[word]}", one) for word in formats]
             written.append(save_figure(draw(one), folder / f"{stem}.png"))
         say(f"{folder}: {', '.join(path.name for path in written)} written")

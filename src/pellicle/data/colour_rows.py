@@ -99,14 +99,7 @@ def read_colour_rows(
     space = _space(file, chosen.kind, space)
     comma = delimiter != "," and any("," in row[i] for row in cells for i in chosen.channels)
     table = colour_table(file, names, rows, cells, comma)
-    numbers = table.numbers(
-        [*chosen.channels, *chosen.sigma, *([] if chosen.angle is None else [chosen.angle])]
-    )
-    values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
-    sigma = np.stack((rest[: len(chosen.sigma)] * 3)[:3], axis=1) if chosen.sigma else None
-    angle = rest[-1] if chosen.angle is not None else None
-    if chosen.kind == "xyY":
-        values = _from_chromaticity(table, chosen.channels, values)
+    values, sigma, angle = _numbers(table, chosen)
     where = [table.places(position) for position in chosen.channels]
     values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
     shown = ", ".join(names[i].strip() for i in chosen.channels)
@@ -131,6 +124,18 @@ def read_colour_rows(
         for film in dict.fromkeys(films.tolist())
         for of_film in [films == film]
     ]
+
+
+def _numbers(table: Table, chosen: _Columns) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+    """Values and their σ (rows, 3), and angles (rows,), as far as the table has them."""
+    numbers = table.numbers(
+        [*chosen.channels, *chosen.sigma, *([] if chosen.angle is None else [chosen.angle])]
+    )
+    values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
+    if chosen.kind == "xyY":
+        values = _from_chromaticity(table, chosen.channels, values)
+    sigma = np.stack((rest[: len(chosen.sigma)] * 3)[:3], axis=1) if chosen.sigma else None
+    return values, sigma, rest[-1] if chosen.angle is not None else None
 
 
 def is_colour_table(path: str | os.PathLike[str]) -> bool:

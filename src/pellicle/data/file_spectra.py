@@ -14,7 +14,7 @@ from pellicle.data.read_ellipsometry import (
 from pellicle.data.read_generalised import GeneralisedColumns, generalised_columns, has_generalised
 from pellicle.data.read_mueller import MuellerColumns, has_mueller, mueller_columns
 from pellicle.data.tabular.column_selection import SpectrumColumns, named_columns, signal_columns
-from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, listed
+from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import Generalised
@@ -58,34 +58,16 @@ def candidates(
             f"{table.path}: holds samples of a BRDF, not a spectrum; fit them with a `recipe` of the surface "
             "(Python: pl.read_brdf_samples)"
         )
-    own = table.layout.name
-    found = []
-    ratios = elements is not None and not set(elements).isdisjoint(Generalised().parts)
-    wanted = signal == Mueller.word or (signal is None and elements is not None and not ratios)
-    generally = signal == Generalised.word or (signal is None and ratios)
-    if generally or (
-        not wanted and signal is None and has_generalised(named) and not has_ellipsometry(named)
-    ):
-        found.append(
-            Candidate(
-                table,
-                generalised_columns(table, named, elements),
-                own or Generalised.word,
-                Generalised.word,
-                None,
-            )
-        )
-        if generally or not any(column.role in SIGNALS for column in named or ()):
-            return found
-    elif wanted or (signal is None and has_mueller(named) and not has_ellipsometry(named)):
-        chosen = mueller_columns(table, named, elements)
-        found.append(Candidate(table, chosen, own or Mueller.word, Mueller.word, None))
+    own, found = table.layout.name, []
+    word, wanted = _ellipsometric(named, signal, elements)
+    if word is not None:
+        if word == SIGNAL:
+            chosen = ellipsometry_columns(table, named)
+        else:
+            select = generalised_columns if word == Generalised.word else mueller_columns
+            chosen = select(table, named, elements)
+        found.append(Candidate(table, chosen, own or word, word, None))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
-            return found
-    elif signal == SIGNAL or (signal is None and has_ellipsometry(named)):
-        angles = ellipsometry_columns(table, named)
-        found.append(Candidate(table, angles, own or SIGNAL, SIGNAL, None))
-        if signal == SIGNAL or not any(column.role in SIGNALS for column in named or ()):
             return found
     powers = signal_columns(table, columns, signal, polarisation)
     for power in powers:
@@ -94,6 +76,21 @@ def candidates(
         label = own if alone else " ".join(part for part in (own, column.name) if part)
         found.append(Candidate(table, power, label or column.name, column.role, column.polarisation))
     return found
+
+
+def _ellipsometric(
+    named: Sequence[Column] | None, signal: str | None, elements: Sequence[str] | None
+) -> tuple[str | None, bool]:
+    """The signal of ellipsometry that a table has, None without one, and whether it was asked for."""
+    words = (Generalised.word, Mueller.word, SIGNAL)
+    if signal is not None:
+        return (signal, True) if signal in words else (None, False)
+    if elements is not None:
+        ratios = not set(elements).isdisjoint(Generalised().parts)
+        return (Generalised.word if ratios else Mueller.word), True
+    # psi and delta go before what only anisotropic samples need
+    present = ((SIGNAL, has_ellipsometry), (Generalised.word, has_generalised), (Mueller.word, has_mueller))
+    return next((word for word, has in present if has(named)), None), False
 
 
 def file_candidates(

@@ -111,16 +111,7 @@ def reflectance_from_counts(
             f"{sample.wavelength.shape}, got {known.shape}"
         )
     check_noise(noise)
-    background = 0.0 if dark is None else _interpolated(sample, dark, "dark")
-    full = _interpolated(sample, reference, "reference") - background
-    if full.min() <= 0:
-        first = sample.wavelength[np.argmax(full <= 0)]
-        above = "" if dark is None else " above the dark"
-        raise DataError(
-            f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
-            "leave those wavelengths out with `range`"
-        )
-    values = (sample.values - background) / full * known
+    values = _ratio(sample, reference, dark) * known
     sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
     remedy = "leave it out with `range`, or measure again"
     check_power(
@@ -142,6 +133,20 @@ def reflectance_from_counts(
         sweeps=tuple(each),
         declared=sample.declared,
     )
+
+
+def _ratio(sample: Spectrum, reference: Spectrum, dark: Spectrum | None) -> np.ndarray:
+    """(S − D) / (Ref − D) at the wavelengths of the sample."""
+    background = 0.0 if dark is None else _interpolated(sample, dark, "dark")
+    full = _interpolated(sample, reference, "reference") - background
+    if full.min() <= 0:
+        first = sample.wavelength[np.argmax(full <= 0)]
+        above = "" if dark is None else " above the dark"
+        raise DataError(
+            f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
+            "leave those wavelengths out with `range`"
+        )
+    return (sample.values - background) / full
 
 
 def _interpolated(sample: Spectrum, other: Spectrum, name: str) -> np.ndarray:

@@ -101,6 +101,22 @@ def _error_columns(table: Table, columns: Sequence[Column], values: Sequence[Col
     return found or ((one,) if one else ())
 
 
+def _sigmas(
+    table: Table, chosen: GeneralisedColumns, errors: list[np.ndarray], rows: np.ndarray, psi: np.ndarray
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """σ of Ψ and of Δ (rows, ratios) from the columns of `errors`; None without any."""
+    for column, error in zip(chosen.errors, errors, strict=True):
+        reason = f"is a standard deviation not above zero; {_REMEDY}"
+        refuse_first(error, error <= 0, table.places(column.position, rows), reason)
+    if len(errors) > 1:
+        of_psi, of_delta = (np.stack(errors[i::2], axis=1) for i in (0, 1))
+        return of_psi, of_delta
+    if not errors:
+        return None, None
+    of_psi = np.broadcast_to(errors[0][:, None], psi.shape)
+    return of_psi, delta_sigma(psi, of_psi)
+
+
 def read_generalised(
     table: Table,
     chosen: GeneralisedColumns,
@@ -125,20 +141,12 @@ def read_generalised(
     for i, name in enumerate(chosen.ratios):
         at_psi, at_delta = (table.places(c.position, rows) for c in chosen.values[2 * i : 2 * i + 2])
         check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{_REMEDY} ({name})")
-    errors = columns[count:] if noise is None else []
-    for column, error in zip(chosen.errors, errors, strict=False):
-        reason = f"is a standard deviation not above zero; {_REMEDY}"
-        refuse_first(error, error <= 0, table.places(column.position, rows), reason)
-    psi_sigma = delta_error = None
-    if noise is not None:
+    if noise is None:
+        psi_sigma, delta_error = _sigmas(table, chosen, columns[count:], rows, psi)
+    else:
         psi_sigma = np.full(psi.shape, float(noise))
-        notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    elif len(errors) == 1:
-        psi_sigma = np.broadcast_to(errors[0][:, None], psi.shape)
-    elif errors:
-        psi_sigma, delta_error = (np.stack(errors[i::2], axis=1) for i in (0, 1))
-    if psi_sigma is not None and delta_error is None:
         delta_error = delta_sigma(psi, psi_sigma)
+        notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
     return of_rows(
         sweep_numbers(axis.wavelength, axis.setting),
         {

@@ -78,6 +78,20 @@ def of_rows(number: Int[np.ndarray, " rows"], arrays: dict[str, Any], **words: A
     return mean_spectrum(sweeps)
 
 
+_EQUAL = (
+    "signal",
+    "transmission",
+    "elements",
+    "ratios",
+    "polarisation",
+    "folded",
+    "wavelength",
+    "angle",
+    "azimuth",
+)
+"""What sweeps that are averaged have in common."""
+
+
 def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     """Average repeated measurements of one spectrum, and keep them as its `sweeps`.
 
@@ -103,17 +117,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     first, count = sweeps[0], len(sweeps)
     if count < 2:
         raise UsageError("a mean needs two sweeps or more")
-    for name in (
-        "signal",
-        "transmission",
-        "elements",
-        "ratios",
-        "polarisation",
-        "folded",
-        "wavelength",
-        "angle",
-        "azimuth",
-    ):
+    for name in _EQUAL:
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
     copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]

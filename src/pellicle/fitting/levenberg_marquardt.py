@@ -163,26 +163,17 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
         cost, gradient, hessian, aux = normal_equations(fn, state.y_eval, args)
         cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
         accept = state.first | (cost < state.cost)
-        step, curvature = state.y_eval - y, state.curvature
-        # the secant of the gradient along the step, less what the model knew of it
-        known = jnp.where(accept, hessian, state.hessian) + curvature
-        missing = gradient - state.gradient - known @ step
-        along = missing @ step
-        defined = ~state.first & (
-            jnp.abs(along) > _RANK_ONE * jnp.linalg.norm(missing) * jnp.linalg.norm(step)
-        )
-        update = jnp.outer(missing, missing) / jnp.where(defined, along, 1)
-        curvature = jnp.where(defined & jnp.all(jnp.isfinite(update)), curvature + update, curvature)
-        fall = state.cost - cost
-        by_first, by_second = jnp.abs(state.predicted - fall)
-        corrected = jnp.where(jnp.isfinite(fall), by_second <= by_first, state.corrected)
-        gain = fall / jnp.maximum(state.predicted[state.corrected.astype(int)], jnp.finfo(y.dtype).tiny)
-        damping = state.damping * jnp.where(accept, jnp.clip(1 - (2 * gain - 1) ** 3, 0.1, 2), state.growth)
 
         def chosen(new, old):
             return jnp.where(accept, new, old)
 
         hessian = chosen(hessian, state.hessian)
+        curvature = _with_secant(state, state.y_eval - y, gradient, hessian)
+        fall = state.cost - cost
+        by_first, by_second = jnp.abs(state.predicted - fall)
+        corrected = jnp.where(jnp.isfinite(fall), by_second <= by_first, state.corrected)
+        gain = fall / jnp.maximum(state.predicted[state.corrected.astype(int)], jnp.finfo(y.dtype).tiny)
+        damping = state.damping * jnp.where(accept, jnp.clip(1 - (2 * gain - 1) ** 3, 0.1, 2), state.growth)
         top = jnp.maximum(state.top, jnp.diagonal(hessian))
         y = chosen(state.y_eval, y)
         gradient = chosen(gradient, state.gradient)
@@ -230,6 +221,15 @@ class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
         del fn, args, options, state, tags, result
         return y, aux, {}
+
+
+def _with_secant(state: State, step: Array, gradient: Any, hessian: Any) -> Array:
+    """The curvature, corrected by what the model did not know of the secant of the gradient along a step."""
+    missing = gradient - state.gradient - (hessian + state.curvature) @ step
+    along = missing @ step
+    defined = ~state.first & (jnp.abs(along) > _RANK_ONE * jnp.linalg.norm(missing) * jnp.linalg.norm(step))
+    update = jnp.outer(missing, missing) / jnp.where(defined, along, 1)
+    return jnp.where(defined & jnp.all(jnp.isfinite(update)), state.curvature + update, state.curvature)
 
 
 def _bounds(options: dict[str, Any], y: Array) -> tuple[Array, Array]:

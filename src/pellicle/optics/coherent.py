@@ -43,8 +43,7 @@ def responses(
     - `angle`: of incidence in radians, or `interface.Inside` for light from within a plate. None is
       normal incidence, where s and p are equal and only the first polarisation is computed.
     - `polarisations`: "s", "p" or "sp".
-    - `propagating`: promises that no wave is totally reflected in a real layer, which makes a film of
-      real index cheaper.
+    - `propagating`: promises that no wave is totally reflected in a real layer: a cheaper film.
     - `roughness`: k₀σ of each interface from the top down, one more than there are layers.
 
     **Returns:** one `Response` for each polarisation, in their order. With a `Principal` medium s and p

@@ -198,17 +198,7 @@ def read_rgl(
     brdf = load_rgl(path)
     channels = _channels(path, brdf, wavelengths) if bands is None else _band_channels(path, brdf, bands)
     lowest = np.cos(np.deg2rad(max_theta)) if max_theta < 90 else 0.0
-    pieces, beyond, invalid = [], 0, 0
-    for azimuth, theta in np.ndindex(brdf.values.shape[:2]):
-        i, o, factor, nodes = brdf.at_nodes(azimuth, theta)
-        stored = brdf.values[azimuth, theta].reshape(brdf.values.shape[2], -1)[:, nodes]
-        values = channels @ stored.astype(float) * factor
-        above = (o[2] > lowest) & (i[2] > lowest)
-        valid = above & np.all((values >= 0) & np.isfinite(values), axis=0)
-        beyond += int(np.sum(~above))
-        invalid += int(np.sum(above & ~valid))
-        pieces.append(np.concatenate([np.tile(i[:, None], o.shape[1]), o, values])[:, valid])
-    every = np.concatenate(pieces, axis=1)
+    every, beyond, invalid = _valid_nodes(brdf, channels, lowest)
     if not every.size:
         within = "" if max_theta == 90 else f" within {max_theta:g} degrees of the normal"
         raise DataError(f"{path}: has no valid value of a BRDF{within}; download it again")
@@ -232,6 +222,22 @@ def read_rgl(
             f"left out: {beyond} nodes with a direction {where}, {invalid} invalid (negative) ones",
         ),
     )
+
+
+def _valid_nodes(brdf: RglBrdf, channels: np.ndarray, lowest: float) -> tuple[np.ndarray, int, int]:
+    """Directions and values of the valid nodes, (6 + channels, nodes), with cosines above `lowest`; and the
+    number of nodes beyond it and of other invalid ones."""
+    pieces, beyond, invalid = [], 0, 0
+    for azimuth, theta in np.ndindex(brdf.values.shape[:2]):
+        i, o, factor, nodes = brdf.at_nodes(azimuth, theta)
+        stored = brdf.values[azimuth, theta].reshape(brdf.values.shape[2], -1)[:, nodes]
+        values = channels @ stored.astype(float) * factor
+        above = (o[2] > lowest) & (i[2] > lowest)
+        valid = above & np.all((values >= 0) & np.isfinite(values), axis=0)
+        beyond += int(np.sum(~above))
+        invalid += int(np.sum(above & ~valid))
+        pieces.append(np.concatenate([np.tile(i[:, None], o.shape[1]), o, values])[:, valid])
+    return np.concatenate(pieces, axis=1), beyond, invalid
 
 
 def _channels(path: str | os.PathLike[str], brdf: RglBrdf, wavelengths: Sequence[float] | None) -> np.ndarray:

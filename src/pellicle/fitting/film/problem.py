@@ -96,6 +96,7 @@ def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> Spect
         takes,
         spectrum.noise,
         points * channels,
+        channels,
         steepest,
         spectrum.signal,
     )

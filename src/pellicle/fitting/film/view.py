@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import jax
@@ -45,10 +44,11 @@ class SpectrumView:
     takes: tuple[int, ...]
     noise: Noise
     points: int  # data values: all channels of each wavelength
+    channels: int
     largest_index: float
     signal: Signal
 
-    @cached_property
+    @property
     def form(self) -> SpectrumForm:
         return SpectrumForm(self.plan.static_key, self.signal)
 
@@ -56,17 +56,12 @@ class SpectrumView:
     def arrays(self) -> tuple[Scene, Data]:
         return self.scene, self.data
 
-    @cached_property
-    def channels(self) -> int:
-        """Data values at each wavelength."""
-        return len(self.data.values) // len(self.scene.light.wavelength)
-
-    @cached_property
+    @property
     def rows(self) -> int:
         """Wavelengths without padding."""
         return self.points // self.channels
 
-    @cached_property
+    @property
     def measured_channels(self) -> int:
         """The first channels, which are measured: outwards from the sphere of N, C, S nothing is."""
         return self.channels if self.data.frame is None else self.channels - self.signal.outwards
@@ -76,7 +71,7 @@ class SpectrumView:
         """Independent data values: N, C and S lie on a sphere, so two of the three; elements count each."""
         return sum(group.independent for group in self.noise_groups)
 
-    @cached_property
+    @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
         """The channels of each noise."""
         return tuple(
