@@ -1,6 +1,9 @@
-"""Optical contrast, and Ψ and Δ in transmission, from end to end."""
+"""Optical contrast, Ψ and Δ in transmission, and counts against a stack, from end to end."""
 
+import numpy as np
 import pytest
+
+import pellicle as pl
 
 CONTRAST = """
 [data]
@@ -59,3 +62,40 @@ def test_flags_of_transmission(pellicle, tmp_path):
     flags = ["--layer", "2.1+0.01j", "--substrate", "1.52", "--thickness", "10:400", "--transmission"]
     [record] = pellicle("fit", data, *flags, "--json").objects
     assert record["parameters"]["thickness"]["value"] == pytest.approx(180.0, abs=1.0)
+
+
+COUNTS = """
+[data]
+files = ["film.csv"]
+signal = "R"
+noise = 0.002
+{reference}
+
+[scene]
+substrate = "Si"
+layer = [{{ material = "SiO2", thickness = {{ lower = 100, upper = 800 }} }}]
+
+[reference]
+substrate = "Si"
+layer = [{{ material = "SiO2", thickness = 100 }}]
+"""
+
+
+def test_counts_of_a_film_and_of_a_stack_of_known_layers(pellicle, tmp_path):
+    nm = np.linspace(450.0, 850.0, 100)
+    lamp = 4e4 * np.exp(-(((nm - 650) / 150) ** 2)) + 2000
+    for name, thickness in (("film", 450.0), ("wafer", 100.0)):
+        seen = pl.simulate(pl.Scene(pl.Layer("SiO2", thickness), "Si"), nm).values
+        rows = [f"{x},{y}" for x, y in zip(nm, lamp * seen, strict=True)]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["nm,counts", *rows]), encoding="utf-8")
+    path = tmp_path / "film.toml"
+    path.write_text(COUNTS.format(reference='reference = "wafer.csv"'), encoding="utf-8")
+    [record] = pellicle("fit", "--recipe", path, "--json", "--out", tmp_path / "out").objects
+    assert record["parameters"]["thickness"]["value"] == pytest.approx(450.0, abs=0.1)
+    [again] = pellicle("fit", "--recipe", tmp_path / "out" / "recipe.toml", "--json").objects
+    assert again["parameters"] == record["parameters"]
+    twice = pellicle("fit", "--recipe", path, "--reference-material", "Si")
+    assert (twice.code, "leave one out" in twice.err) == (3, True)
+    path.write_text(COUNTS.format(reference=""), encoding="utf-8")
+    alone = pellicle("fit", "--recipe", path)
+    assert (alone.code, "no column of reference counts" in alone.err) == (3, True)

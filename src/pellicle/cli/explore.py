@@ -83,7 +83,6 @@ def _of_recipe(path: str) -> Session:
     from pellicle.explorer.session import Session
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
-    from pellicle.scene.instrument import Drift
 
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
@@ -93,8 +92,7 @@ def _of_recipe(path: str) -> Session:
     spectra = []
     if recipe.files and data.signal not in SPACES:
         try:
-            free_scale = isinstance(scene.instrument.scale, Drift)
-            spectra = read(recipe.files[0], FileOptions(**own.reading), free_scale=free_scale)
+            spectra = read(recipe.files[0], FileOptions(**own.reading), scene)
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(own, scene)

@@ -259,7 +259,6 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
     """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
     each of several spectra."""
     from pellicle.data.file_spectra import ALL
-    from pellicle.scene.instrument import Drift
 
     if is_of_colours(path, reading):
         try:
@@ -272,7 +271,7 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
             Input(film.source, partial(list, [film]), scene, own_scale, path, film.name) for film in films
         ]
     refuse_camera(path, reading)
-    read_file = partial(read, path, reading, free_scale=isinstance(scene.instrument.scale, Drift))
+    read_file = partial(read, path, reading, scene)
     if reading.spectrum == ALL:
         try:
             found = read_file()

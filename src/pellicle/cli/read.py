@@ -128,7 +128,7 @@ def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
     import numpy as np
 
     every = replace(options, spectrum=options.spectrum or "all")
-    found = read_file(path, every, free_scale=False)
+    found = read_file(path, every)
     if options.angle is None:
         return found
     if isinstance(options.angle, list):

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
     from pellicle.recipes.film import FilmRecipe
+    from pellicle.scene.film import Scene
+    from pellicle.scene.reference import Reference
 
 _PIXELS = ("region", "points")
 
@@ -25,15 +27,20 @@ def of_kind(kind: str) -> set[str]:
     return {name for name, (_, option) in FileOptions.declared().items() if kind in option.kinds}
 
 
-def read(path: str, options: FileOptions, *, free_scale: bool) -> list[Spectrum]:
-    """Read the spectra of a file that are meant; with a `free_scale` any level is acceptable.
+def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Spectrum]:
+    """Read the spectra of a file that are meant; where the scale of the `scene` is free any level is
+    acceptable, and its reference is that of counts.
 
     Raises DataError or UsageError.
     """
     from pellicle.data.read_spectrum import read_spectra
+    from pellicle.scene.instrument import Drift
 
-    if options.reference is not None or options.reference_material is not None:
-        return [_from_counts(path, options)]
+    stack = None if scene is None else scene.reference
+    of_counts = options.reference is not None or options.reference_material is not None
+    if of_counts or (stack is not None and options.signal == "R"):
+        return [_from_counts(path, options, stack)]
+    free_scale = scene is not None and isinstance(scene.instrument.scale, Drift)
     if options.dark is not None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     stated = {name: x for name, x in options.given().items() if name in SpectrumOptions.declared()}
@@ -56,16 +63,12 @@ def sigma(noise: float | str | None) -> float | None:
     return level.value
 
 
-def _from_counts(path: str, options: FileOptions) -> Spectrum:
-    """Reflectance from raw counts of a sample and of a bare reference (a polished surface).
+def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Spectrum:
+    """Reflectance from raw counts of a sample and of a reference: a polished surface, or a `stack`.
 
     Without a file of the reference, its counts and those without light lie beside those of the sample.
     """
-    import numpy as np
-
     from pellicle.data.read_counts import read_counts, read_counts_beside, reflectance_from_counts
-    from pellicle.recipes.media_words import medium
-    from pellicle.simulation.functions import reflectance
 
     if options.signal not in (None, "R"):
         raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")
@@ -83,15 +86,30 @@ def _from_counts(path: str, options: FileOptions) -> Spectrum:
         dark = read_counts(options.dark, **table)
     else:
         dark = read_counts_beside(path, "dark counts", **table)
-    known = reflectance(
-        sample.wavelength,
-        0.0,
-        1.0,
-        medium(options.reference_material or "Si", name="`reference_material`"),
-        angle=options.angle or 0.0,
-        polarisation=options.polarisation or "unpolarised",
-    )
-    return reflectance_from_counts(sample, reference, np.asarray(known), dark, noise=sigma(options.noise))
+    known = _reference_reflectance(sample.wavelength, options, stack)
+    return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise))
+
+
+def _reference_reflectance(
+    wavelength: np.ndarray, options: FileOptions, stack: Reference | None
+) -> np.ndarray:
+    from pellicle.recipes.media_words import medium
+    from pellicle.scene.film import Light, Scene
+    from pellicle.scene.layers import Layer
+    from pellicle.scene.reference import Reference
+    from pellicle.simulation.spectra import simulate_spectrum
+
+    if stack is None:
+        stack = Reference(medium(options.reference_material or "Si", name="`reference_material`"))
+    elif options.reference_material is not None:
+        raise UsageError(
+            "the reference is described twice, by [reference] of the recipe and by --reference-material:"
+            " leave one out"
+        )
+    light = Light(None, options.angle or 0.0, "R", options.polarisation or "unpolarised")
+    return simulate_spectrum(
+        Scene(stack.layers or Layer(1.0, 0.0), stack.substrate, light=light), wavelength
+    ).values
 
 
 def is_of_colours(path: str, reading: FileOptions) -> bool:

@@ -63,12 +63,11 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     from pellicle.cli.flags import light
     from pellicle.cli.reading import read
     from pellicle.scene.film import Light
-    from pellicle.scene.instrument import Drift
 
     path = recipe.files[0]
     own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own keys
     scene, options = own.scene(), FileOptions(**own.reading)
-    spectrum = read(path, options, free_scale=isinstance(scene.instrument.scale, Drift))[0]
+    spectrum = read(path, options, scene)[0]
     say(f"wavelengths: those of {path} (the recipe gives none)")
     stated, first = light(options), spectrum.settings[0]
     angle = stated.angle if spectrum.angle is None else first.angle

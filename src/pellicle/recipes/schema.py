@@ -185,7 +185,7 @@ class SceneTable(_Table):
 
 
 class ReferenceTable(_Table):
-    """`[reference]`: the known sample with which a contrast is measured."""
+    """`[reference]`: the known sample with which a contrast or counts are measured."""
 
     substrate: Medium | PlateTable
     layer: list[LayerTable] = []

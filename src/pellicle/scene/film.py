@@ -127,7 +127,7 @@ class Scene(eqx.Module):
     - `ambient`: the medium of the incident light, which must not absorb.
     - `light`: a `Light`.
     - `instrument`: an `Instrument`.
-    - `reference`: a `Reference`, with which a contrast is measured.
+    - `reference`: a `Reference`, with which a contrast or raw counts are measured.
     - `uncertainty`: an `Uncertainty` of what the scene states or leaves out; it enters the errors of a fit.
 
     **Raises:** ValueError where the ambient absorbs, without layers, and where the parts contradict.
