@@ -13,7 +13,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FITS = ROOT / "fits"
-QUICK = "brush_19-1-1"
 
 
 @pytest.fixture(scope="module")
@@ -65,13 +64,7 @@ def test_changes_are_reported(script):
     assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 5.0", "n is new"]
 
 
-@pytest.mark.slow
-def test_one_study_is_reproduced(script, monkeypatch):
-    monkeypatch.setenv("PELLICLE_CACHE", "off")
-    assert script.rerun(FITS / QUICK) == []
-
-
-@pytest.mark.slow  # two minutes; the test above fits one film in every run
+@pytest.mark.slow  # two minutes
 def test_all_studies_are_reproduced(script, monkeypatch):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
     assert {script.name_of(study): script.rerun(study) for study in script.studies()} == {

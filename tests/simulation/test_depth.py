@@ -53,7 +53,6 @@ def reference(i, letter):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("letter", "sp")
 def test_random_stacks_as_tmm(computed, letter):
     absorbed, R, _, field = computed[letter]
