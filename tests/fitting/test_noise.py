@@ -88,6 +88,7 @@ def test_student_is_wider_than_normal(chi2):
 def test_typical_noise_is_the_median_of_the_local_noise(points):
     values = RANDOM.normal(size=(20, points))
     assert typical_noise(values) == pytest.approx(np.median(local_noise(values), axis=1))
+    assert np.array_equal(typical_noise(values), [typical_noise(each) for each in values])  # one: another way
 
 
 def test_correlation_times_by_sums_of_products_are_those_by_a_fourier_transform():

@@ -67,11 +67,18 @@ def local_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
     points = values.shape[-1]
     if points < 5:
         return np.broadcast_to(np.maximum(np.ptp(values, axis=-1, keepdims=True), 1e-12), values.shape)
-    rough, reach = _roughness(values), min(window, points) // 2
-    padded = np.pad(rough, [(0, 0)] * (rough.ndim - 1) + [(reach, reach)], mode="reflect")
+    rough = _roughness(values)
+    least = median(rough, -1)[..., None] / 3
+    return MAD_TO_SIGMA * np.maximum(_running_median(rough, window), least)
+
+
+def _running_median(values: np.ndarray, window: int) -> np.ndarray:
+    """Median in a window around each point (..., points): NumPy sorts short rows faster than it finds their
+    median."""
+    reach = min(window, values.shape[-1]) // 2
+    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1)
-    least = np.median(rough, axis=-1, keepdims=True) / 3
-    return MAD_TO_SIGMA * np.maximum(np.median(windows, axis=-1), least)
+    return np.sort(windows, axis=-1)[..., reach]
 
 
 def _roughness(values: np.ndarray) -> np.ndarray:
@@ -83,12 +90,16 @@ def _roughness(values: np.ndarray) -> np.ndarray:
 def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
     """Median (...) of the local noise of `values` (..., points).
 
-    The running medians of `local_noise` are not computed: how many of them are below a size follows from
-    counts, and the size that half of them are below by bisection.
+    Of many spectra the running medians of `local_noise` are not computed: how many of them are below a size
+    follows from counts, and the size that half of them are below by bisection.
     """
     points = values.shape[-1]
     if points < 5:
         return np.asarray(np.maximum(np.ptp(values, axis=-1), 1e-12))
+    if values.ndim == 1:
+        rough = _roughness(values)
+        middle = median(_running_median(rough, window))
+        return np.asarray(MAD_TO_SIGMA * np.maximum(middle, median(rough) / 3))
     rough, reach = _roughness(values.reshape(-1, points)), min(window, points) // 2
     around = np.pad(rough, [(0, 0), (reach, reach)], mode="reflect")
     ordered = np.sort(rough, axis=1)
