@@ -59,8 +59,9 @@ test: $(VENV)/.dev
 exact: $(VENV)/.dev
 	$(KEEP_MEMORY) $(ONE_THREAD) $(PYTEST) $(EXACT)
 
+# of all tests, those of make slow too
 coverage: $(VENV)/.dev
-	$(PYTEST) --cov --cov-report=term
+	$(BIN)/python -m pytest -n 2 --dist loadfile --cov --cov-report=term
 
 # executed once, for the reader and for the documentation. PELLICLE_SHORT=1 is for tests: fewer points, quick compilation
 notebooks: $(VENV)/.dev
