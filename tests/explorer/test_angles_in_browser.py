@@ -161,6 +161,28 @@ def test_a_slider_moves_every_curve_and_the_list_is_edited_by_keys(opened):
     assert "angles" not in page.url
 
 
+def test_of_two_lists_the_later_counts_though_its_answer_comes_first(opened):
+    page = opened()
+    asked = []
+
+    def first_is_late(route):
+        asked.append(route.request.url)
+        if len(asked) == 1:
+            page.wait_for_timeout(1500)
+        route.continue_()
+
+    page.route("**/api/scene*", first_is_late)
+    box = angle_list(page)
+    for listed in ("60, 70", "55, 65"):
+        box.fill(listed)
+        box.press("Enter")
+    settle(page)
+    assert len(asked) == 2
+    drawn = list(traces(page))
+    assert drawn == [f"{signal} {angle}°" for signal in "ΨΔ" for angle in (55, 65)]
+    assert box.input_value() == "55, 65"
+
+
 def test_an_address_with_wrong_angles_shows_the_scene(opened):
     page = opened("&angles=65,x&thickness=300")
     assert "from 0 to 90" in page.get_by_role("alert").inner_text()

@@ -83,21 +83,11 @@ def simulate(
     """
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe
-    from pellicle.signals.registry import KINDS
 
-    if json and depth is None:
-        raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
-    spread = how.spread()
-    not_negative("--tolerance", how.tolerance)
+    spread = _checked_spread(how, depth, json)
     described = read_recipe(recipe)
-    if how.depolarisation_noise is not None:
-        not_negative("--depolarisation-noise", how.depolarisation_noise)
-        kind = None if isinstance(described, SurfaceRecipe) else KINDS.get(described.tables.data.signal or "")
-        if kind is None or "depolarisation" not in kind.keywords:
-            raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
+    _check_depolarisation(described, how.depolarisation_noise)
     if depth is not None:
-        if spread or how.tolerance:
-            raise UsageError("--depth is exact: leave out --noise and --tolerance")
         _write_depth_profile(described, out, _wavelengths_of(depth), json)
         return 0
     start()
@@ -114,6 +104,30 @@ def simulate(
     else:
         _write_spectrum(described, out, noise, how, comments)
     return 0
+
+
+def _checked_spread(how: SimulationFlags, depth: str | None, json: bool) -> float | str | None:
+    """Return the noise that is given. Raises UsageError for flags that contradict each other."""
+    if json and depth is None:
+        raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
+    spread = how.spread()
+    not_negative("--tolerance", how.tolerance)
+    if depth is not None and (spread or how.tolerance):
+        raise UsageError("--depth is exact: leave out --noise and --tolerance")
+    return spread
+
+
+def _check_depolarisation(described: FilmRecipe | SurfaceRecipe, noise: float | None) -> None:
+    """Raise UsageError where noise of a depolarisation is given that the signal does not have."""
+    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.signals.registry import KINDS
+
+    if noise is None:
+        return
+    not_negative("--depolarisation-noise", noise)
+    kind = None if isinstance(described, SurfaceRecipe) else KINDS.get(described.tables.data.signal or "")
+    if kind is None or "depolarisation" not in kind.keywords:
+        raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
 
 
 def _source(recipe: str, noise: Any, seed: int) -> str:

@@ -113,10 +113,8 @@ def reflectance_from_counts(
     check_noise(noise)
     values = _ratio(sample, reference, dark) * known
     sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
-    remedy = "leave it out with `range`, or measure again"
-    check_power(
-        "reflectance", values, sigma, sample.place("reflectance from counts"), too_high=remedy, remedy=remedy
-    )
+    place, remedy = sample.place("reflectance from counts"), "leave it out with `range`, or measure again"
+    check_power("reflectance", values, sigma, place, too_high=remedy, remedy=remedy)
     each = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
     return Spectrum(
         wavelength=sample.wavelength,

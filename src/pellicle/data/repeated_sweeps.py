@@ -126,8 +126,7 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
         kept = [sweep for i, sweep in enumerate(sweeps) if i not in copies]
         one = kept[0] if len(kept) == 1 else mean_spectrum(kept)
         return dataclasses.replace(one, notes=(*one.notes, note))
-    size, alike = repeatability(sweeps), _alike(deviations(sweeps))
-    mean = _mean(sweeps)
+    size, alike, mean = repeatability(sweeps), _alike(deviations(sweeps)), _mean(sweeps)
     level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
     if first.kind.degrees:
         level, unit = math.degrees(0.5), " degrees"

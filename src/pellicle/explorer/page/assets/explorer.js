@@ -85,18 +85,19 @@ export async function explore(element, call, options = {}) {
   let angles = null; // of incidence, where they are not those of the scene
   let limit = Infinity; // bytes of a file
   let serial = 0;
+  let turns = 0; // scenes that were asked for
   let gesture = false; // a slider is being moved
   let planTimer = null;
   let againTimer = null;
   let pending = 0; // requests and drawings under way
   const unfinished = new Set(); // parts of the view whose programs are being compiled
   const values = () => Object.fromEntries(controls.map((each) => [each.about.name, each.value]));
-  const view = (...want) => () => ({ values: values(), want, serial: ++serial, moving: gesture });
+  const view = (...want) => () => ({ values: values(), want, serial: ++serial, turn: turns, moving: gesture });
   const asView = (body) => ask("view", body);
   const refresh = () => askCurves(view("curves", "colour"));
 
   const askCurves = newestOf(asView, (answer, asked) => {
-    if (answer.error) return;
+    if (answer.error || asked.turn !== turns) return; // curves of another scene
     if (answer.curves) plot.curves = answer.curves;
     if (answer.colour) showColour(answer.colour);
     showWarnings(answer.warnings ?? []);
@@ -183,10 +184,12 @@ export async function explore(element, call, options = {}) {
 
   /**
    * Makes the sliders of a scene, at the values of `given` and at the angles of incidence `listed`, null for its own.
-   * Returns whether there is a scene.
+   * Returns whether there is a scene; null where another one was asked for meanwhile.
    */
   async function takeScene(given, listed = null) {
+    const turn = ++turns;
     const scene = await ask("scene", { angles: listed });
+    if (turn !== turns) return null;
     if (scene.error) return false;
     angles = listed !== null && scene.angles?.length ? scene.angles : listed; // in rising order
     const marked = new Map(controls.map((each) => [each.about.name, each.free.checked]));
@@ -222,7 +225,9 @@ export async function explore(element, call, options = {}) {
 
   /** Draws a curve for each angle of a list, at the values of the sliders. */
   async function takeAngles(listed, wanted = values()) {
-    if (!(await takeScene(new URLSearchParams(Object.entries(wanted)), listed))) return angleList.refuse();
+    const found = await takeScene(new URLSearchParams(Object.entries(wanted)), listed);
+    if (found === null) return;
+    if (!found) return angleList.refuse();
     tellChange();
     refresh();
   }
