@@ -65,10 +65,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
 
 
 def test_places_that_cannot_be_written(tmp_path):
-    with pytest.raises(
-        UsageError,
-        match=r"written \(there is no folder .*nowhere\); make it.*`path`",
-    ):
+    with pytest.raises(UsageError, match=r"written \(there is no folder .*nowhere\); make it.*`path`"):
         write_text(tmp_path / "nowhere" / "a.txt", "")
     with pytest.raises(UsageError, match="is a folder, not a file"):
         write_text(tmp_path, "", overwrite=True)

@@ -144,11 +144,7 @@ def test_an_opaque_film_reflects_like_one_face():
 
 def test_total_reflection_is_total():
     glass = {**SHADER, "ambient_n": 1.5, "n": 1.3, "base_n": 1.0}
-    for reflectance in (
-        film_colour.reflectance,
-        blinn_phong_film.published,
-        blinn_phong_film.phase_average,
-    ):
+    for reflectance in (film_colour.reflectance, blinn_phong_film.published, blinn_phong_film.phase_average):
         assert float(reflectance(glass, jnp.array(1.2))[0]) == pytest.approx(1, rel=1e-12)
 
 

@@ -16,11 +16,7 @@ from pellicle.colour import delta_e2000, film, film_colour, integration_bands, l
 
 THICKNESS = np.array([0.0, 40.0, 150.0, 420.0, 900.0, 1600.0])
 ANGLE = np.array([0.0, 55.0])[:, None]
-MEDIA = {
-    "oxide on iron": (2.9, 2.7 + 2.8j),
-    "soap": (1.33, 1.0),
-    "grey film on glass": (2.0 + 0.08j, 1.5),
-}
+MEDIA = {"oxide on iron": (2.9, 2.7 + 2.8j), "soap": (1.33, 1.0), "grey film on glass": (2.0 + 0.08j, 1.5)}
 # limit of the mean ΔE2000 of each method under D65 on these films; the worst measured is beside it
 LIMITS = {
     "points-645-525-445": 35.0,
@@ -70,10 +66,7 @@ def test_every_method_is_near_the_reference(film):
 
 @pytest.mark.parametrize(
     ("name", "illuminant", "limit"),
-    [
-        *(("gaussians-8", lamp, 0.1) for lamp in ("E", "D50", "D55", "D75", "A")),
-        ("uniform-64", "A", 0.05),
-    ],
+    [*(("gaussians-8", lamp, 0.1) for lamp in ("E", "D50", "D55", "D75", "A")), ("uniform-64", "A", 0.05)],
 )
 def test_other_illuminants(name, illuminant, limit):
     """Measured: 0.071, 0.062, 0.059, 0.065, 0.078 and 0.017."""

@@ -153,11 +153,7 @@ def test_a_fit_finds_the_porosity(tmp_path):
     def porous(fraction):
         return Bruggeman(material("TiO2"), Constant(1.0), fraction)
 
-    fit = _fit(
-        tmp_path,
-        pl.Layer(porous(0.35), 230.0),
-        pl.Layer(porous(pl.Free(0, 0.9)), pl.Free(50, 500)),
-    )
+    fit = _fit(tmp_path, pl.Layer(porous(0.35), 230.0), pl.Layer(porous(pl.Free(0, 0.9)), pl.Free(50, 500)))
     found = fit.parameters
     assert fit.status.value == "converged"
     assert found["fraction"].value == pytest.approx(0.35, abs=4 * found["fraction"].stderr_noise)

@@ -22,10 +22,7 @@ from pellicle.optics.pair import Pair, imag, is_real, real, to_complex
 WAVELENGTH = np.linspace(400.0, 800.0, 9)
 TABLE = Table([400.0, 500.0, 800.0], [1.5, 1.4, 1.3], [0.3, 0.2, 0.0])
 # BK7 (SCHOTT data sheet N-BK7, B and C there in µm²), n_d = 1.5168 at 587.5618 nm
-BK7 = Sellmeier(
-    (1.03961212, 0.231792344, 1.01046945),
-    (0.00600069867e6, 0.0200179144e6, 103.560653e6),
-)
+BK7 = Sellmeier((1.03961212, 0.231792344, 1.01046945), (0.00600069867e6, 0.0200179144e6, 103.560653e6))
 MODELS = {
     "constant": Constant(1.46),
     "absorbing constant": Constant(2.1, 0.3),

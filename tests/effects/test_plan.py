@@ -40,12 +40,7 @@ TABLE = [
     ("stack", False, "one layer", scene()),
     ("stack", True, "2 coherent layers", pl.Scene([pl.Layer(1.46, 10.0), pl.Layer(2.0, 20.0)], 1.5)),
     ("absorption", True, "extinction is free, or not zero", scene(Constant(1.46, FREE_K))),
-    (
-        "absorption",
-        True,
-        "extinction is free, or not zero",
-        scene(Shifted(Constant(1.46), k=FREE_K)),
-    ),
+    ("absorption", True, "extinction is free, or not zero", scene(Shifted(Constant(1.46), k=FREE_K))),
     ("gradient", False, "no layer is graded", scene()),
     ("gradient", True, "slices of sixth order", scene(GRADED)),
     ("gradient", True, "Re ε passes 0", scene(pl.Graded(1.46, 0.5 + 3j, mix="linear"), angle=60.0)),
@@ -93,12 +88,7 @@ TABLE = [
         "by bandwidth and uneven thickness",
         scene(instrument=pl.Instrument("free", 0.0, 1, 1)),
     ),
-    (
-        "coherence",
-        True,
-        "bandwidth",
-        scene(instrument=pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0))),
-    ),
+    ("coherence", True, "bandwidth", scene(instrument=pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0)))),
     (
         "coherence",
         True,
@@ -139,12 +129,7 @@ TABLE = [
         pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air")),
     ),
     ("dispersion", False, "no index varies", scene()),
-    (
-        "dispersion",
-        False,
-        "one wavelength",
-        scene(Cauchy(1.4, 1e4), wavelength=np.array([600.0])),
-    ),
+    ("dispersion", False, "one wavelength", scene(Cauchy(1.4, 1e4), wavelength=np.array([600.0]))),
     ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
     ("dispersion", True, "the index of layer varies", scene(Cauchy(1.4, pl.Free(0, 1)))),
     ("opaque", False, "light may reach every layer", scene(0.2 + 3j)),
@@ -200,11 +185,7 @@ def test_a_start_value_decides_nothing():
     def plan(value):
         free = [pl.Free(0, upper, start=value * upper) for upper in (1.0, 60.0, 9.0)]
         return pl.plan(
-            scene(
-                Constant(1.46, free[0]),
-                angle=free[1],
-                instrument=pl.Instrument(bandwidth=free[2]),
-            )
+            scene(Constant(1.46, free[0]), angle=free[1], instrument=pl.Instrument(bandwidth=free[2]))
         )
 
     for row, same in zip(plan(0.0).rows, plan(0.5).rows, strict=True):
@@ -217,19 +198,12 @@ def test_orders_need_wavelengths():
 
 
 ORDERS = {
-    "oxide on silicon": scene(
-        Constant(pl.Free(1.3, 1.7)),
-        thickness=pl.Free(10, 900),
-        instrument=BANDWIDTH,
-    ),
+    "oxide on silicon": scene(Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), instrument=BANDWIDTH),
     "titania on silicon, oblique": scene(
         2.5, thickness=pl.Free(10, 900), angle=pl.Free(0, 60), instrument=BANDWIDTH
     ),
     "absorbing on metal": scene(
-        Constant(2.1, pl.Free(0, 0.2)),
-        0.2 + 3.4j,
-        pl.Free(10, 900),
-        instrument=BANDWIDTH,
+        Constant(2.1, pl.Free(0, 0.2)), 0.2 + 3.4j, pl.Free(10, 900), instrument=BANDWIDTH
     ),
     "polymer on glass": scene(1.6, 1.52, pl.Free(10, 900), instrument=BANDWIDTH),
 }

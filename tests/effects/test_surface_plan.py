@@ -23,24 +23,11 @@ TOLERANCE = 1e-3
 HEIGHT = Free(40.0, 300.0)
 FACETS = Surface(
     "microfacet-film",
-    {
-        "thickness": Free(40.0, 300.0),
-        "n": 1.5,
-        "k": 1e-6,
-        "base_n": 1.9,
-        "base_k": 0,
-        "diffuse": 1e-7,
-    },
+    {"thickness": Free(40.0, 300.0), "n": 1.5, "k": 1e-6, "base_n": 1.9, "base_k": 0, "diffuse": 1e-7},
 )
 LOBES = Surface(
     "granier-heidrich-reciprocal",
-    {
-        "thickness": Free(40.0, 300.0),
-        "n": 1.5,
-        "deviation": 1e-4,
-        "azimuth": 30.0,
-        "diffuse": 0.3,
-    },
+    {"thickness": Free(40.0, 300.0), "n": 1.5, "deviation": 1e-4, "azimuth": 30.0, "diffuse": 0.3},
 )
 GONE = {
     "facets": (FACETS, {"absorption", "diffuse", "precision"}),

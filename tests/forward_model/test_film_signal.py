@@ -125,10 +125,7 @@ def primitives(thing, plan=None):
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
 LEAVES_NO_TRACE = {
     "absorption": (scene(), scene(1.46 + 0.1j)),
-    "absorption, k fixed at 0": (
-        scene(Constant(1.46, 0.0)),
-        scene(Constant(1.46, 0.1)),
-    ),
+    "absorption, k fixed at 0": (scene(Constant(1.46, 0.0)), scene(Constant(1.46, 0.1))),
     "oblique": (scene(polarisation="p"), scene(polarisation="p", angle=30.0)),
     "angle shift": (scene(angle=30.0), scene(angle=30.0, instrument=SHIFTED)),
     "polarisation": (scene(angle=30.0, polarisation="s"), scene(angle=30.0)),

@@ -95,8 +95,7 @@ def test_a_chain_that_is_too_short_gives_no_interval(bands, film):
 
 
 @pytest.mark.parametrize(
-    ("walkers", "sentence"),
-    [(3, "an even number"), (2, "at least 4"), (10**9, "GiB and the machine has")],
+    ("walkers", "sentence"), [(3, "an even number"), (2, "at least 4"), (10**9, "GiB and the machine has")]
 )
 def test_impossible_walkers_are_refused(bands, film, walkers, sentence):
     with pytest.raises(UsageError, match=sentence):

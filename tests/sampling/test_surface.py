@@ -166,8 +166,7 @@ def test_correlated_samples_count_as_fewer(monkeypatch, known):
 
 
 @pytest.mark.parametrize(
-    ("status", "assumption"),
-    [(pl.Status.NOT_IDENTIFIABLE, "there is a layer"), (pl.Status.AMBIGUOUS, "")],
+    ("status", "assumption"), [(pl.Status.NOT_IDENTIFIABLE, "there is a layer"), (pl.Status.AMBIGUOUS, "")]
 )
 def test_without_evidence_of_a_layer_a_posterior_assumes_one(monkeypatch, known, status, assumption):
     """But one of several thicknesses is a layer all the same."""

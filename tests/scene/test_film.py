@@ -52,10 +52,7 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: pl.Layer(1.46, pl.Free(-5, 5)), "`thickness` must not be negative, got -5 nm"),
         (lambda: pl.Layer(1.46 - 0.1j, 5), "negative imaginary part, which is gain"),
         (lambda: pl.Layer("Unobtainium", 5), "Unobtainium"),
-        (
-            lambda: pl.Layer("cauchy", 100.0),
-            r"'cauchy' is a dispersion model.* pl\.dispersion\.Cauchy",
-        ),
+        (lambda: pl.Layer("cauchy", 100.0), r"'cauchy' is a dispersion model.* pl\.dispersion\.Cauchy"),
         (lambda: pl.Layer("tauc-lorentz", 5), r"give pl\.dispersion\.TaucLorentz\(\.\.\.\), with pl\.Free"),
         (lambda: pl.Layer("cauchy(1.4,3000)", 5), r"pl\.dispersion\.Cauchy"),
         (lambda: pl.Layer(-1.46, 5), "index -1.46 has a negative real part"),

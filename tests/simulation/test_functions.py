@@ -97,12 +97,7 @@ def test_an_integer_is_a_number_too(function):
 def test_precision_follows_the_input(function, dtype):
     """Python numbers, and materials, take the precision of the arrays beside them."""
     wavelength = np.linspace(400, 800, 3, dtype=dtype)
-    for media in (
-        (1.46, 3.9),
-        (2.1 + 0.1j, 3.9 + 0.02j),
-        ("SiO2", "Si"),
-        (Cauchy(1.45, 3e3), 1.5),
-    ):
+    for media in ((1.46, 3.9), (2.1 + 0.1j, 3.9 + 0.02j), ("SiO2", "Si"), (Cauchy(1.45, 3e3), 1.5)):
         for angle in (0.0, 30.0, dtype(30)):
             assert function(wavelength, 100.0, *media, angle=angle).dtype == dtype
 

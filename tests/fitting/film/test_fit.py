@@ -31,11 +31,7 @@ def agrees(fit, truth, sigmas=4.0):
 @pytest.mark.slow  # compiles for 5 s each; test_search.py recovers thickness and n
 @pytest.mark.parametrize("signal", ["R", "T"])
 def test_thickness_n_and_k(film, measured, signal):
-    scene = film(
-        material=Constant(N, K),
-        substrate=Constant(1.5),
-        light=pl.Light(signal=signal),
-    )
+    scene = film(material=Constant(N, K), substrate=Constant(1.5), light=pl.Light(signal=signal))
     fit = pl.fit(measured(scene, 1.72, 0.03, 480.0, noise=0.002), scene)
     agrees(fit, {"n": 1.72, "k": 0.03, "thickness": 480.0})
     assert fit.rms == pytest.approx(0.002, rel=0.2)

@@ -125,10 +125,7 @@ def test_progress_is_reported(film, measured):
 CASES = {
     "thickness": (lambda: 1.46 + 0.0, ()),
     "thickness and n": (lambda: pl.dispersion.Constant(pl.Free(1.3, 1.95)), ("n",)),
-    "thickness and Cauchy": (
-        lambda: pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 3e4)),
-        ("A", "B"),
-    ),
+    "thickness and Cauchy": (lambda: pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 3e4)), ("A", "B")),
 }
 
 

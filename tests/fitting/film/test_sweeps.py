@@ -58,8 +58,7 @@ def test_a_misfit_does_not_hide_between_angles(interleaved):
     values = truth.reshape(13, 41).T.ravel() if interleaved else truth
     values = values + np.random.default_rng(1).normal(0.0, 0.002, values.size)
     fit = pl.fit(
-        pl.Spectrum(nm, values, "R", angle=angle),
-        pl.Scene(pl.Layer("SiO2", pl.Free(100, 600)), "Si"),
+        pl.Spectrum(nm, values, "R", angle=angle), pl.Scene(pl.Layer("SiO2", pl.Free(100, 600)), "Si")
     )
     assert fit.rms > 0.02
     assert fit.status is pl.Status.MISFIT
