@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,21 +54,6 @@ def test_thinner_films_take_fewer_nodes():
     steel = model("microfacet-film")
     assert steel.for_thickness_up_to(100).evaluate is not steel.evaluate
     assert model("granier-heidrich").for_thickness_up_to(100) is model("granier-heidrich")
-
-
-def test_tempered_steel_turns_straw_then_purple_then_blue():
-    up = direction(0.0, 0.0)
-
-    def hue(thickness):
-        return (
-            360
-            * colorsys.rgb_to_hls(*map(float, exact({**STEEL, **SENSOR, "thickness": thickness}, up, up)))[0]
-        )
-
-    straw, purple, blue = hue(15.0), hue(28.0), hue(40.0)
-    assert 20 < straw < 60
-    assert 260 < purple < 345
-    assert 190 < blue < 250
 
 
 def test_weights_integrate_over_a_sensor():

@@ -145,11 +145,6 @@ def test_total_reflection_in_the_film():
     np.testing.assert_allclose(result, expected, atol=0.01)
 
 
-def test_zero_thickness_is_the_bare_substrate():
-    result = film_colour(0.0, 1.8, 1.5, method="gaussians-8", illuminant="E").xyz
-    np.testing.assert_allclose(result, 0.04 * sensor("1931", "E").white, rtol=1e-2)
-
-
 @pytest.mark.parametrize("name", ["rainbow", "points-645-525", "uniform-0", "nodes-7-500", "gaussians-9"])
 def test_unknown_methods_are_refused(name):
     with pytest.raises(ValueError, match="expected"):

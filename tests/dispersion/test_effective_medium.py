@@ -148,19 +148,6 @@ def _fit(tmp_path, truth, layer):
     return pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
 
 
-@pytest.mark.slow  # the Tauc-Lorentz layer's fit below goes the same way
-def test_a_fit_finds_the_porosity(tmp_path):
-    def porous(fraction):
-        return Bruggeman(material("TiO2"), Constant(1.0), fraction)
-
-    fit = _fit(tmp_path, pl.Layer(porous(0.35), 230.0), pl.Layer(porous(pl.Free(0, 0.9)), pl.Free(50, 500)))
-    found = fit.parameters
-    assert fit.status.value == "converged"
-    assert found["fraction"].value == pytest.approx(0.35, abs=4 * found["fraction"].stderr_noise)
-    assert found["fraction"].stderr_noise < 0.005
-    assert found["thickness"].value == pytest.approx(230.0, abs=4 * found["thickness"].stderr_noise)
-
-
 @pytest.mark.slow
 def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
     """All six numbers at once, from the default bounds."""

@@ -98,13 +98,8 @@ def plans():
     }
 
 
-_SLOW = pytest.mark.slow  # compiles for 6 s; the plans of the other surfaces are made in the same way
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=_SLOW) if name == "facets" else name for name in GONE]
-)
+@pytest.mark.parametrize("name", GONE)
 def test_what_changes_little_is_left_out_within_the_bound(plans, name):
     """At thicknesses that the plan did not look at; for less work, and with every gradient."""
     plan, (surface, effects) = plans[name], GONE[name]

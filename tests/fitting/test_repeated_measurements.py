@@ -9,7 +9,7 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import Curve
-from pellicle.fitting.repeated_measurements import LEVEL, Agreement, RepeatedParameter
+from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter
 from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
 
 
@@ -87,19 +87,6 @@ def test_types_a_and_b_combined():
     assert round(both.coverage_factor, 2) == 2.12
     assert round(alone.coverage_factor, 2) == 2.78
     assert both.expanded == pytest.approx(both.coverage_factor * math.sqrt(2.0))
-
-
-@pytest.mark.slow
-def test_levels_by_simulation():
-    """Of 4000 sets of four, 1 % scatter too much and 1 % too little, within four standard deviations of such
-    a count; 95 % of the expanded uncertainties reach the truth."""
-    draws = np.random.default_rng(0).normal(size=(4000, 4))
-    found = [parameter(row) for row in draws]
-    for side in (Agreement.LARGER, Agreement.SMALLER):
-        count = sum(p.agreement is side for p in found)
-        assert abs(count - 40) < 4 * math.sqrt(40)
-    inside = sum(abs(p.mean) < p.expanded for p in found)
-    assert abs(inside - 4000 * LEVEL) < 4 * math.sqrt(4000 * LEVEL * (1 - LEVEL))
 
 
 @pytest.mark.parametrize(

@@ -108,18 +108,6 @@ def test_general_method_equals_the_closed_form_where_both_compute(signal, k):
         np.testing.assert_allclose(other.delta, one.delta, rtol=0, atol=1e-9)
 
 
-@pytest.mark.slow  # 30 s of compilation
-def test_tilted_axis_gives_the_mueller_matrix_and_the_powers_of_the_functions():
-    tilted = pl.Anisotropic(ORDINARY, EXTRAORDINARY + 0.05j, axis=(40.0, 30.0))
-    own = pl.mueller(NM, 300.0, tilted, "Si", angle=ANGLE, normalised=False)
-    simulated = pl.simulate(scene(pl.Layer(tilted, 300.0), "Si", "mueller"), NM)
-    expected = np.asarray(own / own[:, :1, :1]).reshape(-1, 16)[:, 1:]
-    np.testing.assert_allclose(np.reshape(simulated.values, (-1, 15)), expected, atol=1e-6)
-    for letter, sign in (("p", 1), ("s", -1)):
-        power = values(scene(pl.Layer(tilted, 300.0), "Si", "R", letter))
-        np.testing.assert_allclose(power, own[:, 0, 0] + sign * own[:, 0, 1], atol=1e-6)
-
-
 def test_slices_only_where_one_wave_may_decay_within_the_bounds():
     def size(ordinary: Any, thickness: Any, angle: float = ANGLE) -> int:
         crystal = pl.Anisotropic(ordinary, 1.75 + 0.05j, axis=(40.0, 25.0))

@@ -134,7 +134,7 @@ def test_a_film_on_a_plate(signal):
 @SLOW
 @pytest.mark.parametrize(
     ("signal", "polarisation"),
-    [("R", "s"), ("R", "p"), ("R", "unpolarised"), ("T", "p"), ("mueller", "unpolarised")],
+    [("R", "s"), ("T", "p"), ("mueller", "unpolarised")],
 )
 @pytest.mark.parametrize("angle", [0.0, 40.0])
 def test_equal_indices_are_an_isotropic_film(signal, polarisation, angle):
@@ -146,16 +146,6 @@ def test_equal_indices_are_an_isotropic_film(signal, polarisation, angle):
         plan = exact(given, [Row("angle-spread", True, "", 0.0, 12, around)])
         found.append(np.asarray(jax.jit(build(plan))(given)))
     np.testing.assert_allclose(*found, atol=1e-12)
-
-
-@pytest.mark.slow  # compiles ratios of isotropic and birefringent films
-def test_ratios_of_an_isotropic_film_are_those_of_equal_indices():
-    both = [
-        scene(SIGNAL, x, depth=50.0, angle=50.0, half=2.0) for x in (1.6, pl.Anisotropic(1.6, 1.6, axis=AXIS))
-    ]
-    one, other = map(predict, both)
-    np.testing.assert_allclose(one, other, atol=1e-8)
-    assert np.all(one[:, 3] < 1 - 1e-6)  # the lens turns some p light into s
 
 
 @pytest.mark.slow  # compiles a Mueller matrix

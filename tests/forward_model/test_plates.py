@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 import tmm
@@ -10,7 +9,6 @@ import tmm
 import pellicle as pl
 from pellicle.forward_model.film_signal import build
 from pellicle.scene.film import with_wavelength
-from pellicle.scene.free import insert
 
 NM = np.array([450.0, 600.0, 800.0])
 ANGLE = 65.0
@@ -105,22 +103,6 @@ def test_the_whole_matrix():
         signs = np.diag([1, 1, 1, -1])
         exact = (signs @ matrix @ signs / matrix[0, 0]).ravel()[1:]
         np.testing.assert_allclose(elements, exact, rtol=0, atol=5e-8)
-
-
-@pytest.mark.slow  # compiles for 3 s
-def test_its_slope_is_that_of_differences():
-    scene = with_wavelength(
-        pl.Scene(pl.Layer(2.2 + 0.05j, pl.Free(1, 500, start=120.0)), PLATE, light=LIGHT), NM, ANGLE
-    )
-    run = build(pl.plan(scene))
-
-    @jax.jit
-    def signal(thickness):
-        return run(insert(scene, [thickness]))
-
-    slope = jax.jit(jax.jacfwd(signal))(120.0)
-    differences = (signal(120.0 + 1e-3) - signal(120.0 - 1e-3)) / 2e-3
-    np.testing.assert_allclose(slope, differences, rtol=1e-6, atol=1e-9)
 
 
 def test_behind_a_metal_nothing_comes_back():

@@ -21,7 +21,6 @@ TABLE = json.loads(Path(__file__).with_name("table.json").read_text(encoding="ut
 CASES = TABLE["cases"]
 PARAMETERS = TABLE["parameters"]
 POINTS = np.array([case["at"] for case in CASES.values()])
-SMOOTH = [name for name, case in CASES.items() if case["smooth"]]
 CRITICAL = "substrate exactly critical"
 
 VALUE, GRADIENT = 5e-15, 3e-12
@@ -38,16 +37,6 @@ LOOSER = {
 }
 
 VALUE32, GRADIENT32 = 3e-6, 1.5e-3
-LOOSER32 = {
-    "1 mm transparent": (2e-3, 5e-3),  # 3e4 rad
-    "wavelength 1 nm": (1e-5, 2e-2),
-    "89.999 degrees": (VALUE32, 3e-3),  # the angle itself rounds to 89.9990005
-    "89.999 degrees, transparent": (VALUE32, 3e-3),
-    "exactly 90 degrees": (VALUE32, 3e-3),
-    "exactly 90 degrees, transparent": (VALUE32, 3e-3),
-    "Kretschmann plasmon": (7e-6, GRADIENT32),  # n₂ itself rounds by 6e-8, and n₂ ∂R/∂n₂ is 114
-    CRITICAL: (VALUE32, np.nan),
-}
 
 FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 SIGNALS = [(signal, letter) for signal in "RT" for letter in "sp"]
@@ -122,12 +111,6 @@ TRANSPARENT = [name for name, case in CASES.items() if case["at"][2] == 0 and ca
 @pytest.mark.parametrize("name", TRANSPARENT)
 def test_float64_of_real_indices(name, signal, letter):
     check(name, signal, letter, np.float64, LOOSER.get(name, (VALUE, GRADIENT)), transparent=True)
-
-
-@pytest.mark.parametrize(("signal", "letter"), SIGNALS)
-@pytest.mark.parametrize("name", CASES)
-def test_float32(name, signal, letter):
-    check(name, signal, letter, np.float32, LOOSER32.get(name, (VALUE32, GRADIENT32)))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -109,17 +109,3 @@ def test_equal_indices_are_an_isotropic_medium_to_the_last_digits():
             for a, b in zip(own, isotropic, strict=True):
                 np.testing.assert_allclose(reflectance(a), reflectance(b), rtol=1e-12)
                 np.testing.assert_allclose(transmittance(a), transmittance(b), rtol=1e-12)
-
-
-@pytest.mark.slow  # test_equal_indices: the same functions, of media that are isotropic
-def test_four_layers_with_rough_faces_take_the_same_indices():
-    """The loop of `stack` against the product of `few_layers`, each with the same stack cut in two."""
-    with jax.enable_x64(True):
-        medium, below = (Principal(*map(jnp.array, n)) for n in ((1.6, 1.5, 1.7), (2.6, 2.6, 2.9)))
-        angle, three = jnp.linspace(0.0, 1.5, 16), [medium, 1.4, medium]
-        few = responses(1.0, three, below, [jnp.array(2.0)] * 3, angle)
-        many = responses(1.0, [medium, *three], below, [jnp.array(x) for x in (0.5, 1.5, 2, 2)], angle)
-        smooth = responses(1.0, three, below, [2.0] * 3, angle, roughness=[jnp.array(0.0)] * 4)
-        for a, b, c in zip(few, many, smooth, strict=True):
-            np.testing.assert_allclose(reflectance(b), reflectance(a), rtol=1e-12)
-            np.testing.assert_allclose(reflectance(c), reflectance(a), rtol=1e-12)

@@ -136,14 +136,6 @@ def test_a_step_of_one_order_stays():
     assert by.sum() > 0.7 * unsure.sum()
 
 
-def test_a_decided_line_on_the_other_order_stays():
-    truth = np.full((40, 40), 600.0)
-    truth[:, 20] += PERIOD
-    made = decided_by_neighbours(constructed(truth, np.zeros(truth.shape, bool)))
-    assert right(made, truth).all()
-    assert np.all(made["status"] == CONVERGED)
-
-
 def test_a_converged_pixel_with_a_close_rival_is_overruled_only_by_clear_neighbours():
     truth = np.fromfunction(lambda y, x: 600 + 2.0 * x, (40, 40))
     before = constructed(truth, np.zeros(truth.shape, bool))
@@ -209,15 +201,6 @@ def test_nothing_crosses_a_diagonal_gap():
     before["status"].values[y == x] = NO_DATA
     made = decided_by_neighbours(before)
     assert not np.any(made["status"] == BY)
-
-
-def test_a_scratch_of_random_orders_is_filled_from_both_sides():
-    truth = np.fromfunction(lambda y, x: 800 + 3.0 * x - 2.0 * y, (40, 40))
-    y, x = np.mgrid[:40, :40]
-    unsure = abs(y - 0.7 * x - 5) < 3
-    made = decided_by_neighbours(constructed(truth, unsure))
-    assert right(made, truth).all()
-    assert np.all(made["status"].values[unsure] == BY)
 
 
 def test_maps_without_continuity_are_left_alone():

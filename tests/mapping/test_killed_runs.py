@@ -55,10 +55,7 @@ def finished_blocks(store):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("small_blocks")
-@pytest.mark.parametrize(
-    ("kills", "workers"),
-    [(1, 1), pytest.param(10, 1, marks=pytest.mark.slow), pytest.param(5, 2, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("kills", "workers"), [(5, 1), (2, 2)])
 def test_kills_at_random_moments_change_nothing(
     start, cube, scene, fake_fits, same_files, tmp_path, kills, workers
 ):

@@ -8,11 +8,8 @@ import pytest
 import xarray
 from distributed import Client, LocalCluster
 
-import pellicle as pl
-from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.cluster import local_cluster
-from pellicle.mapping.pixels.results import CODES
 from pellicle.mapping.run import run_map
 
 
@@ -100,18 +97,3 @@ def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):
     monkeypatch.setattr("pellicle.mapping.cluster.ANSWER", 0.2)
     with pytest.raises(UsageError, match="no dask scheduler answers at tcp://"):
         run_map(cube, scene, tmp_path / "map.zarr", scheduler="tcp://127.0.0.1:1")
-
-
-@pytest.mark.slow  # compiles for 12 s; test_pixel_errors.py compares fits of pixels without a store
-def test_fits_are_those_of_fit(tmp_path):
-    """Two pixels, one of them without data, by the whole way."""
-    scene = pl.Scene(pl.Layer(1.46, pl.Free(10, 800)), 3.9)
-    nm = np.linspace(400.0, 796.0, 100)
-    clean = np.asarray(pl.reflectance(nm, 300.0, 1.46, 3.9))
-    spectrum = clean + np.random.default_rng(0).normal(0, 0.002, nm.size)
-    values = np.stack([np.full(100, np.nan), spectrum])[None]
-    made = run_map(Cube({"values": values}, nm), scene, tmp_path / "map.zarr")
-    fit = pl.fit(pl.Spectrum(nm, spectrum, "R"), scene)
-    assert made.dataset.status.values.tolist() == [[CODES["no-data"], CODES[str(fit.status)]]]
-    assert float(made.thickness[0, 1]) == pytest.approx(fit["thickness"].value, abs=0.05)
-    assert np.isnan(made.thickness[0, 0])

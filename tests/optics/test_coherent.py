@@ -71,23 +71,3 @@ def test_no_layer_is_the_bare_interface():
         face = (AMBIENT, q0, SUBSTRATE, interface.normal(SUBSTRATE, a), letter)
         np.testing.assert_allclose(response.reflectance(result), interface.reflectance(*face), atol=1e-15)
         np.testing.assert_allclose(response.transmittance(result), interface.transmittance(*face), rtol=1e-14)
-
-
-@pytest.mark.slow
-def test_zero_roughness_by_matrices_equals_the_smooth_film():
-    layer, phase = Pair(2.1, 0.3), 1.2
-    smooth = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE)
-    rough = coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], ANGLE, roughness=[0.0, 0.0])
-    for one, two in zip(smooth, rough, strict=True):
-        for power in POWERS:
-            np.testing.assert_allclose(power(one), power(two), atol=1e-14)
-
-
-def test_rough_interfaces_reflect_less():
-    layer, phase = Pair(2.1, 0.3), 1.2
-    for power in (response.reflectance, response.reflectance_below):
-        smooth, rough = (
-            power(coherent.responses(AMBIENT, [layer], SUBSTRATE, [phase], None, roughness=sigma)[0])
-            for sigma in (None, [0.05, 0.05])
-        )
-        assert np.all(np.asarray(rough) < np.asarray(smooth))

@@ -218,20 +218,6 @@ def test_from_below_is_the_film_turned_over():
         np.testing.assert_allclose(response.transmittance(one), response.transmittance(two), rtol=1e-10)
 
 
-def test_a_layer_that_becomes_evanescent_is_smooth():
-    """Across the critical angle of the film, the real type agrees with the complex one."""
-    angle = np.linspace(0.6, 0.9, 101)
-
-    @jax.jit
-    def reflected(layer):
-        return [response.reflectance(x) for x in film.film(1.5, layer, 1.6 + 0 * angle, 3.0, angle)]
-
-    real, full = reflected(1.1 + 0 * angle), reflected(1.1 + 0j * angle)
-    for one, two in zip(real, full, strict=True):
-        np.testing.assert_allclose(one, two, atol=1e-13)
-    assert np.max(np.abs(np.diff(real[0]))) < 0.05
-
-
 @partial(jax.jit, static_argnames="whole")
 def grid_and_slope(n, k, below, depth, angle, whole):
     """R and T of every depth and n, and their slopes in n; `whole` gives each point an index of its own."""

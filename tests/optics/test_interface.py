@@ -27,17 +27,6 @@ def test_normal_incidence_computes_nothing_oblique():
 
 
 @pytest.mark.parametrize("letter", "sp")
-def test_glass_at_normal_incidence(letter):
-    assert boundary(1.0, 1.5, 0.0, letter) == pytest.approx([0.04, 0.96])
-
-
-def test_brewster():
-    degrees = np.rad2deg(np.arctan(1.52))
-    assert boundary(1.0, 1.52, degrees, "p")[0] == pytest.approx(0, abs=1e-30)
-    assert boundary(1.0, 1.52, degrees, "s")[0] == pytest.approx(((1.52**2 - 1) / (1.52**2 + 1)) ** 2)
-
-
-@pytest.mark.parametrize("letter", "sp")
 @pytest.mark.parametrize("n2", [1.5, 0.2 + 3.4j, 2 + 0.1j, 0.7])
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 75.0, 90.0])
 def test_energy(n2, degrees, letter):

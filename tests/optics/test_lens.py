@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -45,16 +44,6 @@ def test_rays_and_the_turns_of_their_polarisation(angle, half):
     ):
         np.testing.assert_allclose(np.sum(turn.apply(field) * p_ray, axis=1), on_p, atol=1e-14)
         np.testing.assert_allclose(np.sum(turn.apply(field) * s_ray, axis=1), on_s, atol=1e-14)
-
-
-def test_a_ray_along_the_normal_has_finite_slopes():
-    def numbers(angle, sine):
-        rays = lens_rays(angle, sine, 2, 3)
-        return rays.angle, rays.azimuth, *rays.turn
-
-    for angle, sine in ((0.0, 0.0), (0.0, 0.3), (0.4, 0.0)):
-        slopes = jax.jacfwd(numbers, argnums=(0, 1))(angle, sine)
-        assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(slopes))
 
 
 FILMS = [  # angle, half angle, indices, angles of the axis, nm, foot

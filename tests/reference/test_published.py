@@ -58,15 +58,3 @@ def test_frustrated_total_reflection():
     truth = 1 / (1 + alpha * np.sinh(2 * np.pi * gap / wavelength * np.sqrt(root)) ** 2)
     found = pl.transmittance(wavelength, gap, 1.0, n, ambient=n, angle=45.0, polarisation="s")
     assert found == pytest.approx(truth, rel=1e-12)
-
-
-def test_the_shader_of_the_seed_counts_a_phase_jump_twice():
-    """n = 1, 1.5, 2.0, 250 nm at 550 nm: 0.0239, where seed 004's own code gives 0.0942."""
-    assert pl.reflectance(550.0, 250.0, 1.5, 2.0) == pytest.approx(0.0239, abs=5e-5)
-
-
-def test_power_into_an_absorbing_substrate():
-    """R + T = 0.989 by the one power weight of Gerardin et al. 2019 (eq. 21)."""
-    film = (550.0, 100.0, 1.46, 0.2 + 3.4j)
-    total = sum(f(*film, angle=60.0, polarisation="p") for f in (pl.reflectance, pl.transmittance))
-    assert total == pytest.approx(1, abs=1e-14)

@@ -10,7 +10,6 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.errors import DataError
 from pellicle.fitting.brdf import fit as fitting
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.progress import quiet
@@ -112,25 +111,6 @@ def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
         assert posterior[name].sd == pytest.approx(posterior.fit[name].stderr, rel=0.15), name
     [band, *_] = posterior.predictions()
     assert np.all(np.isfinite(band.model))
-
-
-@pytest.mark.slow
-def test_a_chain_is_resumed_and_belongs_to_its_problem(fitted_before, known, tmp_path):
-    path = tmp_path / "chain.h5"
-    assert not pl.sample(known.samples, FREE, chain=path, steps=20).trusted
-    resumed = pl.sample(known.samples, FREE, chain=path, steps=40)
-    whole = pl.sample(known.samples, FREE, steps=40)
-    np.testing.assert_array_equal(resumed.draws, whole.draws)
-    assert resumed.checks.steps == 40
-    prior = Free(0, 1000, prior=pl.priors.Normal(300.0, 50.0))
-    for samples, changed in (
-        (dataclasses.replace(known.samples, values=1.01 * known.samples.values), {}),
-        (known.samples, {"thickness": Free(0, 900)}),
-        (known.samples, {"thickness": prior}),
-    ):
-        surface = dataclasses.replace(FREE, numbers={**FREE.numbers, **changed})
-        with pytest.raises(DataError, match="is the chain of another problem"):
-            pl.sample(samples, surface, chain=path)
 
 
 @pytest.mark.slow  # needs the fit of the test above

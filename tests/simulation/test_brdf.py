@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
-from pellicle.simulation.brdf import Directions, default_directions, simulate_samples
+from pellicle.simulation.brdf import default_directions, simulate_samples
 
 
 def vectors(theta, phi):
@@ -42,15 +40,3 @@ def test_two_channels_have_no_file():
     two = Surface("granier-heidrich-diffuse", {}, (500.0, 600.0))
     with pytest.raises(UsageError, match="one channel or R, G and B: the surface has 2 wavelengths"):
         simulate_samples(two, default_directions(4))
-
-
-@pytest.mark.slow
-def test_the_fit_of_what_was_simulated_finds_the_truth():
-    steel = Surface(
-        "microfacet-film",
-        {"thickness": Free(10.0, 70.0, start=45.0), "n": 2.9, "roughness": 0.35, "diffuse": 0.0},
-    )
-    directions = Directions(*(x[:200] for x in default_directions()))
-    fit = pl.fit(simulate_samples(steel, directions, noise=0.01).samples, steel)
-    assert fit.status == "converged"
-    assert abs(fit["thickness"].value - 45.0) < 4 * fit["thickness"].stderr < 1.0

@@ -112,20 +112,6 @@ def test_normal_incidence_has_one_polarisation(function):
 
 
 @BOTH
-def test_unpolarised_is_the_mean_of_s_and_p(function):
-    one, two, mean = (float(call(function, p)) for p in ("s", "p", "unpolarised"))
-    assert mean == pytest.approx(0.5 * (one + two))
-    assert abs(one - two) > 0.01
-
-
-@BOTH
-def test_total_reflection_needs_no_complex_index(function):
-    """A real substrate beyond its critical angle: the type makes no promise here."""
-    found = function(550.0, 100.0, 2.1, 1.0, ambient=1.52, angle=60.0)
-    assert float(found) == pytest.approx(1.0 if function is pl.reflectance else 0.0, abs=1e-14)
-
-
-@BOTH
 @pytest.mark.parametrize("ambient", [1.33 + 0.1j, np.array([1.33 + 0j]), "Au"])
 def test_an_absorbing_ambient_is_refused(function, ambient):
     with pytest.raises(ValueError, match="the ambient must not absorb: give it a real index"):
@@ -195,12 +181,6 @@ def test_the_index_of_whatever_a_layer_may_be():
     assert complex(n) == pytest.approx(1.5 + 3000 / 550**2)
     with pytest.raises(ValueError, match="not at 90"):
         pl.refractive_index(90.0, "Au")
-
-
-@BOTH
-def test_an_unknown_material_is_refused(function):
-    with pytest.raises(ValueError, match="Unobtainium"):
-        function(550.0, 100.0, "Unobtainium", "Si")
 
 
 @BOTH

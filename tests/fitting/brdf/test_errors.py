@@ -19,21 +19,6 @@ def _clean(grey_samples, grey, truth):
     return dataclasses.replace(data, values=pl.simulate(exact, directions=data).values, sigma=None)
 
 
-@pytest.mark.slow  # many fits; benchmarks/brdf_errors.py has the whole study
-def test_errors_without_sigma_cover_the_truth(grey_samples, grey, truth, no_search):
-    """z of three parameters in 16 runs at 3 % noise: root mean square 1 ± 0.1.
-
-    With one noise for all samples on the scale of the cube root it is 1.5. `benchmarks/brdf_errors.py` is the
-    long version.
-    """
-    clean, z = _clean(grey_samples, grey, truth), []
-    for seed in range(16):
-        noise = 0.03 * np.random.default_rng(seed).standard_normal(clean.values.shape)
-        found = fit(dataclasses.replace(clean, values=clean.values * (1 + noise)), grey())
-        z += [(found[name].value - value) / found[name].stderr_noise for name, value in truth.items()]
-    assert 0.8 < np.sqrt(np.mean(np.square(z))) < 1.25
-
-
 @pytest.mark.slow  # compiles a model of its own
 def test_a_share_of_the_signal_is_one_of_the_model(grey_samples, grey, truth, no_search):
     """Of two samples 20 % above and below the truth a noise in proportion favours neither.

@@ -80,19 +80,6 @@ def spoiled(samples: BrdfSamples) -> BrdfSamples:
     return dataclasses.replace(samples, values=values)
 
 
-@pytest.mark.slow  # four fits; tests/fitting/test_robust_losses.py has the losses
-@pytest.mark.parametrize("loss", ["huber", "student-t"])
-def test_outliers_move_a_plain_fit_and_not_a_robust_one(grey, grey_samples, truth, loss):
-    samples = spoiled(grey_samples())
-    plain, robust = pl.fit(samples, grey()), pl.fit(samples, grey(), loss=loss)
-    name = "specular"
-    assert abs(plain[name].value - truth[name]) > 3 * robust[name].stderr
-    for key, value in truth.items():
-        assert abs(robust[key].value - value) < 3 * robust[key].stderr
-    assert robust.chi2_reduced < 0.2 * plain.chi2_reduced
-    assert robust.status is pl.Status.CONVERGED
-
-
 @pytest.mark.slow
 def test_huber_against_scipy(grey, grey_samples):
     samples = spoiled(grey_samples())
@@ -154,16 +141,6 @@ def test_a_joint_fit_is_that_of_all_samples(grey, two, truth):
         assert 0.7 < part.chi2_reduced < 1.4
     with pytest.raises(ValueError, match="joint fit of 2"):
         joint.samples  # noqa: B018
-
-
-@pytest.mark.slow
-def test_a_set_in_two_halves_is_the_whole_set(grey, grey_samples):
-    whole = grey_samples()
-    halves = [dataclasses.replace(whole.at(np.arange(n, 120, 2)), path=f"{n}.csv") for n in (0, 1)]
-    one, both = pl.fit(whole, grey()), pl.fit(halves, grey())
-    for p in one.free:
-        assert abs(both[p.name].value - p.value) < 0.1 * p.stderr
-    assert both.rms == pytest.approx(one.rms, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -70,11 +70,6 @@ WIDTH = pl.Free(0, 30)
 
 
 @pytest.fixture(scope="module")
-def without(measured) -> pl.Fit:
-    return pl.fit(replace(measured, depolarisation=None, depolarisation_sigma=None), scene(WIDTH))
-
-
-@pytest.fixture(scope="module")
 def ranked(measured) -> tuple[pl.Fit, Problem]:
     fit, found = fitted(measured, scene(WIDTH), 0.0, lambda *_: None)
     return fit, found.problem
@@ -107,15 +102,6 @@ def is_at_the_bound(fit: pl.Fit, bound: np.ndarray) -> None:
         assert abs(fit[name].value - truth) < 4 * least
 
 
-@pytest.mark.slow  # compiles a fit without depolarisation; the next test has its bound for the error
-def test_without_depolarisation_the_spread_is_less_determined(together, without):
-    is_at_the_bound(without, bounds()[0])
-    # by the bounds 0.0144 and 0.0201 nm
-    assert together[SPREADS].stderr_noise < 0.75 * without[SPREADS].stderr_noise
-    assert together[SPREADS].stderr < 0.8 * without[SPREADS].stderr
-    assert without.curve.depolarisation_data is None
-
-
 @pytest.mark.slow
 def test_the_spread_is_better_determined(together, measured):
     """By as much as the bound of Cramér and Rao says."""
@@ -127,7 +113,7 @@ def test_the_spread_is_better_determined(together, measured):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("unknown", ["all", "psi and delta", "depolarisation"])
+@pytest.mark.parametrize("unknown", ["psi and delta", "depolarisation"])
 def test_a_noise_that_is_not_given_is_that_of_its_own_residuals(measured, together, unknown):
     angles = {} if unknown == "depolarisation" else {"sigma": None, "delta_sigma": None}
     share = {} if unknown == "psi and delta" else {"depolarisation_sigma": None}

@@ -63,17 +63,3 @@ def test_fringes_with_dispersion_and_a_wrong_start_raise_no_alarm(film, measured
     cauchy = pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 4e4))
     scene = film(pl.Free(10, 3000), cauchy)
     assert suggestions(pl.fit(measured(scene, 1.5, 2e4, 1800.0), scene)) == []
-
-
-@pytest.mark.slow  # fits for 4 s; a test above has the same warning of R or T
-def test_fringes_of_raw_counts_that_no_thin_film_has(film):
-    """A soap film of 1200 nm in a fading lamp; without an offset only a thin film fits."""
-    nm = np.linspace(420.0, 800.0, 256)
-    signal = (1 - np.cos(4 * np.pi * 1.33 * 1200.0 / nm)) / 2
-    lamp = np.exp(-(((nm - 600) / 200) ** 2))
-    data = pl.Spectrum(nm, lamp * (signal + 2.0) + 0.005 * NOISE, "R", calibrated=False)
-    scene = film(pl.Free(10, 3000), 1.33, substrate="air", instrument=pl.Instrument(scale="slow"))
-    fit = pl.fit(data, scene)
-    assert fit["thickness"].value < 300.0
-    assert fit.status == "misfit"
-    assert len(suggestions(fit)) == 1

@@ -39,13 +39,9 @@ def test_small_residuals_and_other_signals_are_not_read_again():
 
 
 @pytest.mark.slow  # four fits
-@pytest.mark.parametrize(
-    ("words", "written"),
-    [("360 - delta", 360 - DELTA), ("delta + 180", DELTA - 180), ("180 - delta", 180 - DELTA)],
-)
-def test_a_misfit_names_the_convention(words, written):
+def test_a_misfit_names_the_convention():
     """Without a given noise, too: C alone is wrong where the file has 180 - delta."""
-    fit = pl.fit(spectrum(written), pl.Scene(pl.Layer("SiO2", pl.Free(1, 1000)), "Si"))
+    fit = pl.fit(spectrum(180 - DELTA), pl.Scene(pl.Layer("SiO2", pl.Free(1, 1000)), "Si"))
     assert fit.status == "misfit"
-    assert f"with {words} in place of delta it would fit, with thickness 2" in fit.warnings[0]
+    assert "with 180 - delta in place of delta it would fit, with thickness 2" in fit.warnings[0]
     assert float(fit.warnings[0].split("thickness ")[1].split()[0]) == pytest.approx(250, abs=0.5)

@@ -14,8 +14,6 @@ from pellicle.fitting.film.targets import measured as as_numbers
 from pellicle.fitting.minima import minima
 from pellicle.fitting.progress import quiet
 
-NM = np.linspace(400.0, 900.0, 128)
-
 
 def built(scene, data):
     """The problem as `fit` would make it, with a given σ."""
@@ -157,19 +155,11 @@ def recovered(film, measured, case, films, noise):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.005, 0.02])
 @pytest.mark.parametrize("case", CASES)
-def test_identifiable_films_are_recovered(film, measured, case):
-    right, identifiable = recovered(film, measured, case, films=12, noise=0.005)
-    assert identifiable.sum() >= 6
-    assert right[identifiable].all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("noise", [0.002, 0.005, 0.02])
-@pytest.mark.parametrize("case", CASES)
-def test_identifiable_films_are_recovered_many(film, measured, case, noise):
+def test_identifiable_films_are_recovered(film, measured, case, noise):
     """One miss in a hundred is allowed at 2 % noise, where the best fit need not be the true one."""
-    right, identifiable = recovered(film, measured, case, films=120, noise=noise)
+    right, identifiable = recovered(film, measured, case, films=60, noise=noise)
     share = right[identifiable].mean()
     print(f"{case}, noise {noise:g}: {share:.3f} of {identifiable.sum()} identifiable of {len(right)}")
     assert share >= (0.95 if noise > 0.01 else 0.99)
