@@ -32,7 +32,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.sampling.checks import split_rhat
+from pellicle.sampling.chain import split_rhat
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pellicle import dispersion as dispersion
     from pellicle import fitting as fitting
-    from pellicle.api.appearance import explore as explore
-    from pellicle.api.appearance import export as export
     from pellicle.api.fits import compare as compare
     from pellicle.api.fits import fit as fit
     from pellicle.api.fits import sample as sample
@@ -19,6 +17,8 @@ if TYPE_CHECKING:
     from pellicle.api.plans import cost as cost
     from pellicle.api.plans import plan as plan
     from pellicle.api.simulations import depth_profile as depth_profile
+    from pellicle.api.simulations import explore as explore
+    from pellicle.api.simulations import export as export
     from pellicle.api.simulations import simulate as simulate
     from pellicle.data.brdf_samples import BrdfSamples as BrdfSamples
     from pellicle.data.colours import CameraMatrix as CameraMatrix
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from pellicle.sampling.result import Posterior as Posterior
     from pellicle.scene import priors as priors
     from pellicle.scene.film import Light as Light
+    from pellicle.scene.film import Reference as Reference
     from pellicle.scene.film import Scene as Scene
     from pellicle.scene.free import Free as Free
     from pellicle.scene.graded import Graded as Graded
@@ -56,7 +57,6 @@ if TYPE_CHECKING:
     from pellicle.scene.layers import Substrate as Substrate
     from pellicle.scene.layers import Uncertainty as Uncertainty
     from pellicle.scene.layers import medium as medium
-    from pellicle.scene.reference import Reference as Reference
     from pellicle.scene.surface import Surface as Surface
     from pellicle.simulation.brdf import Directions as Directions
     from pellicle.simulation.depth import absorptance as absorptance
@@ -69,21 +69,10 @@ if TYPE_CHECKING:
     from pellicle.simulation.polarisation import mueller as mueller
 
 _NAMES = {
-    "pellicle.api.simulations": (
-        "simulate",
-        "depth_profile",
-    ),
-    "pellicle.api.plans": (
-        "plan",
-        "cost",
-    ),
-    "pellicle.api.fits": (
-        "fit",
-        "sample",
-        "compare",
-    ),
+    "pellicle.api.simulations": ("simulate", "depth_profile", "explore", "export"),
+    "pellicle.api.plans": ("plan", "cost"),
+    "pellicle.api.fits": ("fit", "sample", "compare"),
     "pellicle.api.maps": ("map",),
-    "pellicle.api.appearance": ("explore", "export"),
     "pellicle.data.brdf_samples": ("BrdfSamples",),
     "pellicle.data.colours": ("CameraMatrix", "Colours"),
     "pellicle.data.cube": ("Cube",),
@@ -102,12 +91,11 @@ _NAMES = {
     "pellicle.recipes.write": ("write_recipe",),
     "pellicle.reporting.present": ("report",),
     "pellicle.sampling.result": ("Posterior",),
-    "pellicle.scene.film": ("Light", "Scene"),
+    "pellicle.scene.film": ("Light", "Reference", "Scene"),
     "pellicle.scene.free": ("Free",),
     "pellicle.scene.graded": ("Graded",),
     "pellicle.scene.instrument": ("Instrument",),
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "Uncertainty", "medium"),
-    "pellicle.scene.reference": ("Reference",),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.depth": ("absorptance", "field"),
     "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),

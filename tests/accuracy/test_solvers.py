@@ -7,9 +7,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.case import case
-from pellicle.accuracy.registry import Method
-from pellicle.accuracy.simulated_data import data_sets
-from pellicle.accuracy.solvers import SOLVERS, compare_solvers, from_truth
+from pellicle.accuracy.cost import SOLVERS, compare_solvers, from_truth
+from pellicle.accuracy.registry import Method, data_sets
 from pellicle.fitting.progress import quiet
 
 NM = np.linspace(420.0, 740.0, 40)

@@ -14,7 +14,7 @@ from pellicle.fitting.curves import BrdfCurve
 from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Part, Rival, Status
 from pellicle.sampling.ensemble import STEPS, Subject, sampled
 from pellicle.sampling.modes import mixture
-from pellicle.sampling.predict import Axis, Prediction
+from pellicle.sampling.result import Axis, Prediction
 from pellicle.scene.surface import surface_view
 
 RECIPE = """

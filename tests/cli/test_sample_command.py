@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pellicle.sampling.checks import arviz
+from pellicle.sampling.chain import arviz
 
 
 @pytest.fixture(scope="module")

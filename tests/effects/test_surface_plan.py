@@ -10,8 +10,8 @@ from pellicle.brdf.models import MODELS
 from pellicle.colour import sensor
 from pellicle.effects import surface_plan
 from pellicle.effects.differences import gradients
+from pellicle.effects.removal import SAFETY
 from pellicle.effects.surface_plan import FLOOR, REMOVABLE, exact
-from pellicle.effects.tolerance import SAFETY
 from pellicle.errors import UsageError
 from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import Free, insert, start_values

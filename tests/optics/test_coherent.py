@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.optics import coherent, few_layers, film, interface, response, stack
+from pellicle.optics import coherent, film, interface, response, stack
 from pellicle.optics.pair import Pair, to_complex
 
 AMBIENT, SUBSTRATE, ANGLE = 1.3, Pair(np.array([1.7, 4.0]), np.array([0.0, 0.1])), 0.7
@@ -30,7 +30,7 @@ def test_one_smooth_layer_takes_the_closed_form(propagating):
 def test_other_numbers_of_layers_take_matrices(count):
     layers, phases = [2.1, Pair(1.5, 0.2), 1.4, 1.8][:count], [0.3, 1.0, 2.0, 0.5][:count]
     result = coherent.responses(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
-    by = stack.stack if count > 3 else few_layers.few_layers
+    by = stack.stack if count > 3 else coherent.few_layers
     expected = by(AMBIENT, layers, SUBSTRATE, phases, ANGLE)
     np.testing.assert_array_equal(amplitudes(result), amplitudes(expected))
 
@@ -40,7 +40,7 @@ def test_other_numbers_of_layers_take_matrices(count):
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_few_layers_agree_with_the_loop(count, angle, propagating):
     layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
-    few = few_layers.few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
+    few = coherent.few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
     for one, many in zip(few, stack.stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
         for power in POWERS:
             np.testing.assert_allclose(power(one), power(many), rtol=1e-13)

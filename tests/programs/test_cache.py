@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pellicle.programs import cache as program_cache
-from pellicle.programs import machine_code, private_files
+from pellicle.programs import private_files
 from pellicle.programs.cache import kept
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners")
@@ -27,12 +27,12 @@ VECTOR = [jax.ShapeDtypeStruct((3,), np.float64)]
 def path(tmp_path) -> Path:
     """A program x + 1 that is kept."""
     path = tmp_path / "programs" / "one"
-    assert machine_code.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, {}) is not None
+    assert program_cache.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, {}) is not None
     return path
 
 
 def test_a_kept_program_computes_what_was_compiled(path):
-    program = machine_code.load(path, KEY)
+    program = program_cache.load(path, KEY)
     assert program is not None
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
@@ -41,11 +41,11 @@ def test_a_kept_program_computes_what_was_compiled(path):
 def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
     """Without the initialisation of LAPACK that process is killed by a signal."""
     path, matrix = tmp_path / "programs" / "one", [jax.ShapeDtypeStruct((2, 2), np.float64)]
-    assert machine_code.make(path, KEY, lambda x: [jnp.linalg.cholesky(x)], matrix, tmp_path, {}) is not None
+    assert program_cache.make(path, KEY, lambda x: [jnp.linalg.cholesky(x)], matrix, tmp_path, {}) is not None
     code = (
         "import sys, pathlib, jax, numpy as np; jax.config.update('jax_enable_x64', True)\n"
-        "from pellicle.programs import machine_code\n"
-        f"program = machine_code.load(pathlib.Path({str(path)!r}), {KEY!r})\n"
+        "from pellicle.programs import cache\n"
+        f"program = cache.load(pathlib.Path({str(path)!r}), {KEY!r})\n"
         "print(float(np.asarray(program(np.array([[4.0, 2.0], [2.0, 5.0]]))[0]).sum()))"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -53,10 +53,10 @@ def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
 
 
 def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(machine_code, "_OPTIONS", {"xla_of_another_version": True})
-    monkeypatch.setattr(machine_code, "compiler_options", machine_code.compiler_options.__wrapped__)
-    path, options = tmp_path / "programs" / "one", machine_code.compiler_options()
-    program = machine_code.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, options)
+    monkeypatch.setattr(program_cache, "_OPTIONS", {"xla_of_another_version": True})
+    monkeypatch.setattr(program_cache, "compiler_options", program_cache.compiler_options.__wrapped__)
+    path, options = tmp_path / "programs" / "one", program_cache.compiler_options()
+    program = program_cache.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, options)
     assert program is not None
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
@@ -66,58 +66,58 @@ def test_a_file_or_folder_that_others_can_write_is_not_loaded(path):
         mode = place.stat().st_mode
         for bit in (0o020, 0o002):
             place.chmod(mode | bit)
-            assert machine_code.load(path, KEY) is None
+            assert program_cache.load(path, KEY) is None
         place.chmod(mode)
-    assert machine_code.load(path, KEY) is not None
+    assert program_cache.load(path, KEY) is not None
 
 
 def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
     owner = os.stat(path).st_uid
     monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
-    assert machine_code.load(path, KEY) is None
-    assert machine_code.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent, {}) is None
+    assert program_cache.load(path, KEY) is None
+    assert program_cache.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent, {}) is None
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give files away")
 def test_a_file_that_was_given_away_is_not_loaded(path):
     os.chown(path, 12345, -1)
-    assert machine_code.load(path, KEY) is None
+    assert program_cache.load(path, KEY) is None
     os.chown(path, 0, -1)
     os.chown(path.parent, 12345, -1)
-    assert machine_code.load(path, KEY) is None
+    assert program_cache.load(path, KEY) is None
 
 
 def test_a_symbolic_link_is_not_followed(path):
     link = path.with_name("two")
     link.symlink_to(path)
-    assert machine_code.load(link, KEY) is None
+    assert program_cache.load(link, KEY) is None
     folder = path.parent.with_name("linked")
     folder.symlink_to(path.parent)
-    assert machine_code.load(folder / path.name, KEY) is None
+    assert program_cache.load(folder / path.name, KEY) is None
     assert not private_files.make_folder(folder)
 
 
 def test_a_pipe_does_not_stop_the_process(path):
     pipe = path.with_name("pipe")
     os.mkfifo(pipe, 0o600)
-    assert machine_code.load(pipe, KEY) is None
+    assert program_cache.load(pipe, KEY) is None
 
 
 def test_a_damaged_file_or_one_of_another_key_is_not_loaded(path, monkeypatch):
     whole = path.read_bytes()
     unpickled = []
-    monkeypatch.setattr(machine_code.pickle, "loads", unpickled.append)
-    assert machine_code.load(path, b"another key") is None
+    monkeypatch.setattr(program_cache.pickle, "loads", unpickled.append)
+    assert program_cache.load(path, b"another key") is None
     for damaged in (b"", whole[:20], whole[:-1], whole[:1000] + bytes([whole[1000] ^ 1]) + whole[1001:]):
         path.write_bytes(damaged)
-        assert machine_code.load(path, KEY) is None
+        assert program_cache.load(path, KEY) is None
     assert not unpickled
 
 
 def test_what_cannot_be_deserialised_is_not_loaded(path):
-    body = machine_code.pickle.dumps((False, (b"no program", None, None)))
-    path.write_bytes(machine_code._digest(KEY, body) + body)
-    assert machine_code.load(path, KEY) is None
+    body = program_cache.pickle.dumps((False, (b"no program", None, None)))
+    path.write_bytes(program_cache._digest(KEY, body) + body)
+    assert program_cache.load(path, KEY) is None
 
 
 def test_the_oldest_files_make_room(tmp_path):
@@ -189,7 +189,7 @@ def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_pr
 
 def test_without_a_cache_programs_are_compiled_with_the_same_options(new_process, monkeypatch):
     """XLA refuses an option that it does not have."""
-    monkeypatch.setattr(machine_code, "compiler_options", lambda: {"xla_of_another_version": True})
+    monkeypatch.setattr(program_cache, "compiler_options", lambda: {"xla_of_another_version": True})
     before = jax.config.values["jax_compilation_cache_dir"]
     jax.config.update("jax_compilation_cache_dir", None)
     try:
@@ -202,7 +202,7 @@ def test_without_a_cache_programs_are_compiled_with_the_same_options(new_process
 @pytest.mark.parametrize("cached", [True, False])
 def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached):
     """XLA refuses an option that it does not have."""
-    monkeypatch.setattr(machine_code, "compiler_options", lambda: {"xla_of_another_version": True})
+    monkeypatch.setattr(program_cache, "compiler_options", lambda: {"xla_of_another_version": True})
     if not cached:
         jax.config.update("jax_compilation_cache_dir", None)
     assert kept(plain_scaled, many_calls=True)(2, np.arange(4.0)).total == 12

@@ -15,10 +15,9 @@ from pellicle.accuracy.surface import SurfaceCost
 from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
 from pellicle.reporting.fit_text import report as fit_report
-from pellicle.sampling.checks import Checks
+from pellicle.sampling.chain import Checks
 from pellicle.sampling.modes import mixture
-from pellicle.sampling.predict import Axis, Prediction
-from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Axis, Posterior, Prediction
 
 FILES = {
     "fit": {"report.html", "report.txt", "result.json", "fit.csv", "nk.csv", "figure.png"},

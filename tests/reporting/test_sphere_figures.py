@@ -7,7 +7,7 @@ import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.reporting.rendering_display import display, exposure
 from pellicle.reporting.sphere_figures import balls, bubbles
-from pellicle.simulation.sphere import Rendering
+from pellicle.simulation.environment import Rendering
 
 PNG = b"\x89PNG"
 

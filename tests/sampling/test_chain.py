@@ -26,8 +26,8 @@ HERE = Path(__file__).parent
 RUN = """
 import runpy, jax
 jax.config.update("jax_enable_x64", True)
-from pellicle.sampling import chain, checks, sample
-checks.LONG_ENOUGH = 1e9  # to the last step
+from pellicle.sampling import chain, sample
+chain.LONG_ENOUGH = 1e9  # to the last step
 chain._PATIENCE = 0.0
 example = runpy.run_path({example!r})
 sample.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r})
@@ -48,7 +48,7 @@ def test_a_killed_chain_goes_on_as_if_nothing_had_happened(bands, film, tmp_path
     process.send_signal(signal.SIGKILL)
     assert process.wait() == -signal.SIGKILL
     before = _draws(path)
-    monkeypatch.setattr("pellicle.sampling.checks.LONG_ENOUGH", 1e9)
+    monkeypatch.setattr("pellicle.sampling.chain.LONG_ENOUGH", 1e9)
     steps = len(before) + 150
     resumed = pl.sample(bands(), film(), steps=steps, chain=path)
     whole = pl.sample(bands(), film(), steps=steps)

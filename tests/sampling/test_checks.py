@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pellicle.sampling.chain import empty
-from pellicle.sampling.checks import autocorrelation_time, check, split_rhat
+from pellicle.sampling.chain import autocorrelation_time, check, empty, split_rhat
 from pellicle.sampling.modes import Modes
 
 ONE = Modes(np.array([[0.5]]), np.array([[[0.1]]]), np.array([1.0]))

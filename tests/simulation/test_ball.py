@@ -7,9 +7,8 @@ import pellicle as pl
 from pellicle.colour import linear_srgb, sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.errors import UsageError
-from pellicle.simulation.environment import Environment, studio
+from pellicle.simulation.environment import Environment, sphere, studio
 from pellicle.simulation.film_sphere import ball, stack
-from pellicle.simulation.sphere import sphere
 
 SIZE = 21
 EYE = sensor()

@@ -7,8 +7,7 @@ import pellicle as pl
 from pellicle.brdf.directions import direction, frame
 from pellicle.colour import film_colour, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
-from pellicle.simulation.environment import Environment, one_lamp, studio
-from pellicle.simulation.sphere import sphere
+from pellicle.simulation.environment import Environment, one_lamp, sphere, studio
 from pellicle.simulation.surface_sphere import following, in_colour, in_plane, relief, render
 
 STEEL = {"n": 2.9, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.1}

@@ -2,24 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import importlib
+import importlib.util
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.case import case
 from pellicle.accuracy.film_methods import compare_methods
 from pellicle.accuracy.intervals import INTERVAL_METHODS, compare_intervals
-from pellicle.accuracy.registry import Comparison, Method
-from pellicle.accuracy.simulated_data import data_sets
-from pellicle.accuracy.solvers import compare_solvers
+from pellicle.accuracy.registry import (
+    Comparison,
+    DataSet,
+    Method,
+    OnData,
+    data_sets,
+    deviance,
+    deviance_and_slope,
+    deviances,
+    measure_on_data,
+    residual,
+)
 from pellicle.errors import UsageError
+from pellicle.fitting.film.search import search
+from pellicle.fitting.minima import solve
 from pellicle.fitting.presentation import PlotMixin
+from pellicle.fitting.problem import Form
 from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.status import RIVAL
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
+
+STEPS = 100
+"""Most steps of a solver of another package."""
+CANDIDATES, SURVIVORS = 256, (64, 16, 4)
+"""Successive halving: random starts, and how many of them continue after every few steps, the last ones to
+convergence."""
+FEW_STEPS = 4
+
+
+def _best(units: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    return units[np.argsort(np.where(np.isfinite(values), values, np.inf), kind="stable")[:count]]
+
+
+def _from(data: DataSet, starts: np.ndarray) -> np.ndarray:
+    polished = solve(data.problem, starts)
+    return _best(polished.units, polished.deviance, 1)[0]
+
+
+def from_truth(data: DataSet) -> np.ndarray:
+    """The local minimum reached from the true values, where no solver of real data can start."""
+    return _from(data, data.truth[None])
+
+
+def _random(data: DataSet, count: int) -> np.ndarray:
+    return np.random.default_rng(count).uniform(size=(count, len(data.start)))
+
+
+def _multistart(count: int, data: DataSet) -> np.ndarray:
+    return _from(data, _random(data, count))
+
+
+def _halving(data: DataSet) -> np.ndarray:
+    units = _random(data, CANDIDATES)
+    for count in SURVIVORS:
+        after = solve(data.problem, units, steps=FEW_STEPS)
+        units = _best(after.units, after.deviance, count)
+    return _from(data, units)
+
+
+def _scipy_lbfgsb(data: DataSet) -> np.ndarray:
+    from scipy.optimize import minimize
+
+    def both(unit):
+        value, slope = jax.device_get(deviance_and_slope(*data.program, jnp.asarray(unit)))
+        return float(value), np.asarray(slope, dtype=float)
+
+    bounds = [(0.0, 1.0)] * len(data.start)
+    return minimize(both, data.start, jac=True, method="L-BFGS-B", bounds=bounds).x
+
+
+@partial(jax.jit, static_argnums=0)
+def _jaxopt_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # on import jaxopt warns that it is unmaintained
+        jaxopt: Any = importlib.import_module("jaxopt")  # optional
+    solver = jaxopt.LBFGSB(fun=lambda u: deviance(form, arrays, box, u), maxiter=STEPS, tol=1e-8)
+    return solver.run(unit, bounds=(jnp.zeros_like(unit), jnp.ones_like(unit))).params
+
+
+@partial(jax.jit, static_argnums=0)
+def _optimistix_run(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
+    import optimistix as optx
+
+    solver = optx.LevenbergMarquardt(rtol=1e-8, atol=1e-8)
+    return optx.least_squares(
+        lambda u, _: residual(form, arrays, box, u), solver, unit, max_steps=STEPS, throw=False
+    ).value
+
+
+def _from_start(run: Callable[..., Any], data: DataSet) -> np.ndarray:
+    return np.asarray(run(*data.program, jnp.asarray(data.start)))
+
+
+SOLVERS = (
+    Method(
+        "LM, start once",
+        "the search: one descent from the recipe's start",
+        lambda data: _from(data, data.start[None]),
+    ),
+    Method("scan + LM", "nothing: the search of `pl.fit`", lambda data: search(data.problem, quiet).units[0]),
+    Method("successive halving", "the scan: most of 256 random starts, soon", _halving),
+    Method("multistart, 16", "the scan: 16 random starts", partial(_multistart, 16)),
+    Method("multistart, 64", "the scan: 64 random starts", partial(_multistart, 64)),
+    Method("L-BFGS-B, scipy", "the search, and the residuals' Jacobian", _scipy_lbfgsb),
+    Method(
+        "L-BFGS-B, jaxopt",
+        "the search, and the residuals' Jacobian",
+        partial(_from_start, _jaxopt_run),
+        missing=None if importlib.util.find_spec("jaxopt") else "jaxopt",
+    ),
+    Method("LM, Optimistix's own", "the search, and the bounds", partial(_from_start, _optimistix_run)),
+)
+"""Every solver, in the order of the table."""
+
+
+def _deviance(data: DataSet, unit: np.ndarray) -> float:
+    value = float(deviances(*data.program, unit[None])[0])
+    return value if np.isfinite(value) else np.inf
+
+
+def compare_solvers(
+    data: Sequence[DataSet],
+    noise: float,
+    progress: Progress,
+    solvers: Sequence[Method] = SOLVERS,
+    *,
+    time_limit: float = np.inf,
+) -> Comparison:
+    """Fit every data set with every solver in turn; see `measure_on_data`."""
+    comparison = Comparison("inverse", noise=noise, requested=len(data))
+    how = OnData("data sets", lambda one: one, _score, _summary)
+    return measure_on_data(comparison, solvers, data, how, progress, time_limit)
+
+
+def _score(data: DataSet) -> Callable[[np.ndarray], tuple[float, bool]]:
+    """Score of a solver's answer: the largest error of any parameter, and whether it missed the minimum."""
+    least = _deviance(data, from_truth(data))
+
+    def score(unit: np.ndarray) -> tuple[float, bool]:
+        inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
+        return float(np.max(np.abs(inside - data.truth))), bool(_deviance(data, inside) > least + RIVAL)
+
+    return score
+
+
+def _summary(scores: list[tuple[float, bool]]) -> tuple[float, dict[str, Any]]:
+    errors, failures = zip(*scores, strict=True)
+    return float(np.mean(errors)), {"median_error": float(np.median(errors)), "failures": sum(failures)}
+
 
 TOLERANCE, TOLERANCE_IN_DEGREES = 1e-3, 0.1
 """Default tolerance: a fraction, or degrees on the sphere of N, C, S."""

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.accuracy.registry import Comparison, Method, OnData, measure_on_data
-from pellicle.accuracy.simulated_data import DataSet
+from pellicle.accuracy.registry import Comparison, DataSet, Method, OnData, measure_on_data
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.film.search import search
 from pellicle.fitting.neighbourhood import neighbourhood

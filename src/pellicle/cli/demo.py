@@ -42,7 +42,7 @@ def demo(
     from pellicle.cli.chart import chart
     from pellicle.cli.simulate import SimulationFlags, simulate
     from pellicle.files import write_text
-    from pellicle.sampling.checks import missing
+    from pellicle.sampling.chain import missing
 
     folder, count = Path(out), 1
     while folder.exists():

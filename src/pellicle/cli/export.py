@@ -50,7 +50,7 @@ def export(
     """
     described = _described(film, recipe)
     start()
-    from pellicle.api.appearance import export as export_scene
+    from pellicle.api.simulations import export as export_scene
     from pellicle.reporting.export_text import text
     from pellicle.reporting.json_record import one_line
 

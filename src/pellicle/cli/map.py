@@ -1,23 +1,215 @@
-"""`pellicle map`: thickness at every pixel of a cube of spectra or of a photograph."""
+"""`pellicle map`: thickness at every pixel of a cube of spectra or of a photograph, with its progress."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from pellicle.cli.batch import CONVERGED, UNCLEAR
-from pellicle.cli.cube_flags import CubeFlags
-from pellicle.cli.flags import OUTPUT, CameraFlags, flag, named, switch
-from pellicle.cli.map_cube import RunFlags, map_cube
+from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
+from pellicle.cli.cube_flags import CubeFlags, merged, reading
+from pellicle.cli.flags import OUTPUT, CameraFlags, Flags, flag, named, switch
+from pellicle.cli.messages import as_flags
+from pellicle.cli.progress import PixelProgress
 from pellicle.cli.session import check_folder, say, show, start
 from pellicle.data.options import SPACES
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
+    from pellicle.mapping.map_result import Map
     from pellicle.recipes.film import FilmRecipe
+    from pellicle.scene.film import Scene
+
+
+RUN = Group("Run", sort_key=2)
+MOST_DECIDED = 0.5
+"""Share of the pixels with data that must have one answer for the exit code 0."""
+STORE, NETCDF, RATES = "map.zarr", "map.nc", "rate.nc"
+
+
+@dataclass(frozen=True)
+class RunFlags(Flags):
+    """Flags of the computation of a map, None where not given."""
+
+    workers: Annotated[
+        int | None, flag(RUN, "Processes on this machine, one thread each (its cores, if that saves time).")
+    ] = None
+    scheduler: Annotated[
+        str | None, flag(RUN, "Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels.")
+    ] = None
+    neighbours: Annotated[
+        bool | None,
+        Parameter(group=RUN, help="Decide ambiguous pixels by the order of their neighbours.", negative=""),
+    ] = None
+    lamp_curve: Annotated[
+        str | None,
+        flag(
+            RUN,
+            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT, from a"
+            " region of known reflectance.",
+        ),
+    ] = None
+    lamp_reference: Annotated[
+        str | None, flag(RUN, "Recipe of the region of --lamp-curve (the bare substrate).")
+    ] = None
+    preview: Annotated[
+        bool | None,
+        Parameter(
+            group=RUN, help="Fit a few thousand pixels only, into the folder OUT-preview.", negative=""
+        ),
+    ] = None
+    resume: Annotated[
+        bool | None,
+        Parameter(group=OUTPUT, help="Go on with the map that an earlier run left in --out (the default)."),
+    ] = None
+    overwrite: Annotated[
+        bool | None, Parameter(group=OUTPUT, help="Replace a map that is in --out.", negative="")
+    ] = None
+
+
+def map_cube(
+    path: str, described: FilmRecipe, run: RunFlags, cube: CubeFlags, out: str | None, json: bool
+) -> int:
+    """Map a cube, print the report, write the folder, and return the exit code."""
+    _check(run, out)
+    folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
+    if folder is not None:
+        check_folder(str(folder))
+    scene = described.scene()
+    reference = None if run.lamp_reference is None else _known(run.lamp_reference)
+    start()
+    from pellicle.reporting.json_record import one_line
+    from pellicle.reporting.map_text import cube_json, cube_report
+    from pellicle.scene.free import free_leaves
+
+    if not free_leaves(scene):
+        raise DataError(
+            f"{described.path}: nothing is free to fit: give the thickness bounds, as in"
+            " thickness = { lower = 10, upper = 3000 }"
+        )
+    text = Path(described.path).read_text(encoding="utf-8")
+    options = {**reading(merged(cube, described)), "lamp_reference": reference, "recipe": text}
+    made = _fitted(path, scene, run, folder, options)
+    if made is None:
+        return INTERRUPTED
+    if made.run is not None and made.run.earlier:
+        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
+    show(one_line(cube_json(made)) if json else as_flags(cube_report(made)), folder is not None)
+    if folder is not None:
+        _write(folder, made)
+    return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
+
+
+def _check(run: RunFlags, out: str | None) -> None:
+    """Refuse flags that contradict one another. Raises UsageError."""
+    if run.workers is not None and run.workers < 1:
+        raise UsageError(f"--workers must be at least 1, got {run.workers}")
+    if run.workers is not None and run.scheduler is not None:
+        raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
+    if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
+        raise UsageError(f"{idle[0]} needs --out, the folder of the map")
+
+
+def _fitted(
+    path: str, scene: Scene, run: RunFlags, folder: Path | None, options: dict[str, Any]
+) -> Map | None:
+    """The map of a cube in its folder; None where it was interrupted, which is stated."""
+    from pellicle.api import maps
+
+    remains = set() if folder is None or not folder.exists() else {folder, *folder.iterdir()}
+    if folder is not None:
+        _mark(folder)
+    progress = PixelProgress(path)
+    try:
+        with progress:
+            return maps.map(
+                path,
+                scene,
+                out=None if folder is None else folder / STORE,
+                workers=1 if run.preview and run.workers is None else run.workers,
+                scheduler=run.scheduler,
+                resume=run.resume is not False,
+                overwrite=bool(run.overwrite),
+                preview=bool(run.preview),
+                neighbours=bool(run.neighbours),
+                lamp_curve=run.lamp_curve,
+                progress=progress,
+                **options,
+            )
+    except KeyboardInterrupt:
+        kept = f"; they are kept in {folder}, and the same command goes on from there" if folder else ""
+        say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
+        return None
+    except ValueError:  # a cube that cannot be read leaves no folder
+        if folder is not None and not progress.done:
+            _remove(folder, remains)
+        raise
+
+
+def _known(path: str) -> Scene:
+    """The scene of the recipe of a reference."""
+    from pellicle.recipes import read_recipe
+    from pellicle.recipes.film import FilmRecipe
+
+    described = read_recipe(path)
+    if not isinstance(described, FilmRecipe):
+        raise UsageError(f"{path}: --lamp-reference needs the recipe of a film, and this one is of a surface")
+    return described.scene()
+
+
+def _mark(folder: Path) -> None:
+    """Make the folder and mark it as ours, so that a killed run can go on in it."""
+    from pellicle.files import MARKER, new_folder, write_text
+    from pellicle.reporting.json_record import indented, versions
+    from pellicle.reporting.map_text import SCHEMA
+
+    target = new_folder(folder)
+    if not (target / MARKER).exists():
+        begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
+        write_text(target / MARKER, indented(begun))
+
+
+def _remove(folder: Path, remains: set[Path]) -> None:
+    """Remove the store and the mark of a run that has no pixel, unless they were there before it."""
+    import shutil
+
+    from pellicle.files import MARKER
+
+    if folder / STORE not in remains:
+        shutil.rmtree(folder / STORE, ignore_errors=True)
+    if folder / MARKER not in remains:
+        (folder / MARKER).unlink(missing_ok=True)
+    if folder not in remains and not any(folder.iterdir()):
+        folder.rmdir()
+
+
+def _write(folder: Path, made: Map) -> None:
+    from pellicle.reporting.map_files import write_cube_map
+
+    made.to_netcdf(folder / NETCDF, overwrite=True)
+    write_cube_map(folder, made)
+    rates = _write_rates(folder, made)
+    say(f"{folder}: map.zarr, map.nc, {rates}report and figures written")
+
+
+def _write_rates(folder: Path, made: Map) -> str:
+    """Write the rates of a series, and return the name of the file with a comma, empty without one."""
+    from pellicle.files import replacing
+    from pellicle.mapping.growth import TIME
+
+    if TIME not in made.dims:
+        return ""
+    try:
+        rates = made.growth()
+    except UsageError as error:
+        say(f"no rates of change: {error}")
+        return ""
+    with replacing(folder / RATES, overwrite=True) as draft:
+        rates.to_netcdf(draft, engine="h5netcdf")
+    return f"{RATES}, "
+
 
 PHOTOGRAPHS = Group("Photographs", sort_key=5)
 MOST_CONVERGED = 0.5

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
     from pellicle.recipes.film import FilmRecipe
-    from pellicle.scene.film import Scene
-    from pellicle.scene.reference import Reference
+    from pellicle.scene.film import Reference, Scene
 
 _PIXELS = ("region", "points")
 
@@ -94,9 +93,8 @@ def _reference_reflectance(
     wavelength: np.ndarray, options: FileOptions, stack: Reference | None
 ) -> np.ndarray:
     from pellicle.recipes.media_words import medium
-    from pellicle.scene.film import Light, Scene
+    from pellicle.scene.film import Light, Reference, Scene
     from pellicle.scene.layers import Layer
-    from pellicle.scene.reference import Reference
     from pellicle.simulation.spectra import simulate_spectrum
 
     if stack is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pellicle.dispersion.anisotropic import Anisotropic, isotropic_in_plane, mixes_polarisations
-from pellicle.effects.bounds import largest_attenuation
+from pellicle.effects.differences import largest_attenuation
 from pellicle.errors import UsageError
 from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL, SLICED, Row
 from pellicle.optics.berreman.slices import DIRECT

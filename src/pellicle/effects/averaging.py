@@ -6,7 +6,7 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import mixes_polarisations
 from pellicle.effects.anisotropy import scene_media
-from pellicle.effects.bounds import (
+from pellicle.effects.differences import (
     largest_index,
     largest_ratio,
     least_ambient,

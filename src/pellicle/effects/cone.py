@@ -9,7 +9,7 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, mixes_polarisations, principal_media
 from pellicle.effects.anisotropy import scene_media
-from pellicle.effects.bounds import (
+from pellicle.effects.differences import (
     largest_index,
     least_ambient,
     normal_incidence,

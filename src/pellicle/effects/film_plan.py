@@ -11,8 +11,9 @@ import jax
 
 from pellicle.effects import anisotropy, averaging, cone, gradient, presence
 from pellicle.effects.differences import Evaluation, Savings, design, measured
-from pellicle.effects.removal import REMOVABLE, FilmRemoval
-from pellicle.effects.tolerance import (
+from pellicle.effects.removal import (
+    REMOVABLE,
+    FilmRemoval,
     Stage,
     Step,
     check_tolerance,

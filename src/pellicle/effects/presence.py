@@ -12,7 +12,7 @@ from pellicle.dispersion.anisotropic import isotropic_in_plane, mixes_polarisati
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.anisotropy import scene_media
-from pellicle.effects.bounds import normal_incidence, upper
+from pellicle.effects.differences import normal_incidence, upper
 from pellicle.forward_model.plan import Row
 from pellicle.materials import Material
 from pellicle.optics.pair import real

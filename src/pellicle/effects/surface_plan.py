@@ -20,11 +20,11 @@ from pellicle.brdf.directions import angle_to_half
 from pellicle.brdf.film_colour import node_count
 from pellicle.brdf.sensor_bands import ERROR
 from pellicle.effects.differences import Evaluation, Savings, design, measured, signals
-from pellicle.effects.removal import in_single_precision
-from pellicle.effects.tolerance import (
+from pellicle.effects.removal import (
     Stage,
     Step,
     check_tolerance,
+    in_single_precision,
     left_out_row,
     plans_after,
     reduced_plan,

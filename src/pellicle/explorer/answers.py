@@ -15,8 +15,7 @@ from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.explorer.programs import COSINES, Curve, named
 from pellicle.forward_model.plan import Plan
 from pellicle.reporting.rendering_display import display, encode, exposure
-from pellicle.simulation.environment import studio
-from pellicle.simulation.sphere import Sphere, sphere
+from pellicle.simulation.environment import Sphere, sphere, studio
 
 WHITE_PERCENTILE = 97.0
 """Percentile of the luminance that is shown as white: a mirrored lamp covers 2 % of a ball."""

@@ -29,10 +29,9 @@ from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.lens import Turn
-from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned
+from pellicle.scene.film import Reference, Scene, media, of_reference, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer
-from pellicle.scene.reference import Reference
 
 Simulate = Callable[[Scene], Any]
 

@@ -23,8 +23,7 @@ from pellicle.forward_model.coherent_groups import CoherentGroup
 from pellicle.forward_model.plan import SLICED, Plan
 from pellicle.optics import plate
 from pellicle.optics.berreman.matrices import Elements
-from pellicle.optics.berreman.stack import Polarised, polarised, transmittances
-from pellicle.optics.berreman.two_sided import two_sided
+from pellicle.optics.berreman.stack import Polarised, polarised, transmittances, two_sided
 from pellicle.optics.ellipsometry import Stokes
 from pellicle.optics.interface import Inside, normal, normal_flux, transverse
 from pellicle.optics.lens import Turn, turned_response, turned_stokes

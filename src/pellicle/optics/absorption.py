@@ -24,8 +24,8 @@ import jax.numpy as jnp
 from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.characteristic import Characteristic
 from pellicle.optics.elementary import exp_and_expm1
+from pellicle.optics.field import InterfaceFields, Media, interface_fields, media
 from pellicle.optics.interface import incident_factor
-from pellicle.optics.interface_fields import InterfaceFields, Media, interface_fields, media
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real, sqrt, times_i, where
 
 

@@ -4,7 +4,7 @@ The fields (E, H) at a layer's lower face give those at its upper face by the el
 `characteristic.matrix_elements`, times their scale. After each layer the fields are divided by their
 norm, so that 50 layers with an opaque one among them stay finite without clamping. Complex arithmetic:
 separate real arrays bring nothing here. One `lax.scan` runs over the layers; unrolled, 50 of them do not
-compile in minutes. Two or three smooth layers take `pellicle.optics.few_layers`. A graded layer is a row of
+compile in minutes. Two or three smooth layers take `pellicle.optics.coherent`. A graded layer is a row of
 slices in that loop (`pellicle.optics.gradient`).
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).

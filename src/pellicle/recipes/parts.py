@@ -20,10 +20,10 @@ from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, Ref
 from pellicle.recipes.written_media import layer_medium
 from pellicle.recipes.written_media import medium as written_medium
 from pellicle.recipes.written_media import number as written_number
+from pellicle.scene.film import Reference
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
 from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
-from pellicle.scene.reference import Reference
 
 _SIGNED = ("wavelength_shift", "angle_shift")
 """Numbers that may be negative."""

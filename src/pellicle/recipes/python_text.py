@@ -13,12 +13,11 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial
 from pellicle.materials import material as find
-from pellicle.scene.film import Light, Scene
+from pellicle.scene.film import Light, Reference, Scene
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
-from pellicle.scene.reference import Reference
 from pellicle.scene.surface import Surface
 
 _PLACES = {

@@ -22,8 +22,8 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, TERMS, fixed_model, free_model
+from pellicle.recipes.media import BIAXIAL, UNIAXIAL
 from pellicle.recipes.media_words import free_numbers
-from pellicle.recipes.structured_media import BIAXIAL, UNIAXIAL
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.priors import HalfNormal, Normal

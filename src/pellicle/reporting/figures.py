@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pellicle.fitting.result import Fit
-    from pellicle.sampling.predict import Prediction
+    from pellicle.sampling.result import Prediction
 
 
 def draw_fit(fit: Fit) -> Figure:

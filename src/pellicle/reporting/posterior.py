@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from arviz import InferenceData
     from matplotlib.figure import Figure
 
-    from pellicle.sampling.predict import Prediction
-    from pellicle.sampling.result import Posterior
+    from pellicle.sampling.result import Posterior, Prediction
 
 _LEAST_MASS = 0.005
 """Minima with less of the posterior are not listed."""
@@ -128,7 +127,7 @@ def write_netcdf(
 
 def inference_data(posterior: Posterior, predictions: tuple[Prediction, ...]) -> InferenceData:
     """Convert a posterior and its predictions to ArviZ's InferenceData."""
-    from pellicle.sampling.checks import arviz
+    from pellicle.sampling.chain import arviz
 
     by_walker = np.moveaxis(posterior.draws, 0, 1)
     fit = to_json(posterior.fit)

@@ -7,7 +7,7 @@ import numpy as np
 
 from pellicle.colour import srgb
 from pellicle.colour.spaces import LUMINANCE, into_srgb
-from pellicle.simulation.sphere import Rendering
+from pellicle.simulation.environment import Rendering
 
 _srgb = jax.jit(srgb)  # compiled one by one its operations take 0.3 s
 WHITE_PERCENTILE = 99.5

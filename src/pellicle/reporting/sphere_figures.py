@@ -16,10 +16,9 @@ from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_f
 from pellicle.reporting.rendering_display import display, encode, exposure
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
-from pellicle.simulation.environment import Environment, light_tent, one_lamp, studio
+from pellicle.simulation.environment import EYE, Environment, Sphere, light_tent, one_lamp, studio
+from pellicle.simulation.environment import sphere as sphere_pixels
 from pellicle.simulation.film_sphere import ball, bubble, stack
-from pellicle.simulation.sphere import EYE, Sphere
-from pellicle.simulation.sphere import sphere as sphere_pixels
 from pellicle.simulation.surface_sphere import in_plane, render
 
 if TYPE_CHECKING:

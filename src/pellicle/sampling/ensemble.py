@@ -17,12 +17,10 @@ import numpy as np
 from pellicle.errors import DataError, UsageError, install_command
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit
-from pellicle.sampling.chain import Chain, ChainFile
-from pellicle.sampling.checks import Checks, check, missing
+from pellicle.sampling.chain import Chain, ChainFile, Checks, check, missing
 from pellicle.sampling.density import LogDensity, Target
 from pellicle.sampling.modes import Modes, Stretch, unchanged
-from pellicle.sampling.predict import Prediction
-from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Posterior, Prediction
 
 log = getLogger(__name__)
 

@@ -29,8 +29,7 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.density import fingerprint, log_density, systematics
 from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
 from pellicle.sampling.modes import modes, sandwich_stretch
-from pellicle.sampling.predict import predictions
-from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Posterior, predictions
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 

@@ -10,8 +10,7 @@ from pellicle.accuracy.intervals import Interval
 from pellicle.accuracy.registry import Method
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.sampling.chain import empty
-from pellicle.sampling.checks import missing
+from pellicle.sampling.chain import empty, missing
 from pellicle.sampling.density import Target, log_density
 from pellicle.sampling.ensemble import run
 from pellicle.sampling.modes import modes

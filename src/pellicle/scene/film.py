@@ -18,7 +18,7 @@ import numpy as np
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
-from pellicle.scene.free import Free
+from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.graded import AtDepth, Graded, face
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import (
@@ -32,9 +32,36 @@ from pellicle.scene.layers import (
     ambient_medium,
     divided,
 )
-from pellicle.scene.reference import Reference
 from pellicle.signals.base import Signal
+from pellicle.signals.contrast import FORMS
 from pellicle.signals.registry import SIMULATED, of_light
+
+
+@final
+class Reference(eqx.Module):
+    """A known sample: a substrate, bare or below layers.
+
+    **Arguments:** `substrate`: a `Substrate`, or its material; `layers` from the ambient down; `form` of a
+    contrast against it: "relative", (R − R₀)/R₀, or "normalised", (R − R₀)/(R + R₀).
+
+    **Raises:** UsageError for another form, and for free parameters.
+
+    >>> Reference("Si", [Layer("SiO2", 285.0)]).form
+    'relative'
+    """
+
+    substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(
+        converter=lambda x: tuple(x) if isinstance(x, list | tuple) else (x,), default=()
+    )
+    form: str = eqx.field(static=True, default="relative")
+
+    def __check_init__(self):
+        if self.form not in FORMS:
+            raise UsageError(f"`form` must be one of {', '.join(FORMS)}, not {self.form!r}")
+        if free_leaves((self.substrate, self.layers)):
+            raise UsageError("a `reference` is known: give its thicknesses and indices as plain numbers")
+
 
 POLARISATIONS = ("unpolarised", "s", "p")
 

@@ -28,8 +28,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.layers import Layer
 from pellicle.simulation.colours import BANDS, varied_layer
-from pellicle.simulation.environment import Environment
-from pellicle.simulation.sphere import Rendering, Sphere, sphere
+from pellicle.simulation.environment import Environment, Rendering, Sphere, sphere
 
 _BATCH = 4096
 """Films in one call: 4096 × 64 wavelengths are 2 MB in double precision."""

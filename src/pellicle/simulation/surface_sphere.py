@@ -18,9 +18,8 @@ from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
 from pellicle.scene.surface import INDICES, Surface, index_numbers
 from pellicle.simulation.colours import BANDS
-from pellicle.simulation.environment import EDGE, Environment, studio
+from pellicle.simulation.environment import EDGE, EYE, Environment, Rendering, sphere, studio
 from pellicle.simulation.film_sphere import to_srgb
-from pellicle.simulation.sphere import EYE, Rendering, sphere
 
 DIRECTIONS = 192
 """Directions of the light at each pixel: half of them spread as a lobe, half as the light of a diffuser."""

@@ -16,7 +16,7 @@ from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.problem import Problem
-from pellicle.sampling.predict import predictions
+from pellicle.sampling.result import predictions
 from pellicle.signals.sphere import psi_delta
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.data.colours import Colours
-from pellicle.effects.bounds import largest_index
+from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, camera_response

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.effects.bounds import largest_index
+from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_targets import MeasuredColours, colours_view

@@ -19,7 +19,7 @@ from pellicle.reporting.page.figures import label
 from pellicle.reporting.plotly_figure import figure
 from pellicle.reporting.rendering_display import display
 from pellicle.scene.surface import Surface
-from pellicle.simulation.sphere import EYE, sphere
+from pellicle.simulation.environment import EYE, sphere
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit
