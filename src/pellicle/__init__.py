@@ -62,11 +62,11 @@ if TYPE_CHECKING:
     from pellicle.simulation.depth import absorptance as absorptance
     from pellicle.simulation.depth import field as field
     from pellicle.simulation.functions import ellipsometry as ellipsometry
+    from pellicle.simulation.functions import jones as jones
+    from pellicle.simulation.functions import mueller as mueller
     from pellicle.simulation.functions import reflectance as reflectance
     from pellicle.simulation.functions import refractive_index as refractive_index
     from pellicle.simulation.functions import transmittance as transmittance
-    from pellicle.simulation.polarisation import jones as jones
-    from pellicle.simulation.polarisation import mueller as mueller
 
 _NAMES = {
     "pellicle.api.simulations": ("simulate", "depth_profile", "explore", "export"),
@@ -98,8 +98,9 @@ _NAMES = {
     "pellicle.scene.layers": ("Interface", "Layer", "Plate", "Substrate", "Uncertainty", "medium"),
     "pellicle.scene.surface": ("Surface",),
     "pellicle.simulation.depth": ("absorptance", "field"),
-    "pellicle.simulation.functions": ("ellipsometry", "reflectance", "refractive_index", "transmittance"),
-    "pellicle.simulation.polarisation": ("jones", "mueller"),
+    "pellicle.simulation.functions": (
+        *("ellipsometry", "jones", "mueller", "reflectance", "refractive_index", "transmittance"),
+    ),
     "pellicle.simulation.brdf": ("Directions",),
 }
 _MODULE = {name: module for module, names in _NAMES.items() for name in names}

@@ -9,7 +9,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.case import case
-from pellicle.accuracy.intervals import INTERVAL_METHODS, compare_intervals
+from pellicle.accuracy.cost import INTERVAL_METHODS, compare_intervals
 from pellicle.accuracy.registry import Method, data_sets
 from pellicle.fitting.progress import quiet
 from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS

@@ -8,9 +8,8 @@ import logging
 import pytest
 
 from pellicle.cli import app, main
-from pellicle.cli.messages import as_flags, flag_names
 from pellicle.cli.progress import log_to_stderr
-from pellicle.cli.session import say
+from pellicle.cli.session import as_flags, flag_names, say
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.cli.wavelengths import measured_scene
+from pellicle.cli.reading import measured_scene
 from pellicle.explorer import fit_run
 from pellicle.explorer.session import Session
 

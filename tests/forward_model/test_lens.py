@@ -11,7 +11,7 @@ import pytest
 import pellicle as pl
 from pellicle.effects import presence
 from pellicle.effects.anisotropy import anisotropy
-from pellicle.effects.cone import angle_spread
+from pellicle.effects.averaging import angle_spread
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
 from pellicle.forward_model.film_signal import build

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from pellicle.programs import cache as program_cache
-from pellicle.programs import private_files
 from pellicle.programs.cache import kept
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners")
@@ -94,7 +93,7 @@ def test_a_symbolic_link_is_not_followed(path):
     folder = path.parent.with_name("linked")
     folder.symlink_to(path.parent)
     assert program_cache.load(folder / path.name, KEY) is None
-    assert not private_files.make_folder(folder)
+    assert not program_cache.make_folder(folder)
 
 
 def test_a_pipe_does_not_stop_the_process(path):
@@ -122,11 +121,11 @@ def test_what_cannot_be_deserialised_is_not_loaded(path):
 
 def test_the_oldest_files_make_room(tmp_path):
     folder = tmp_path / "programs"
-    assert private_files.make_folder(folder)
+    assert program_cache.make_folder(folder)
     for age, name in enumerate(["new", "older", "oldest"]):
-        private_files.write(folder / name, bytes(100), 1000)
+        program_cache.write(folder / name, bytes(100), 1000)
         os.utime(folder / name, (1e9 - age, 1e9 - age))
-    private_files.write(folder / "last", bytes(100), 250)
+    program_cache.write(folder / "last", bytes(100), 250)
     assert {file.name for file in folder.iterdir()} == {"new", "last"}
 
 

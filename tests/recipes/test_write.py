@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.cli.wavelengths import measured_scene
+from pellicle.cli.reading import measured_scene
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import WithExtinction
 from pellicle.recipes.media_words import medium

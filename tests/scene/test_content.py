@@ -8,7 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured
-from pellicle.scene.content import KEPT, Content, remembered
+from pellicle.scene.free import KEPT, Content, remembered
 
 NM = np.linspace(400.0, 800.0, 64)
 

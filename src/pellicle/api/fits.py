@@ -22,8 +22,7 @@ from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, measured
 from pellicle.sampling.sample import sample as sample_posterior
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene, refuse
-from pellicle.scene.surface import Surface
+from pellicle.scene.surface import Surface, check_scene, refuse
 
 
 def fit(

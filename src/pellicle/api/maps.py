@@ -15,8 +15,7 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.photograph import ThicknessMap, map_photograph
 from pellicle.mapping.run import map_cube
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene
-from pellicle.scene.surface import Surface
+from pellicle.scene.surface import Surface, check_scene
 
 if TYPE_CHECKING:
     from pellicle.mapping.lamp import LampCurve

@@ -14,8 +14,7 @@ from pellicle.effects.surface_plan import plan as surface_plan
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene, refuse
-from pellicle.scene.surface import Surface, SurfaceView, surface_view
+from pellicle.scene.surface import Surface, SurfaceView, check_scene, refuse, surface_view
 from pellicle.simulation.brdf import Directions, default_directions
 from pellicle.simulation.spectra import default_wavelengths
 
@@ -129,9 +128,9 @@ def cost(
     colour-science.
     """
     from pellicle.accuracy.colour_methods import COLOUR_METHODS
+    from pellicle.accuracy.cost import INTERVAL_METHODS
     from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
     from pellicle.accuracy.film_colours import colour_cost
-    from pellicle.accuracy.intervals import INTERVAL_METHODS
     from pellicle.accuracy.surface import cost as surface_cost
     from pellicle.rendering.renderer_methods import RENDERER_METHODS
     from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS

@@ -15,8 +15,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Fit
 from pellicle.scene.film import Scene
-from pellicle.scene.kinds import check_scene, refuse
-from pellicle.scene.surface import Surface
+from pellicle.scene.surface import Surface, check_scene, refuse
 from pellicle.simulation.brdf import Directions, simulate_samples
 from pellicle.simulation.colours import simulate_colours
 from pellicle.simulation.depth_profile import DepthProfile

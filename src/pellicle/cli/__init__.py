@@ -18,11 +18,10 @@ from pellicle.cli.export import export
 from pellicle.cli.fit import fit, sample
 from pellicle.cli.map import map
 from pellicle.cli.materials import materials
-from pellicle.cli.messages import as_flags
 from pellicle.cli.processes import interruptible
 from pellicle.cli.progress import log_to_stderr
 from pellicle.cli.read import read
-from pellicle.cli.session import abandon_stdout, say
+from pellicle.cli.session import abandon_stdout, as_flags, say
 from pellicle.cli.simulate import simulate
 from pellicle.errors import UsageError
 

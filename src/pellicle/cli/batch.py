@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
-from pellicle.cli.messages import as_flags, with_flags
 from pellicle.cli.progress import LOG, Progress, TimeLeft, duration, log_to_stderr
-from pellicle.cli.session import check_folder, say, show
+from pellicle.cli.session import as_flags, check_folder, say, show, with_flags
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:

@@ -11,9 +11,8 @@ from cyclopts import Parameter
 from pellicle.cli.batch import CONVERGED, FAILED, UNCLEAR, error_message, measurement
 from pellicle.cli.flags import OUTPUT, SCENE, flag, switch
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs, inputs
-from pellicle.cli.messages import with_flags
 from pellicle.cli.progress import Progress
-from pellicle.cli.session import check_folder, say, show, start
+from pellicle.cli.session import check_folder, say, show, start, with_flags
 from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)

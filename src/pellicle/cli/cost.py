@@ -10,9 +10,8 @@ from cyclopts import Parameter
 
 from pellicle.cli.flags import Flags
 from pellicle.cli.progress import Progress
-from pellicle.cli.reading import recipe_angles
+from pellicle.cli.reading import directions, measured_scene, recipe_angles
 from pellicle.cli.session import check_folder, say, show, start
-from pellicle.cli.wavelengths import directions, measured_scene
 from pellicle.data.options import SPACES
 from pellicle.errors import UsageError
 

@@ -78,8 +78,7 @@ def explore(
 
 def _of_recipe(path: str) -> Session:
     """The session of a film's recipe, with the data of its first file."""
-    from pellicle.cli.reading import read
-    from pellicle.cli.wavelengths import wavelengths
+    from pellicle.cli.reading import read, wavelengths
     from pellicle.explorer.session import Session
     from pellicle.recipes import read_recipe
     from pellicle.recipes.surface import SurfaceRecipe

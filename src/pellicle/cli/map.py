@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
-from pellicle.cli.cube_flags import CubeFlags, merged, reading
-from pellicle.cli.flags import OUTPUT, CameraFlags, Flags, flag, named, switch
-from pellicle.cli.messages import as_flags
+from pellicle.cli.flags import OUTPUT, CameraFlags, CubeFlags, Flags, flag, merged, named, reading, switch
 from pellicle.cli.progress import PixelProgress
-from pellicle.cli.session import check_folder, say, show, start
+from pellicle.cli.session import as_flags, check_folder, say, show, start
 from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from shutil import get_terminal_size
 from typing import Any
 
-from pellicle.cli.messages import as_flags
+from pellicle.cli.session import as_flags
 
 LOG = logging.getLogger("pellicle")
 _COMPILE, _COMPILED = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.cube_flags import CubeOnlyFlags
-from pellicle.cli.flags import OUTPUT, FileFlags, flag, named, switch
-from pellicle.cli.messages import as_flags
+from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, named, switch
 from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.reading import read as read_file
-from pellicle.cli.session import say, start
+from pellicle.cli.session import as_flags, say, start
 from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
@@ -109,7 +107,7 @@ def _is_hdf5(path: str) -> bool:
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
     """The cube of a file; flags of other files are refused."""
-    from pellicle.cli.cube_flags import CubeFlags, reading
+    from pellicle.cli.flags import CubeFlags, reading
     from pellicle.data.read_cube import read_cube
 
     shared = options.given()

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import Flags
-from pellicle.cli.reading import recipe_angles
+from pellicle.cli.reading import directions, each_setting, recipe_angles, wavelengths
 from pellicle.cli.session import check_folder, not_negative, say, start
-from pellicle.cli.wavelengths import directions, each_setting, wavelengths
 from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError
 

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from pellicle.optics.array_namespace import namespace
+from pellicle.optics.pair import namespace
 
 TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """XYZ to linear sRGB (IEC 61966-2-1)."""

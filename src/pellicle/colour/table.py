@@ -17,8 +17,7 @@ from pellicle.colour.film import Colour, reflectance
 from pellicle.colour.observers import sensor
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import real, to_pair
+from pellicle.optics.pair import namespace, real, to_pair
 
 TOLERANCE = 0.05
 """Largest ΔE*ab of a table where none is given; its mean is then below 0.01."""

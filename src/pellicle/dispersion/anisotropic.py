@@ -1,10 +1,10 @@
-"""Birefringent media: dispersions of the principal indices, and the orientation of the axes."""
+"""Birefringent media, by principal dispersions and axes, and names of numbers inside any dispersion."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,8 +13,7 @@ from jaxtyping import Array, Complex
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.optics.anisotropy import Principal, permittivity, uniaxial
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number
+from pellicle.optics.pair import Number, namespace
 
 
 @final
@@ -215,3 +214,51 @@ class MeanIndex(AbstractDispersion):
 def mean_medium(medium: Anisotropic) -> MeanIndex:
     """Return the isotropic mean of an anisotropic medium."""
     return MeanIndex(medium.x, medium.y, medium.z)
+
+
+_BRANCHES = ("host", "inclusion", "first", "second")
+
+
+class ParameterLocation(NamedTuple):
+    """A number's full name in its dispersion, its last part, the field that holds it, and whose it is."""
+
+    name: str
+    key: str
+    field: str
+    owner: Any
+
+    @property
+    def unit(self) -> str:
+        """The unit that the model gives it, empty for none."""
+        if isinstance(self.owner, Anisotropic):
+            return "deg"
+        return getattr(self.owner, "units", {}).get(self.field, "")
+
+
+def locate_parameter(tree: Any, path: tuple) -> ParameterLocation:
+    """Location of the leaf at `path` (as of `jax.tree_util`) in a dispersion.
+
+    The numbers of a tuple are counted from 1 (`B1`); a mixture's components and, where there are
+    several, the terms of a sum go in front.
+    """
+    node: Any = tree
+    owner: Any = tree
+    field, count, words = "", "", []
+    for depth, step in enumerate(path):
+        if hasattr(step, "name"):
+            owner, field, count = node, step.name, ""
+            node = getattr(node, field)
+            if isinstance(owner, Anisotropic):
+                field = owner.names[field]
+                if isinstance(getattr(owner, step.name), AbstractDispersion):
+                    words.append(field)
+            elif field in _BRANCHES:
+                words.append(field)
+            continue
+        index = step.idx if hasattr(step, "idx") else step.key
+        if depth == len(path) - 1:
+            count = str(index + 1)
+        elif len(node) > 1:
+            words.append(f"term{index + 1}")
+        node = node[index]
+    return ParameterLocation(".".join([*words, field + count]), field + count, field, owner)

@@ -11,8 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex
 
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number, to_complex
+from pellicle.optics.pair import Number, namespace, to_complex
 
 HC = 1239.841984
 """Photon energy times wavelength, in eV nm (CODATA 2018): models in eV convert here, and only here."""

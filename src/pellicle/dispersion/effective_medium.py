@@ -15,8 +15,7 @@ import numpy as np
 from pellicle.dispersion.anisotropic import require_isotropic
 from pellicle.dispersion.base import AbstractDispersion, bounds_of
 from pellicle.optics import pair
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, real, times_i
+from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, namespace, real, times_i
 
 
 def _check(mixture: Any) -> None:

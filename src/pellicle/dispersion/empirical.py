@@ -11,8 +11,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, cast_like, require_nonnegative
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number, Pair, imag, is_real, real
+from pellicle.optics.pair import Number, Pair, imag, is_real, namespace, real
 
 
 @final

@@ -13,8 +13,7 @@ import equinox as eqx
 
 from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, require_nonnegative
 from pellicle.optics import pair
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Pair
+from pellicle.optics.pair import Pair, namespace
 from pellicle.optics.special import arctan_over_root, dawson, log_abs, scaled_ei
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.dispersion.base import bounds_of
 from pellicle.dispersion.spline import b_splines, greville_knots
-from pellicle.optics.array_namespace import namespace
+from pellicle.optics.pair import namespace
 
 
 class AbstractProfile(eqx.Module):

@@ -14,7 +14,7 @@ from typing import Any, final
 import equinox as eqx
 
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.optics.array_namespace import namespace
+from pellicle.optics.pair import namespace
 
 Coefficients = tuple[float, ...]
 

@@ -18,8 +18,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.dispersion.base import HC, AbstractDispersion, cast_like, require_nonnegative
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Pair
+from pellicle.optics.pair import Pair, namespace
 from pellicle.optics.special import log_abs
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import jax
 
-from pellicle.effects import anisotropy, averaging, cone, gradient, presence
+from pellicle.effects import anisotropy, averaging, gradient, presence
 from pellicle.effects.differences import Evaluation, Savings, design, measured
 from pellicle.effects.removal import (
     REMOVABLE,
@@ -51,7 +51,7 @@ EFFECTS = (
     Effect("back-face", presence.back_face),
     Effect("coherence", averaging.coherence),
     Effect("orders", averaging.orders),
-    Effect("angle-spread", cone.angle_spread),
+    Effect("angle-spread", averaging.angle_spread),
     Effect("dispersion", presence.dispersion),
     Effect("opaque", presence.opaque),
     Effect("precision", presence.precision),

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.optics.array_namespace import namespace
+from pellicle.optics.pair import namespace
 from pellicle.scene.priors import LogUniform, Prior
 
 Array: TypeAlias = jax.Array | np.ndarray

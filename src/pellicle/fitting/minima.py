@@ -8,7 +8,7 @@ from logging import getLogger
 import jax
 import numpy as np
 
-from pellicle.effects.cone import rays_of_axes
+from pellicle.effects.averaging import rays_of_axes
 from pellicle.fitting.evaluation import Until, polish
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet

@@ -13,8 +13,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.errors import DataError
 from pellicle.materials.contents import covering
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Pair, imag, is_real, real
+from pellicle.optics.pair import Pair, imag, is_real, namespace, real
 
 CLEAR = 1e-5
 """Largest k of an ambient that is taken as transparent. In the coefficients of the sample's faces k changes

@@ -18,8 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number
+from pellicle.optics.pair import Number, namespace
 
 
 class Principal(NamedTuple):

@@ -27,10 +27,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.optics.anisotropy import axis_direction
-from pellicle.optics.array_namespace import namespace
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import Polarised
 from pellicle.optics.mueller import mueller
+from pellicle.optics.pair import namespace
 from pellicle.optics.quadrature import disc_rule
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from pellicle.optics.array_namespace import custom_jvp, fori_loop, namespace
+from pellicle.optics.pair import custom_jvp, fori_loop, namespace
 
 _STEP = 0.2
 _TERMS = 17

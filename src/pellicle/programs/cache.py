@@ -7,8 +7,8 @@ code where no one but the user can write the files (`make`); elsewhere (Windows,
 GPU) it is the traced program, which is data: JAX lowers it again and finds the machine code in its cache.
 
 Loading machine code takes some milliseconds: nothing is traced, lowered or compiled. Machine code and the
-`pickle` format around it can do anything that the user can, so files are read only as `private_files` allows.
-A file begins with a digest of its content and of the key under which it was kept.
+`pickle` format around it can do anything that the user can, so files are read only where nobody else can have
+written them. A file begins with a digest of its content and of the key under which it was kept.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ import os
 import pickle
 import re
 import secrets
-from collections.abc import Callable, Hashable, Sequence
-from contextlib import suppress
+import stat
+import tempfile
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import lru_cache, wraps
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -30,7 +32,90 @@ import numpy as np
 
 from pellicle.errors import DataError, UsageError
 from pellicle.files import replacing
-from pellicle.programs import private_files
+
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def read(path: Path) -> bytes | None:
+    """Return the content of a file, None where it is absent or where others could have written it.
+
+    File and folder must belong to the user, be writable by no one else, and be no symbolic links. What is
+    checked is what is open, so that nothing can be exchanged after the check.
+    """
+    if not hasattr(os, "geteuid"):  # Windows
+        return None
+    try:
+        with _opened(path.parent, os.O_DIRECTORY) as folder, _opened(path.name, 0, folder) as file:
+            if not (_is_private(folder) and _is_private(file)):
+                return None
+            with open(file, "rb", closefd=False) as content:
+                return content.read()
+    except OSError:
+        return None
+
+
+def write(path: Path, content: bytes, limit: int) -> None:
+    """Write a file, complete or not at all, into a folder of `make_folder`.
+
+    The oldest files of the folder are removed until it holds at most `limit` bytes. Raises OSError.
+    """
+    handle, name = tempfile.mkstemp(dir=path.parent)  # readable and writable by the user alone
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(name, path)
+    except OSError:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+    files = [(file, file.stat()) for file in path.parent.iterdir()]
+    excess = sum(status.st_size for _, status in files) - limit
+    for file, status in sorted(files, key=lambda each: each[1].st_mtime_ns):
+        if excess <= 0:
+            break
+        with suppress(OSError):  # another process may have removed it
+            file.unlink()
+        excess -= status.st_size
+
+
+def make_folder(path: Path) -> bool:
+    """Make a folder for the user alone, if it is absent, and return whether no one else can write it.
+
+    False too where it cannot be made, is a symbolic link, or the system has no owners of files (Windows).
+    """
+    if not hasattr(os, "geteuid"):
+        return False
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.mkdir(mode=0o700, exist_ok=True)
+        with _opened(path, os.O_DIRECTORY) as folder:
+            return _is_private(folder)
+    except OSError:
+        return False
+
+
+def others_can_write(path: Path) -> bool:
+    """True where a file or folder belongs to another user, or another user can write it."""
+    if not hasattr(os, "geteuid"):
+        return False
+    status = path.stat()
+    return status.st_uid != os.geteuid() or bool(status.st_mode & _OTHERS_WRITE)
+
+
+@contextmanager
+def _opened(path: str | Path, kind: int, folder: int | None = None) -> Iterator[int]:
+    # O_NONBLOCK: a pipe in the place of the file must not stop the process
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | kind, dir_fd=folder)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _is_private(handle: int) -> bool:
+    status = os.fstat(handle)
+    return status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
+
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +146,7 @@ def compiler_options() -> dict[str, str | bool]:
 
 def load(path: Path, key: bytes) -> Callable[..., Any] | None:
     """Load the program that `make` kept under the same path and key, or None if no trusted file exists."""
-    content = private_files.read(path)
+    content = read(path)
     if content is None:
         return None
     try:
@@ -83,7 +168,7 @@ def make(
 
     `cache` is the folder of JAX's own compilation cache, `options` are those of XLA.
     """
-    if not private_files.make_folder(path.parent):
+    if not make_folder(path.parent):
         return None
     # JAX makes no promise that a program from its own cache can be serialised again: a name of its own keeps
     # this one out of there.
@@ -103,7 +188,7 @@ def make(
         body = pickle.dumps((bool(calls), serialize_executable.serialize(compiled)))
         content = _digest(key, body) + body
         program = _loaded(content, key)  # this process runs what later ones will
-        private_files.write(path, content, LIMIT)
+        write(path, content, LIMIT)
     except Exception as error:
         log.info("the compiled program is not kept: %s", error)
         return compiled

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import equinox as eqx
 
+from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
 from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
 from pellicle.dispersion.oscillators import (
@@ -18,7 +19,6 @@ from pellicle.dispersion.oscillators import (
     Oscillators,
     TaucLorentz,
 )
-from pellicle.dispersion.parameter_names import ParameterLocation
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.free import Free, is_free

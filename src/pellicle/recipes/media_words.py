@@ -9,11 +9,10 @@ import jax
 import numpy as np
 
 from pellicle.data.options import parse_number, parse_range
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant, Shifted
-from pellicle.dispersion.parameter_names import locate_parameter
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
 from pellicle.recipes.dispersion_models import (

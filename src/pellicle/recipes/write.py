@@ -19,13 +19,12 @@ from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.recipes import parts
+from pellicle.recipes.parts import same, written_medium, written_number
 from pellicle.recipes.read import checked
-from pellicle.recipes.written_media import medium, number, same
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
-from pellicle.scene.kinds import check_scene
 from pellicle.scene.layers import medium as medium_of
-from pellicle.scene.surface import Surface
+from pellicle.scene.surface import Surface, check_scene
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _WHOLE = 1e15
@@ -83,7 +82,7 @@ def recipe_text(
         again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
         _check_surface(scene, again)
         return text
-    ambient = medium(scene.ambient, "the ambient", at)
+    ambient = written_medium(scene.ambient, "the ambient", at)
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
@@ -145,7 +144,7 @@ def _one_or_several(angle: Any, light: Light, name: str) -> Any:
     """An angle, or several of which each is for all wavelengths."""
     if np.ndim(angle) and light.wavelength is None:
         return np.asarray(angle, float).tolist()
-    return number(angle, name)
+    return written_number(angle, name)
 
 
 def _wavelengths(nm: np.ndarray) -> Any:
@@ -167,10 +166,10 @@ def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
     for part in ("film", "base"):
         own = getattr(scene, part)
         if own is not None:
-            found[part] = medium(medium_of(own), part, folder)
+            found[part] = written_medium(medium_of(own), part, folder)
     for key, value in scene.numbers.items():
         several = not isinstance(value, Free) and np.ndim(value) == 1
-        found[key] = [float(x) for x in np.ravel(value)] if several else number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
+        found[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
     return found
 
 

@@ -16,9 +16,8 @@ from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Fit
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert
-from pellicle.scene.kinds import check_scene
 from pellicle.scene.layers import Layer
-from pellicle.scene.surface import Surface
+from pellicle.scene.surface import Surface, check_scene
 
 _SAMPLE = ("layers", "substrate", "ambient")
 """Parts of a scene that are the film: light and instrument belong to the measurement."""

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from pellicle.accuracy.intervals import Interval
+from pellicle.accuracy.cost import Interval
 from pellicle.accuracy.registry import Method
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima

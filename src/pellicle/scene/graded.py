@@ -15,8 +15,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.profiles import AbstractProfile, Linear
 from pellicle.errors import UsageError
-from pellicle.optics.array_namespace import namespace
-from pellicle.optics.pair import Number, narrow, parts, sqrt
+from pellicle.optics.pair import Number, namespace, narrow, parts, sqrt
 from pellicle.scene.layers import medium
 
 MEAN_NODES = 16

@@ -1,7 +1,11 @@
-"""Surfaces: a BRDF model by name, with each of its numbers fixed or free, and indices of its media."""
+"""Surfaces: a BRDF model by name, with each of its numbers fixed or free, and indices of its media.
+
+`check_scene` is for verbs that take a film or a surface.
+"""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,8 +23,9 @@ from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import materials_in
 from pellicle.optics.pair import imag, real
+from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves
-from pellicle.scene.layers import MediumLike, medium
+from pellicle.scene.layers import Interface, Layer, MediumLike, Plate, medium
 
 KEYS = {"film": ("n", "k"), "base": ("base_n", "base_k")}
 """Keys of the index of each part of a surface."""
@@ -310,3 +315,30 @@ def nonzero_numbers(surface: Surface) -> dict[str, Any]:
         value = number.free if number.channel is None else [*numbers.get(number.key, []), number.free]
         numbers[number.key] = value
     return {key: x for key, x in numbers.items() if key not in absent}
+
+
+def check_scene(scene: Any, several: bool = False) -> None:
+    """Raise UsageError unless `scene` is a `Scene` or a `Surface`, or with `several` a list of scenes.
+
+    The message has the call that makes one.
+    """
+    kinds = "a Scene, a Surface or a list of scenes" if several else "a Scene or a Surface"
+    for each in scene if several and isinstance(scene, list | tuple) else [scene]:
+        if isinstance(each, Scene | Surface):
+            continue
+        name, remedy = type(each).__name__, "pl.Scene(pl.Layer(material, thickness), substrate) makes one"
+        if isinstance(each, str | os.PathLike):
+            name = repr(os.fspath(each))
+            remedy = f"a recipe gives one by pl.read_recipe({name}).scene()"
+        elif isinstance(each, Layer | Interface | Plate):
+            remedy = "give it a substrate, as in pl.Scene(layer, 'Si')"
+        elif callable(getattr(each, "scene", None)):
+            remedy = "its .scene() is one"
+        raise UsageError(f"`scene` must be {kinds}, not {name}: {remedy}")
+
+
+def refuse(kind: str, **arguments: Any) -> None:
+    """Raise TypeError where an argument of the other kind of scene is given."""
+    for name, value in arguments.items():
+        if value is not None:
+            raise TypeError(f"`{name}` has no meaning for {kind}")

@@ -18,7 +18,7 @@ from pellicle.optics.absorption import absorptances
 from pellicle.optics.field import fields
 from pellicle.optics.interface import transverse
 from pellicle.optics.pair import Number, to_complex
-from pellicle.simulation.film_arguments import Medium, film_arguments, floating
+from pellicle.simulation.functions import Medium, film_arguments, floating
 
 
 class Field(NamedTuple):

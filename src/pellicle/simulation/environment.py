@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.optics.array_namespace import namespace
+from pellicle.optics.pair import namespace
 
 EDGE = 3.0
 """Width (degrees) over which the edges of a soft box and the horizon fade: a step would be a staircase."""

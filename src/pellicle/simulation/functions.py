@@ -1,4 +1,4 @@
-"""Reflectance, transmittance and ellipsometric angles of coherent layers, as functions of numbers.
+"""Reflectance, transmittance, ellipsometric angles, Jones and Mueller matrices, as functions of numbers.
 
 Every argument broadcasts and may be traced: `jit`, `vmap`, `grad` and `jacfwd` work through all of
 them. The precision follows the input, float32 or float64.
@@ -6,19 +6,110 @@ them. The precision follows the input, float32 or float64.
 
 from __future__ import annotations
 
-from typing import Any
+import warnings
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
-from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.optics import coherent, response
+from pellicle.dispersion.anisotropic import Anisotropic, principal_media
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.errors import UsageError
+from pellicle.optics import coherent, interface, response
+from pellicle.optics import mueller as mueller_matrices
+from pellicle.optics.anisotropy import is_anisotropic
+from pellicle.optics.berreman.matrices import Elements
+from pellicle.optics.berreman.slices import DIRECT
+from pellicle.optics.berreman.stack import Polarised, most_dichroic, polarised
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
-from pellicle.optics.pair import to_complex
+from pellicle.optics.interface import normal, normal_flux, transverse
+from pellicle.optics.pair import Number, abs2, is_real, to_complex, to_pair
 from pellicle.optics.response import Response
-from pellicle.scene.layers import medium
-from pellicle.simulation.film_arguments import Medium, film_arguments, floating, index_at
+from pellicle.scene.film import check_polarisation
+from pellicle.scene.layers import ambient_medium, medium
+
+Medium = Any
+"""A number (n + ik), an array of them, a material, or a material's name."""
+
+
+class FilmArguments(NamedTuple):
+    """A film as `pellicle.optics.coherent.responses` takes it."""
+
+    wavelength: Any  # nm
+    thicknesses: list[Any]  # nm
+    ambient: Number
+    layers: list[Number]
+    substrate: Number
+    angle: Any  # radians; None is normal incidence
+    polarisations: str
+    propagating: bool  # no wave is totally reflected in a real layer
+
+
+def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, polarisation) -> FilmArguments:
+    """Evaluate and check the arguments of `pellicle.reflectance`.
+
+    To be called by a helper of the public function: a warning names the line that calls the latter.
+    """
+    check_polarisation(polarisation)
+    for name, value in {"wavelength": wavelength, "thickness": thickness, "angle": angle}.items():
+        if isinstance(value, str):
+            raise UsageError(f"`{name}` must be a number or an array, not {value!r}")
+    if _loses_precision(wavelength, thickness, layer, substrate, ambient, angle):
+        warnings.warn(
+            "float64 input is computed in float32: jax.config.update('jax_enable_x64', True) keeps it",
+            stacklevel=4,
+        )
+    wavelength = floating(wavelength)
+    normal = isinstance(angle, int | float) and angle == 0
+    several = isinstance(layer, list | tuple)
+    propagating = normal or all(
+        interface.propagates(n, ambient, angle) for n in (layer if several else [layer])
+    )
+    into_below = normal or interface.propagates(substrate, ambient, angle)
+    named = isinstance(ambient, str | AbstractDispersion)
+    ambient = index_at(ambient_medium(ambient) if named else ambient, wavelength)
+    substrate = index_at(substrate, wavelength)
+    if not is_real(ambient):
+        raise ValueError("the ambient must not absorb: give it a real index")
+    if not into_below and not is_anisotropic(substrate):
+        substrate = interface.allow_tunnelling(substrate)
+    theta = None if normal else jnp.deg2rad(floating(angle))
+    letters = "sp" if polarisation == "unpolarised" else polarisation
+    layers, thicknesses = [layer], [thickness]
+    if several:
+        layers = layer
+        count = len(thickness) if isinstance(thickness, list | tuple) else np.shape(thickness)[:1]
+        if count not in (len(layers), (len(layers),)):
+            raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
+        thicknesses = [thickness[i] for i in range(len(layers))]
+    indices = [index_at(n, wavelength) for n in layers]
+    return FilmArguments(wavelength, thicknesses, ambient, indices, substrate, theta, letters, propagating)
+
+
+def floating(x: Any):
+    """Convert to an array of real or complex floats, weakly typed where it is a Python number."""
+    return jnp.asarray(x) * 1.0
+
+
+def index_at(what: Medium, wavelength) -> Number:
+    """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
+    if isinstance(what, str | AbstractDispersion):
+        material = medium(what)
+        for own in [] if isinstance(wavelength, Tracer) else principal_media(material):
+            if hasattr(own, "check_range"):
+                own.check_range(np.asarray(wavelength))
+        return material.index(wavelength)
+    return to_pair(floating(what))
+
+
+def _loses_precision(*arguments: Any) -> bool:
+    if jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        return False
+    double = (np.float64, np.complex128)
+    return any(isinstance(a, np.ndarray | np.generic) and a.dtype in double for a in arguments)
 
 
 def reflectance(
@@ -162,3 +253,126 @@ def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisa
 
 
 _compiled_responses = jax.jit(coherent.responses, static_argnames=("polarisations", "propagating"))
+
+
+def jones(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any,
+    side: str = "reflection",
+) -> Complex[Array, "... 2 2"]:
+    """Jones matrix of one or several layers on a half space, isotropic or birefringent.
+
+    **Arguments** as for `pellicle.reflectance`; a layer and the substrate may also be `pellicle.Anisotropic`.
+    `angle` of incidence in degrees has no default. `side`: "reflection", or "transmission" into an isotropic
+    substrate.
+
+    **Returns:** complex, in the shape that the arguments broadcast to, with two more axes:
+    [[r_pp, r_ps], [r_sp, r_ss]] for electric fields. Rows are outgoing and columns incident: r_ps is the
+    reflected p wave for incident s (Woollam's instruments write r_sp for it). The signs are those of
+    `pellicle.ellipsometry`: r_pp/r_ss is near −1 for bare silicon at small angles, and the time factor is
+    exp(−iωt), so that tan(Ψ) exp(iΔ) = conj(r_pp/r_ss). The azimuth of an optic axis counts from the plane of
+    incidence, from x (the direction of the light along the surface) towards y = z × x with z into the sample;
+    s is along y.
+
+    **Raises:** as `pellicle.reflectance`; ValueError for transmission into a birefringent substrate, whose
+    two waves are neither p nor s.
+
+    **Source:** D. W. Berreman, J. Opt. Soc. Am. 62, 502 (1972), in the form of `pellicle.optics.berreman`.
+
+    ```python
+    >>> calcite = pl.Anisotropic(1.658, 1.486, axis=(45.0, 30.0))
+    >>> matrix = pl.jones(589.3, 500.0, calcite, 1.52, angle=60.0)
+    >>> print(" ".join(f"{abs(x):.3f}" for x in matrix.ravel()))
+    0.026 0.039 0.012 0.500
+
+    ```
+    """
+    film, response = _response(wavelength, thickness, layer, substrate, ambient, angle, side)
+    amplitudes = response.reflected if side == "reflection" else _transmitted(film, response)
+    return _array([to_complex(x) for x in amplitudes])
+
+
+def mueller(
+    wavelength: Any,
+    thickness: Any,
+    layer: Medium,
+    substrate: Medium,
+    *,
+    ambient: Medium = 1.0,
+    angle: Any,
+    side: str = "reflection",
+    normalised: bool = True,
+) -> Float[Array, "... 4 4"]:
+    """Mueller matrix of one or several layers on a half space, isotropic or birefringent.
+
+    **Arguments** and **Raises** as `jones`. `normalised`: divided by its element m11, as instruments
+    write it. Otherwise m11 is the reflectance or transmittance for unpolarised light.
+
+    **Returns:** real, in the shape that the arguments broadcast to, with two more axes. An isotropic sample
+    has m12 = m21 = −N, m33 = m44 = C and m34 = −m43 = S, with N = cos 2Ψ, C = sin 2Ψ cos Δ and
+    S = sin 2Ψ sin Δ. Where there is no light, the normalised matrix is 0.
+
+    Mueller matrices of incoherent contributions add before they are normalised; Jones matrices do not.
+
+    ```python
+    >>> silicon = pl.mueller(632.8, 100.0, "SiO2", "Si", angle=70.0)
+    >>> print(np.round(silicon[0] + 0.0, 3))
+    [ 1.    -0.138  0.     0.   ]
+
+    ```
+    """
+    film, response = _response(wavelength, thickness, layer, substrate, ambient, angle, side)
+    amplitudes = response.reflected
+    if side == "transmission":
+        # power in place of the electric field, p and s apart
+        flux = [normal_flux(film.substrate, _normal(film), letter) for letter in "ps"]
+        per_field = flux[0] / abs2(film.substrate), flux[1]
+        p, s = (jnp.sqrt(jnp.maximum(x, 0.0) / response.incident) for x in per_field)
+        t = _transmitted(film, response)
+        amplitudes = Elements(t.pp * p, t.ps * p, t.sp * s, t.ss * s)
+    matrix = mueller_matrices.mueller(_array([to_complex(x) for x in amplitudes]))
+    return mueller_matrices.normalised(matrix) if normalised else matrix
+
+
+def _response(
+    wavelength: Any, thickness: Any, layer: Any, substrate: Any, ambient: Any, angle: Any, side: str
+) -> tuple[FilmArguments, Polarised]:
+    if side not in ("reflection", "transmission"):
+        raise UsageError(f'`side` must be "reflection" or "transmission", not {side!r}')
+    film = film_arguments(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    if side == "transmission" and is_anisotropic(film.substrate):
+        raise ValueError(
+            'a birefringent substrate transmits neither p nor s waves: `side` must be "reflection"'
+        )
+    angle = jnp.zeros_like(film.wavelength) if film.angle is None else film.angle
+    film = film._replace(angle=angle)
+    phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
+    numbers = (film.ambient, film.layers, film.substrate, phases, angle)
+    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves(numbers))
+    dichroic = traced or bool(jnp.any(_dichroism(film.ambient, film.layers, phases, angle) > DIRECT))
+    return film, _polarised(*numbers, dichroic=dichroic)
+
+
+_polarised = jax.jit(polarised, static_argnames="dichroic")
+_dichroism = jax.jit(most_dichroic)
+
+
+def _normal(film: FilmArguments) -> Any:
+    return normal(film.substrate, transverse(film.ambient, film.angle)[0])
+
+
+def _transmitted(film: FilmArguments, response: Polarised) -> Elements:
+    """Return the Jones matrix of transmission: of the electric field of p and s in the substrate."""
+    E, H = response.fields
+    index = 1 / film.substrate
+    return Elements(index * H.pp, index * H.ps, E.sp, E.ss)
+
+
+def _array(elements: list[Any]) -> Any:
+    pp, ps, sp, ss = jnp.broadcast_arrays(*elements)
+    return jnp.stack([jnp.stack([pp, ps], axis=-1), jnp.stack([sp, ss], axis=-1)], axis=-2)

@@ -20,9 +20,8 @@ from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
-from pellicle.scene.content import Content, remembered
 from pellicle.scene.film import Scene, thickness_spread
-from pellicle.scene.free import Free, free_leaves, insert, is_free
+from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
 

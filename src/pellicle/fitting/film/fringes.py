@@ -26,9 +26,8 @@ from pellicle.fitting.noise import local_noise
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import ViewFit
 from pellicle.optics.pair import real
-from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene
-from pellicle.scene.free import insert
+from pellicle.scene.free import insert, remembered
 from pellicle.scene.layers import Layer
 
 _GRID = 1024

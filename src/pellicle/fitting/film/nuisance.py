@@ -19,7 +19,7 @@ from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.positive_definite import nonnegative
-from pellicle.scene.content import remembered
+from pellicle.scene.free import remembered
 from pellicle.scene.instrument import Drift, Instrument
 
 _LOOSE = 10.0

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from pellicle.dispersion.anisotropic import ParameterLocation, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
@@ -18,14 +19,12 @@ from pellicle.dispersion.oscillators import (
     Oscillators,
     TaucLorentz,
 )
-from pellicle.dispersion.parameter_names import ParameterLocation, locate_parameter
 from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import Spline
 from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
-from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free, free_leaves, insert, is_free
+from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.layers import Layer, Uncertainty
 
 _WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}

@@ -17,8 +17,8 @@ from pellicle.fitting.film.view import ROUND, SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
-from pellicle.scene.content import remembered
 from pellicle.scene.film import Scene, coherent_layers, with_wavelength
+from pellicle.scene.free import remembered
 
 _KEPT_EFFECTS = ("precision", "dispersion")
 """Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media

@@ -25,7 +25,7 @@ from pellicle.fitting.normal_equations import by_singular_values
 from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
 from pellicle.fitting.result import Estimate
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.scene.content import remembered
+from pellicle.scene.free import remembered
 
 _SHORT = 5
 """Fewest points of a sweep, on average; rows that turn back more often are in no order."""

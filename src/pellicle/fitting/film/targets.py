@@ -15,9 +15,8 @@ from pellicle.fitting import noise
 from pellicle.fitting.film.colour_targets import MeasuredColours
 from pellicle.fitting.problem import Noise
 from pellicle.forward_model.film_signal import depolarises
-from pellicle.scene.content import remembered
 from pellicle.scene.film import Light, Scene
-from pellicle.scene.free import free_leaves, is_free
+from pellicle.scene.free import free_leaves, is_free, remembered
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 from pellicle.signals.base import Signal
 

@@ -8,8 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Principal
-from pellicle.optics.berreman.matrices import matrix
-from pellicle.optics.berreman.propagation import Fields, Propagation, elements_and_exponents, exp, full
+from pellicle.optics.berreman.matrices import Fields, Propagation, elements_and_exponents, exp, full, matrix
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.interface import normal_square
 from pellicle.optics.pair import Number, real, times_i

@@ -15,8 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Tensor
-from pellicle.optics.berreman.matrices import inverse, matrix, one_minus, stacked
-from pellicle.optics.berreman.propagation import Fields, Propagation
+from pellicle.optics.berreman.matrices import Fields, Propagation, inverse, matrix, one_minus, stacked
 from pellicle.optics.hoisting import stored
 from pellicle.optics.pair import Number, Pair, to_complex
 

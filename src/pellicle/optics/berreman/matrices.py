@@ -1,16 +1,28 @@
 """2×2 matrices of numbers: real arrays, complex arrays or `Pair`s of arrays (2, 2, ...).
 
 One formula for all elements compiles to a fraction of the code of a formula for each of them.
+
+They propagate the tangential fields through a homogeneous layer. The fields are ψ = (Ex, Hy, Ey, −Hx) with H
+in units of E over the impedance of free space and the time factor exp(−iωt); they obey dψ/dz = i k₀ Δ ψ.
+Source: D. W. Berreman, J. Opt. Soc. Am. 62, 502 (1972).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from pellicle.optics.characteristic import (
+    Characteristic,
+    element_slopes,
+    is_real_array,
+    matrix_elements,
+    scale_exponent,
+)
+from pellicle.optics.elementary import sincos
 from pellicle.optics.hoisting import stored
 from pellicle.optics.pair import Number, Pair, imag, is_real, real
 
@@ -93,3 +105,63 @@ def one_plus(matrix: Number) -> Number:
 def _constant(rows: tuple[tuple[int, int], ...], matrix: Number) -> Any:
     like = real(matrix)
     return jnp.array(rows, like.dtype).reshape(2, 2, *[1] * (like.ndim - 2))
+
+
+Fields = tuple[Number, Number, Number, Number]
+"""Ex, Hy, Ey and −Hx."""
+
+
+class Propagation(NamedTuple):
+    """exp(−i k₀ d Δ), which takes the fields at the lower face to the upper one, times exp(−growth)."""
+
+    apply: Callable[[Fields], Fields]
+    growth: Any  # real: the exponent of the mode that grows most
+
+
+def full(number: Number) -> Pair:
+    """Return a number as a `Pair` of two arrays, which promises nothing."""
+    return Pair(jnp.asarray(real(number)) * 1.0, imag(number) + 0.0 * real(number))
+
+
+def exp(z: Number) -> Number:
+    """Return the exponential of a real array or a `Pair`."""
+    if not isinstance(z, Pair):
+        return jnp.exp(z)
+    sine, cosine = sincos(z.im)
+    if z.re is None:
+        return Pair(cosine, sine)
+    size = jnp.exp(z.re)
+    return Pair(size * cosine, size * sine)
+
+
+def elements_and_exponents(squares: Sequence[Number], k: Any) -> Iterator[tuple[Number, Number, Number]]:
+    """Return c and f times e^x, and x, whose slope is that of the scale, of each Q: see `matrix_elements`."""
+    Q = stacked(*squares, like=k)
+    scaled = _stored_elements(Q, k)
+    exponent = stored((_real_exponent if is_real_array(Q) else scale_exponent)(Q, k))
+    return zip(*(unstacked(x, len(squares)) for x in (scaled.c, scaled.f, exponent)), strict=True)
+
+
+@jax.custom_jvp
+def _stored_elements(Q: Number, k: Any) -> Characteristic:
+    return stored(matrix_elements(Q, k))
+
+
+@_stored_elements.defjvp
+def _stored_element_slopes(primal: Any, tangent: Any) -> tuple[Characteristic, Characteristic]:
+    values, slopes = element_slopes(_stored_elements, primal, tangent)
+    return values, stored(slopes)
+
+
+@jax.custom_jvp
+def _real_exponent(Q: Any, k: Any) -> Any:
+    """Return x for a real Q: 0 where the wave propagates, −k√−Q where it is evanescent."""
+    return jnp.where(Q < 0, -k * jnp.sqrt(jnp.abs(Q)), 0.0)
+
+
+@_real_exponent.defjvp
+def _real_exponent_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
+    (Q, k), (dQ, dk) = primal, tangent
+    varies = (Q < 0) & (jnp.abs(k * k * Q) >= 0.01)  # as in `matrix_elements`
+    root = jnp.sqrt(jnp.where(varies, -Q, 1.0))
+    return _real_exponent(Q, k), jnp.where(varies, (Q * dk + 0.5 * k * dQ) / root, 0.0)

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.berreman.matrices import inverse, one_minus, product
-from pellicle.optics.berreman.propagation import Propagation
+from pellicle.optics.berreman.matrices import Propagation, inverse, one_minus, product
 from pellicle.optics.hoisting import stored
 from pellicle.optics.pair import Number, to_complex, to_pair
 

@@ -27,6 +27,7 @@ from pellicle.optics.berreman import aligned, biaxial, uniaxial
 from pellicle.optics.berreman.biaxial import delta, downward_pair, half_space
 from pellicle.optics.berreman.matrices import (
     Elements,
+    Propagation,
     elements,
     inverse,
     matrix,
@@ -36,7 +37,6 @@ from pellicle.optics.berreman.matrices import (
     stacked,
     unstacked,
 )
-from pellicle.optics.berreman.propagation import Propagation
 from pellicle.optics.berreman.slices import (
     Scattering,
     doubled,

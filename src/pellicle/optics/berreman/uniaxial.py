@@ -19,13 +19,14 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Uniaxial, birefringence
-from pellicle.optics.berreman.matrices import stacked, unstacked
-from pellicle.optics.berreman.propagation import (
+from pellicle.optics.berreman.matrices import (
     Fields,
     Propagation,
     elements_and_exponents,
     exp,
     full,
+    stacked,
+    unstacked,
 )
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.hoisting import stored
