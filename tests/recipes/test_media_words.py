@@ -203,7 +203,7 @@ def test_the_documented_defaults_are_these(name, specs):
             assert specs[key].limits == tuple(map(float, ends))
 
 
-EVERY = [*MODELS.items(), *((name, specs) for name, (_, specs) in TERMS.items())]
+EVERY = [*MODELS.items(), *((name, specs) for name, specs in TERMS.items())]
 
 
 @pytest.mark.parametrize(("name", "specs"), EVERY)

@@ -176,7 +176,7 @@ def test_any_parameter_of_a_model_can_be_freed():
     layer = media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)", ["Eg", "E0=3.5:5", "k"])
     free = names(Scene(Layer(layer, 100.0), "Si"))
     assert set(free) == {"Eg", "E0", "k"}
-    usual = TERMS["tauc-lorentz"][1]["Eg"]
+    usual = TERMS["tauc-lorentz"]["Eg"]
     assert (free["Eg"].start, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
     assert (free["E0"].lower, free["E0"].upper) == (3.5, 5)
     assert media_words.medium("sellmeier(1.1,8000)", ["B1"]).B[0].lower == 0.1

@@ -52,10 +52,6 @@ Interval = tuple[np.ndarray, np.ndarray]
 """Lower and upper ends for each parameter, in the unit cube of the bounds."""
 
 
-def _fit(data: DataSet) -> RankedMinima:
-    return rank(data.problem, search(data.problem, quiet)).counted
-
-
 def _covariance(fit: RankedMinima) -> Interval:
     problem, best = fit.problem, fit.minima.units[0]
     _, errors = linearised(fit)
@@ -88,7 +84,12 @@ def compare_intervals(
 ) -> Comparison:
     """Compute intervals for every data set by every method; see `measure_on_data`."""
     comparison = Comparison("interval", requested=len(data))
-    how = OnData("intervals", _fit, _score_of_intervals, _summary_of_intervals)
+    how = OnData(
+        "intervals",
+        lambda one: rank(one.problem, search(one.problem, quiet)).counted,
+        _score_of_intervals,
+        _summary_of_intervals,
+    )
     return measure_on_data(comparison, methods, data, how, progress, time_limit)
 
 

@@ -48,10 +48,7 @@ command = app.meta
 @command.default
 def _any(
     *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-    verbose: Annotated[
-        bool,
-        Parameter(negative="", help="Log each step to stderr."),
-    ] = False,
+    verbose: Annotated[bool, Parameter(negative="", help="Log each step to stderr.")] = False,
 ) -> int:
     with log_to_stderr() if verbose else nullcontext():
         return int(app(words) or 0)

@@ -21,8 +21,7 @@ log = getLogger(__name__)
 def compare(
     *data: Annotated[str, Parameter(help="Files to fit, one by one.")],
     recipe: Annotated[
-        list[str] | None,
-        Parameter(group=SCENE, help="Recipe to compare; give two or more.", negative=""),
+        list[str] | None, Parameter(group=SCENE, help="Recipe to compare; give two or more.", negative="")
     ] = None,
     out: Annotated[str | None, flag(OUTPUT, "Folder for the comparison and every fit.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,

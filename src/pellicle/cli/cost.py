@@ -27,8 +27,7 @@ class CostFlags(Flags):
         str, Parameter(help="Reference of the errors: float64, or mpmath with 50 digits.")
     ] = "float64"
     tolerance: Annotated[
-        float | None,
-        Parameter(help="Error that is small enough: in R, T, degrees or, of colours, ΔE2000."),
+        float | None, Parameter(help="Error that is small enough: in R, T, degrees or, of colours, ΔE2000.")
     ] = None
     datasets: Annotated[
         int, Parameter(help="Number of simulated spectra that every solver fits; 0 for no solvers.")

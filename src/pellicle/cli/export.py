@@ -30,8 +30,7 @@ def export(
     to: Annotated[str, Parameter(help="blender, gltf, materialx, mitsuba, openpbr or usd.")],
     out: Annotated[str, Parameter(help="File to write; no file is overwritten.")],
     numbers: Annotated[
-        str,
-        Parameter(help="Numbers that are drawn: effective (solved for the exact colours) or physical."),
+        str, Parameter(help="Numbers that are drawn: effective (solved for the exact colours) or physical.")
     ] = "effective",
     thickness_map: Annotated[
         str | None, Parameter(help="Thickness over the object in nm: a .npy file or a grey PNG.")

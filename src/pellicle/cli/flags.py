@@ -361,8 +361,5 @@ def _reflectance(white: str, flags: CubeFlags) -> Any:
     from pellicle.simulation.functions import reflectance
 
     material = medium(white, name="`white_reflectance`")
-    light: dict[str, Any] = {
-        "angle": flags.angle or 0.0,
-        "polarisation": flags.polarisation or "unpolarised",
-    }
+    light: dict[str, Any] = {"angle": flags.angle or 0.0, "polarisation": flags.polarisation or "unpolarised"}
     return lambda nm: np.asarray(reflectance(nm, 0.0, 1.0, material, **light))

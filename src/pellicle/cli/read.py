@@ -79,6 +79,7 @@ def _measurements(
 ) -> list[Spectrum] | list[Colours] | list[Cube]:
     """Every spectrum of a file, the colours of every film in it, or its cube."""
     from pellicle.data.cubes.detect import is_cube
+    from pellicle.data.cubes.xarray_cubes import is_netcdf
 
     if of_cube.given() or is_cube(Path(path)) or Path(path).is_dir():
         return [_cube(path, options, of_cube)]
@@ -88,7 +89,7 @@ def _measurements(
     try:
         return _spectra(path, options)
     except DataError:
-        if not _is_hdf5(path):
+        if not is_netcdf(Path(path)):
             raise
         try:  # a NetCDF file that is no spectrum may be a cube
             return [_cube(path, options, of_cube)]
@@ -97,12 +98,6 @@ def _measurements(
         if "no axis" in str(reason):
             raise
         raise reason from None
-
-
-def _is_hdf5(path: str) -> bool:
-    from pellicle.data.cubes.xarray_cubes import is_netcdf
-
-    return is_netcdf(Path(path))
 
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:

@@ -60,8 +60,7 @@ def simulate(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
     out: Annotated[
-        str,
-        Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth."),
+        str, Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth.")
     ],
     how: Annotated[SimulationFlags, Parameter(name="*")] = SimulationFlags(),
     depth: Annotated[
@@ -91,7 +90,9 @@ def simulate(
         return 0
     start()
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
-    comments = ["SYNTHETIC: simulated, not measured", _source(recipe, noise, how.seed)]
+    said = f"{noise:g}" if isinstance(noise, float | int) else noise
+    source = f"recipe {Path(recipe).name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
+    comments = ["SYNTHETIC: simulated, not measured", source]
     if isinstance(described, SurfaceRecipe):
         _write_samples(described, out, noise, how, comments)
     elif isinstance(noise, str):
@@ -127,12 +128,6 @@ def _check_depolarisation(described: FilmRecipe | SurfaceRecipe, noise: float | 
     kind = None if isinstance(described, SurfaceRecipe) else KINDS.get(described.tables.data.signal or "")
     if kind is None or "depolarisation" not in kind.keywords:
         raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
-
-
-def _source(recipe: str, noise: Any, seed: int) -> str:
-    """Comment on the origin of a simulated file."""
-    said = f"{noise:g}" if isinstance(noise, float | int) else noise
-    return f"recipe {Path(recipe).name}, seed {seed}, noise {said}, pellicle {version('pellicle')}"
 
 
 def _wavelengths_of(text: str) -> list[float]:
@@ -238,13 +233,7 @@ def _truth(scene: Scene) -> str:
     return "truth: " + ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in numbers)
 
 
-def _csv(
-    scene: Scene,
-    result: SimulatedSignal,
-    kind: Signal,
-    noise: float,
-    comments: list[str],
-) -> str:
+def _csv(scene: Scene, result: SimulatedSignal, kind: Signal, noise: float, comments: list[str]) -> str:
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     import numpy as np
 

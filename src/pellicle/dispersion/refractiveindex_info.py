@@ -40,6 +40,7 @@ def _sqrt(x: Any):
 
 
 def _polynomial(x, c: Coefficients):
+    """5: n = C1 + Σ C λ^e."""
     return c[0] + sum(a * _power(x, e) for a, e in _pairs(c) if a)
 
 
@@ -71,11 +72,6 @@ def _refractiveindex_info(x, c: Coefficients):
     return _sqrt(square)
 
 
-def _cauchy(x, c: Coefficients):
-    """5: n = C1 + Σ C λ^e."""
-    return _polynomial(x, c)
-
-
 def _gases(x, c: Coefficients):
     """6: n − 1 = C1 + Σ B/(C − λ⁻²)."""
     inverse = 1 / (x * x)
@@ -105,17 +101,10 @@ def _exotic(x, c: Coefficients):
     return _sqrt(c[0] + c[1] / (x * x - c[2]) + c[3] * off / (off * off + c[5]))
 
 
-_FORMULAS: dict[int, Callable[[Any, Coefficients], Any]] = {
-    1: _sellmeier,
-    2: _sellmeier_2,
-    3: _polynomial_of_square,
-    4: _refractiveindex_info,
-    5: _cauchy,
-    6: _gases,
-    7: _herzberger,
-    8: _retro,
-    9: _exotic,
-}
+_FORMULAS: tuple[Callable[[Any, Coefficients], Any], ...] = (
+    *(_sellmeier, _sellmeier_2, _polynomial_of_square, _refractiveindex_info, _polynomial),
+    *(_gases, _herzberger, _retro, _exotic),
+)
 
 
 @final
@@ -131,7 +120,7 @@ class Formula(AbstractDispersion):
     coefficients: Coefficients = eqx.field(static=True)
 
     def __check_init__(self):
-        if self.number not in _FORMULAS:
+        if not 1 <= self.number <= len(_FORMULAS):
             raise ValueError(f"number: expected a formula from 1 to 9, got {self.number}")
         if not self.coefficients:
             raise ValueError("coefficients: expected at least one, got none")
@@ -139,4 +128,4 @@ class Formula(AbstractDispersion):
     def index(self, wavelength):
         xp = namespace(wavelength)
         micrometres = xp.asarray(wavelength) * 1e-3
-        return xp.broadcast_to(_FORMULAS[self.number](micrometres, self.coefficients), micrometres.shape)
+        return xp.broadcast_to(_FORMULAS[self.number - 1](micrometres, self.coefficients), micrometres.shape)

@@ -26,10 +26,6 @@ def _knots(what: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(x) for x in what)
 
 
-def _column(what: Sequence[Any] | None) -> tuple[Any, ...] | None:
-    return None if what is None else tuple(what)
-
-
 def _check(model: str, knots: tuple[float, ...], **coefficients: Any) -> None:
     if len(knots) < 2 or any(a >= b for a, b in itertools.pairwise(knots)) or knots[0] <= 0:
         raise ValueError(f"{model}: knots must be two or more rising wavelengths in nm, got {list(knots)}")
@@ -53,7 +49,7 @@ class Spline(AbstractDispersion):
 
     knots: tuple[float, ...] = eqx.field(static=True, converter=_knots)
     n: tuple[Any, ...] = eqx.field(converter=tuple)
-    k: tuple[Any, ...] | None = eqx.field(converter=_column, default=None)
+    k: tuple[Any, ...] | None = eqx.field(converter=lambda k: None if k is None else tuple(k), default=None)
 
     def __check_init__(self):
         _check("spline", self.knots, n=self.n, k=self.k)

@@ -1,4 +1,4 @@
-"""Averages over bandwidth, uneven thickness and a cone of light: orders, nodes and rays, with their errors."""
+"""Averages over bandwidth, uneven thickness and a cone of light: orders, nodes, rays, and their errors."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ def coherence(scene: Scene) -> Row:
         raise ValueError("the number of orders depends on the wavelengths: give the light its wavelengths")
     if _by_orders(scene):
         why = f"fringes are damped by {' and '.join(blurs)}"
-        return Row("coherence", True, why, _straight_phase_error(scene))
+        # of a phase of P radians that is taken as linear over the window: P σ²/λ²
+        at, layers = _layers(scene)
+        window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(at)
+        return Row("coherence", True, why, float(min(_path(at, layers) * window**2, 1.0)))
     return coherence_by_nodes(scene)
 
 
@@ -145,13 +148,6 @@ def _nodes(scene: Scene) -> tuple[int, float]:
     blurs += [4 * np.pi / np.min(at) * index * upper(thickness_spread(scene, x)) for x, index in layers]
     tried = [(n, float(sum(quadrature.normal_error(blur, n) for blur in blurs))) for n in NODES]
     return next(((n, error) for n, error in tried if error < NODES_ERROR), tried[-1])
-
-
-def _straight_phase_error(scene: Scene) -> float:
-    """Error of taking a fringe's phase as linear over the window: P σ²/λ² for a phase of P radians."""
-    at, layers = _layers(scene)
-    window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(at)
-    return float(min(_path(at, layers) * window**2, 1.0))
 
 
 def _layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:

@@ -63,7 +63,7 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     """The effects that a scene has, judged from its types and bounds; rows that are `given` are not judged.
 
     An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
-    an average have a bound above 0 (see `effects.averaging` and `effects.cone`).
+    an average have a bound above 0 (see `effects.averaging`).
     """
     known = {row.effect: row for row in given}
     rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)

@@ -161,17 +161,15 @@ def _collected(share: Quantity | None, count: int | None) -> str:
 def dispersion(scene: Scene) -> Row:
     """On where an index varies with the wavelength."""
     at = scene.light.wavelength
-    varying = [name for name, m in [*_media(scene), ("ambient", scene.ambient)] if not _constant(m)]
+    media = [*_media(scene), ("ambient", scene.ambient)]
+    bare = [(name, m.dispersion if isinstance(m, Material) else m) for name, m in media]
+    varying = [name for name, m in bare if not isinstance(m, Constant)]
     if at is not None and np.size(np.unique(at)) == 1:
         return Row("dispersion", False, "one wavelength")
     if not varying:
         return Row("dispersion", False, "no index varies with the wavelength")
     named = " and ".join(dict.fromkeys(varying))
     return Row("dispersion", True, f"the index of {named} varies with the wavelength")
-
-
-def _constant(material: AbstractDispersion) -> bool:
-    return isinstance(material.dispersion if isinstance(material, Material) else material, Constant)
 
 
 def opaque(scene: Scene) -> Row:

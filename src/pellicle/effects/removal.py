@@ -180,11 +180,12 @@ def _opaque(scene: Scene, removal: FilmRemoval) -> Scene:
 
 def _gradient(scene: Scene, _: FilmRemoval) -> Scene:
     """Give every graded layer its mean permittivity."""
-    return _with(scene, layers=_each(scene, lambda layer: _with(layer, material=_mean(layer.material))))
 
+    def mean(layer: Layer) -> Layer:
+        graded = isinstance(layer.material, Graded)
+        return _with(layer, material=MeanOverDepth(layer.material)) if graded else layer
 
-def _mean(material: AbstractDispersion) -> AbstractDispersion:
-    return MeanOverDepth(material) if isinstance(material, Graded) else material
+    return _with(scene, layers=_each(scene, mean))
 
 
 @final
@@ -245,16 +246,13 @@ def _anisotropy(scene: Scene, _: FilmRemoval) -> Scene:
     """Give every birefringent medium the mean of its indices; free angles of an axis are lost."""
 
     def isotropic(x: Any) -> Any:
-        return _with(x, material=mean_medium(x.material)) if _birefringent(x) else x
+        birefringent = isinstance(getattr(x, "material", None), Anisotropic)
+        return _with(x, material=mean_medium(x.material)) if birefringent else x
 
     layers, substrate = tuple(map(isotropic, scene.layers)), isotropic(scene.substrate)
     if isinstance(substrate.back, Anisotropic):
         substrate = _with(substrate, back=mean_medium(substrate.back))
     return _with(scene, layers=layers, substrate=substrate)
-
-
-def _birefringent(x: Any) -> bool:
-    return not isinstance(x, Interface) and isinstance(x.material, Anisotropic)
 
 
 def _dispersion(scene: Scene, _: FilmRemoval) -> Scene:

@@ -68,7 +68,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
         if i < len(plates):
             medium = thick[i + 1]
             internal = _per_polarisation(partial(_internal, medium, a, plates[i], wavelength), medium)
-            collected = _collection(plates[i])
+            part = plates[i].back_collected, plates[i].back_reflections
+            collected = plate.Collection(*part) if any(x is not None for x in part) else None
         evaluated.append(
             CoherentGroup(
                 above=thick[i],
@@ -85,17 +86,6 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     return evaluated
 
 
-def _collection(described: Plate) -> plate.Collection | None:
-    if described.back_collected is None and described.back_reflections is None:
-        return None
-    return plate.Collection(described.back_collected, described.back_reflections)
-
-
-def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
-    extinction = imag(interface.normal(seen_by(medium, polarisation), a))
-    return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
-
-
 def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
     if all(face is None for face in group.roughness):
         return None
@@ -109,6 +99,11 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
         return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
     index = layer.material.index(wavelength)
     return index if plan.on("absorption") else each_index(real, index)
+
+
+def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
+    extinction = imag(interface.normal(seen_by(medium, polarisation), a))
+    return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
 
 
 def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):

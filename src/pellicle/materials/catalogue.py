@@ -90,14 +90,7 @@ def _material(
     source: Contents | MaterialFile, name: str, page: str, citation: str, note: str, caution: str = ""
 ) -> Material:
     return Material(
-        source.dispersion,
-        name,
-        page,
-        citation,
-        source.wavelength_range,
-        source.has_extinction,
-        note,
-        caution,
+        source.dispersion, name, page, citation, source.wavelength_range, source.has_extinction, note, caution
     )
 
 

@@ -129,16 +129,12 @@ def responses(
     if mixes_polarisations(ambient, *layers, substrate):
         raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
     if any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
-        return tuple(
-            _responses(*_seen(ambient, layers, substrate, one), phases, angle, one, propagating, roughness)[0]
-            for one in polarisations
-        )
+        responses = []
+        for one in polarisations:
+            above, *between, below = (seen_by(n, one) for n in (ambient, *layers, substrate))
+            responses += _responses(above, between, below, phases, angle, one, propagating, roughness)
+        return tuple(responses)
     return _responses(ambient, layers, substrate, phases, angle, polarisations, propagating, roughness)
-
-
-def _seen(ambient: Any, layers: Any, substrate: Any, polarisation: str) -> tuple[Any, list[Any], Any]:
-    own = [seen_by(n, polarisation) for n in (ambient, *layers, substrate)]
-    return own[0], own[1:-1], own[-1]
 
 
 def _responses(

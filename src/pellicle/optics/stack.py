@@ -134,7 +134,8 @@ def _rows(
         of_layers([phase if n == 1 else phase / n for phase, n in zip(phases, counts, strict=True)])
     )
     points = tuple(map(at, range(3 if sliced else 1)))
-    if sliced and all(is_real(x) for x in jax.tree_util.tree_leaves(list(layers), is_leaf=_is_pair)):
+    indices = jax.tree_util.tree_leaves(list(layers), is_leaf=lambda x: isinstance(x, Pair))
+    if sliced and all(map(is_real, indices)):
         points = tuple(map(jnp.real, points))  # three times as fast
     if roughness is None:
         return _Rows(points, depth, None)
@@ -142,10 +143,6 @@ def _rows(
     for count, face in zip(counts, roughness[1:], strict=True):
         rough += [jnp.zeros((count - 1, *shape), dtype), _full(face, shape, dtype)[None]]
     return _Rows(points, depth, jnp.real(joined(rough)))
-
-
-def _is_pair(number: Any) -> bool:
-    return isinstance(number, Pair)
 
 
 def _full(number: Number, shape: tuple[int, ...], dtype: Any) -> Any:

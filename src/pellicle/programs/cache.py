@@ -207,13 +207,9 @@ def _loaded(content: bytes, key: bytes) -> Callable[..., Any]:
 
     lapack, program = pickle.loads(body)
     if lapack:
-        _initialise_lapack()
+        # a lowered program that calls LAPACK lets JAX find its addresses, without which other calls crash
+        jax.jit(jax.lax.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), float))
     return serialize_executable.deserialize_and_load(*program, execution_devices=jax.devices()[:1])
-
-
-def _initialise_lapack() -> None:
-    """Lower a program that calls LAPACK: JAX then finds its addresses, without which other calls crash."""
-    jax.jit(jax.lax.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), float))
 
 
 Program = Callable[..., Any]

@@ -69,49 +69,34 @@ _TAUC_LORENTZ = {
     "Eg": ParameterSpec(0.5, 5.0, 2.0, (0.0, 12.0)),
 }
 
-TERMS: dict[str, tuple[type[AbstractOscillator], dict[str, ParameterSpec]]] = {
-    "lorentz": (
-        Lorentz,
-        {
-            "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
-            "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
-            "gamma": ParameterSpec(0.01, 4.0, 0.5, _WIDTH),
-        },
-    ),
+TERMS: dict[str, dict[str, ParameterSpec]] = {
+    "lorentz": {
+        "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
+        "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+        "gamma": ParameterSpec(0.01, 4.0, 0.5, _WIDTH),
+    },
     # the plasma energy of beryllium, with the most conduction electrons of all metals, is 19 eV
-    "drude": (
-        Drude,
-        {
-            "Ep": ParameterSpec(0.0, 15.0, 3.0, (0.0, 20.0)),
-            "gamma": ParameterSpec(0.01, 2.0, 0.1, _WIDTH),
-        },
-    ),
-    "gaussian": (
-        Gaussian,
-        {
-            "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
-            "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
-            "fwhm": ParameterSpec(0.05, 4.0, 0.5, _WIDTH),
-        },
-    ),
-    "tauc-lorentz": (TaucLorentz, _TAUC_LORENTZ),
-    "cody-lorentz": (
-        CodyLorentz,
-        {
-            **_TAUC_LORENTZ,
-            "Ep": ParameterSpec(0.1, 5.0, 1.0, (0.01, 20.0)),
-            "Et": ParameterSpec(0.0, 1.0, 0.0, (0.0, 3.0), False),
-            "Eu": ParameterSpec(0.01, 0.5, 0.05, (0.001, 2.0), False),
-        },
-    ),
+    "drude": {
+        "Ep": ParameterSpec(0.0, 15.0, 3.0, (0.0, 20.0)),
+        "gamma": ParameterSpec(0.01, 2.0, 0.1, _WIDTH),
+    },
+    "gaussian": {
+        "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
+        "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+        "fwhm": ParameterSpec(0.05, 4.0, 0.5, _WIDTH),
+    },
+    "tauc-lorentz": _TAUC_LORENTZ,
+    "cody-lorentz": {
+        **_TAUC_LORENTZ,
+        "Ep": ParameterSpec(0.1, 5.0, 1.0, (0.01, 20.0)),
+        "Et": ParameterSpec(0.0, 1.0, 0.0, (0.0, 3.0), False),
+        "Eu": ParameterSpec(0.01, 0.5, 0.05, (0.001, 2.0), False),
+    },
 }
 """Oscillators and their parameters; energies in eV, the strength A of lorentz and gaussian without unit."""
 
 # silver has the least n of metals (0.05), and n or k above 10 are those of metals beyond 2 um
-_INDEX = {
-    "n": ParameterSpec(1.2, 4.0, 1.5, (0.01, 10.0)),
-    "k": ParameterSpec(0.0, 2.0, 0.01, (0.0, 20.0)),
-}
+_INDEX = {"n": ParameterSpec(1.2, 4.0, 1.5, (0.01, 10.0)), "k": ParameterSpec(0.0, 2.0, 0.01, (0.0, 20.0))}
 # B of silicon is 10.7 and of germanium 15; a resonance at 800 nm, the band gap of gallium arsenide is there
 _B, _C = (0.0, 40.0), (0.0, 6.4e5)
 MODELS: dict[str, dict[str, ParameterSpec]] = {
@@ -136,7 +121,7 @@ MODELS: dict[str, dict[str, ParameterSpec]] = {
         "B3": ParameterSpec(0.0, 6.0, 0.0, _B, False),
         "C3": ParameterSpec(1e6, 1e9, 1e8, (6.4e5, 1e10), False),
     },
-    **{name: {**specs, "eps_inf": _EPS_INF} for name, (_, specs) in TERMS.items()},
+    **{name: {**specs, "eps_inf": _EPS_INF} for name, specs in TERMS.items()},
     "spline": _INDEX,
     "spline-kk": {"k": _INDEX["k"], "n_inf": ParameterSpec(1.0, 3.0, 1.5, (1.0, 6.0))},
 }
@@ -153,14 +138,8 @@ def free_model(name: str) -> AbstractDispersion:
     """Build a model with its parameters free within their default bounds."""
     # the bounds of these are narrow: their middle is as good a start as any
     middle = name in ("constant", "cauchy", "sellmeier")
-    return build_model(
-        name,
-        {
-            key: spec.parameter(None if middle else spec.value)
-            for key, spec in MODELS[name].items()
-            if spec.free
-        },
-    )
+    specs = {key: spec for key, spec in MODELS[name].items() if spec.free}
+    return build_model(name, {k: spec.parameter(None if middle else spec.value) for k, spec in specs.items()})
 
 
 def fixed_model(name: str, numbers: Sequence[float], label: str) -> AbstractDispersion:
@@ -196,9 +175,8 @@ def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
     """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
     if kind not in TERMS:
         raise UsageError(f"no oscillator {kind!r}{did_you_mean(kind, TERMS)}; known: {', '.join(TERMS)}")
-    oscillator, specs = TERMS[kind]
-    values = _with_defaults(kind, specs, values)
-    return _checked(lambda: oscillator(**values))
+    values = _with_defaults(kind, TERMS[kind], values)
+    return _checked(lambda: KINDS[kind](**values))
 
 
 def sum_of_oscillators(eps_inf: Parameter, terms: Iterable[AbstractOscillator]) -> AbstractDispersion:
@@ -233,30 +211,34 @@ def _spec(at: ParameterLocation) -> ParameterSpec | None:
     if at.field == "fraction":
         return ParameterSpec(0.0, 1.0, 0.5, (0.0, 1.0))
     for name, specs in MODELS.items():
-        kind = TERMS[name][0] if name in TERMS else KINDS[name]
+        kind = KINDS[name]
         # words free n and k of a constant with bounds around its own index
         if kind is not Constant and kind is type(at.owner) and (at.key in specs or at.field in specs):
             return specs.get(at.key) or specs[at.field]
     return _EPS_INF if at.field == "eps_inf" else None
 
 
-KINDS: dict[str, type[AbstractDispersion]] = {
+KINDS: dict[str, type[Any]] = {
     "constant": Constant,
     "cauchy": Cauchy,
     "cauchy-urbach": CauchyUrbach,
     "sellmeier": Sellmeier,
     "spline": Spline,
     "spline-kk": KramersKronigSpline,
+    "lorentz": Lorentz,
+    "drude": Drude,
+    "gaussian": Gaussian,
+    "tauc-lorentz": TaucLorentz,
+    "cody-lorentz": CodyLorentz,
 }
-"""The class of each model that is no oscillator, which `TERMS` has."""
+"""The class of each model, and of each oscillator in `TERMS`."""
 
 
 def _built(name: str, values: Values) -> AbstractDispersion:
     """A model of all its values."""
     given: dict[str, Any] = dict(values)
     if name in TERMS:
-        oscillator, specs = TERMS[name]
-        return Oscillators(given["eps_inf"], (oscillator(**{key: given[key] for key in specs}),))
+        return Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
     if name == "constant":
         require_nonnegative("constant", **given)
         return Constant(given["n"], None if given["k"] == 0 else given["k"])

@@ -224,7 +224,7 @@ def _model_schema(schema: dict[str, Any]) -> None:
         if name in SPLINES:
             properties["knots"] = {"type": "array", "items": {"type": "number"}}
         choices.append({"properties": properties, "additionalProperties": False})
-    kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, (_, specs) in TERMS.items()]
+    kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, specs in TERMS.items()]
     term = [{"properties": keys, "required": ["kind"], "additionalProperties": False} for keys in kinds]
     terms = {"type": "array", "minItems": 1, "items": {"anyOf": term}}
     choices.append(

@@ -28,7 +28,7 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes import media_words
-from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, TERMS, fixed_model, free_model
+from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, fixed_model, free_model
 from pellicle.recipes.media import BIAXIAL, UNIAXIAL, FreeTable, Medium, Number, medium, number
 from pellicle.recipes.media_words import free_numbers
 from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, ReferenceTable, SceneTable
@@ -39,10 +39,7 @@ from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift
 from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
 from pellicle.scene.priors import HalfNormal, Normal
 
-_MIX = {kind: name for name, kind in MIXTURES.items()}
-_PROFILE = {kind: name for name, kind in PROFILES.items()}
-_TERM = {kind: name for name, (kind, _) in TERMS.items()}
-_MODEL: dict[type, str] = {kind: name for name, kind in KINDS.items()}
+_NAME: dict[type, str] = {kind: name for table in (MIXTURES, PROFILES, KINDS) for name, kind in table.items()}
 
 
 def written_number(thing: Any, name: str) -> float | dict[str, Any]:
@@ -95,24 +92,21 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         return _anisotropic(dispersion, name, folder)
     if isinstance(dispersion, Graded):
         media = [written_medium(each, name, folder) for each in (dispersion.first, dispersion.second)]
-        profile = {"profile": _PROFILE[type(dispersion.profile)], **_numbers(dispersion.profile, name)}
+        profile = {"profile": _NAME[type(dispersion.profile)], **_numbers(dispersion.profile, name)}
         return {"graded": media, "mix": dispersion.mix, **profile}
     kind = type(dispersion)
-    if kind in _MIX:
+    if kind in MIXTURES.values():
         both = {key: written_medium(getattr(dispersion, key), name, folder) for key in ("host", "inclusion")}
-        return {
-            "mix": _MIX[kind],
-            **both,
-            "fraction": written_number(dispersion.fraction, f"{name}: fraction"),
-        }
+        fraction = written_number(dispersion.fraction, f"{name}: fraction")
+        return {"mix": _NAME[kind], **both, "fraction": fraction}
     if isinstance(dispersion, Sellmeier) and len(dispersion.B) <= 3:
         pairs = zip(dispersion.B, dispersion.C, strict=True)
         each = {f"{key}{i}": x for i, pair in enumerate(pairs, 1) for key, x in zip("BC", pair, strict=True)}
         return {"model": "sellmeier", **{key: written_number(x, f"{name}: {key}") for key, x in each.items()}}
     if isinstance(dispersion, Oscillators):
         return _oscillators(dispersion, name)
-    if kind in _MODEL and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:
-        return {"model": _MODEL[kind], **_numbers(dispersion, name)}
+    if kind in KINDS.values() and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:
+        return {"model": _NAME[kind], **_numbers(dispersion, name)}
     raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
 
 
@@ -172,7 +166,7 @@ def _anisotropic(dispersion: Anisotropic, name: str, folder: Path) -> dict[str, 
 
 def _oscillators(dispersion: Oscillators, name: str) -> dict[str, Any]:
     eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
-    terms = [{"kind": _TERM[type(term)], **_numbers(term, name)} for term in dispersion.terms]
+    terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
     if len(terms) != 1:
         return {"model": "oscillators", **eps_inf, "terms": terms}
     return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
@@ -180,15 +174,14 @@ def _oscillators(dispersion: Oscillators, name: str) -> dict[str, Any]:
 
 def _numbers(module: AbstractDispersion | AbstractOscillator | Any, name: str) -> dict[str, Any]:
     """The numbers of a module by its fields, lists of one for each knot included."""
-    found = {}
-    for field in fields(module):
-        x, label = getattr(module, field.name), f"{name}: {field.name}"
-        if x is not None:
-            several = isinstance(x, tuple)
-            found[field.name] = (
-                [written_number(each, label) for each in x] if several else written_number(x, label)
-            )
-    return found
+    given = {field.name: getattr(module, field.name) for field in fields(module)}
+    return {
+        key: [written_number(one, f"{name}: {key}") for one in x]
+        if isinstance(x, tuple)
+        else written_number(x, f"{name}: {key}")
+        for key, x in given.items()
+        if x is not None
+    }
 
 
 def _words(dispersion: Any) -> Iterable[str]:
@@ -198,7 +191,7 @@ def _words(dispersion: Any) -> Iterable[str]:
     for model in MODELS:
         if same(free_model(model), dispersion):
             yield model
-    kind = _MODEL.get(type(dispersion))
+    kind = _NAME.get(type(dispersion))
     if kind in SPLINES and same(fixed_model(kind, dispersion.knots, kind), dispersion):
         yield f"{kind}({','.join(repr(x) for x in dispersion.knots)})"
 

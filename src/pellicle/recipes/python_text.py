@@ -154,7 +154,9 @@ def _module(module: Any) -> str:
             continue
         else:
             named[field.name] = _shortened(module, field.name, value)
-    return _call(_place(kind), given, named)
+    public = kind in _POSITIONAL or kind in (Light, Instrument, Uncertainty)
+    place = "" if public else f"{_PLACES.get(kind.__module__, 'dispersion')}."
+    return _call(f"pl.{place}{kind.__name__}", given, named)
 
 
 def _shortened(module: Any, name: str, value: Any) -> Any:
@@ -177,12 +179,6 @@ def _is_default(module: Any, field: Any, value: Any) -> bool:
     if isinstance(module, Reference) and field.name == "layers":
         return value == ()
     return value is default or (isinstance(value, str | int | float) and value == default)
-
-
-def _place(kind: type) -> str:
-    if kind in _POSITIONAL or kind in (Light, Instrument, Uncertainty):
-        return f"pl.{kind.__name__}"
-    return f"pl.{_PLACES.get(kind.__module__, 'dispersion')}.{kind.__name__}"
 
 
 def _call(name: str, given: list[Any], named: dict[str, Any]) -> str:

@@ -35,7 +35,9 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
 
 def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:
     """Return the recipe of parsed tables. Raises UsageError for the first wrong key, in one sentence."""
-    if _describes_surface(loaded):
+    data, scene = loaded.get("data"), loaded.get("scene")
+    by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
+    if by_signal or (isinstance(scene, dict) and "surface" in scene):
         return SurfaceRecipe(path, _validated(loaded, surface.TABLES))
     return FilmRecipe(path, _validated(loaded, film.TABLES))
 
@@ -56,12 +58,6 @@ def _load(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: is not TOML, as a recipe must be: {error}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
-
-
-def _describes_surface(loaded: dict[str, Any]) -> bool:
-    data, scene = loaded.get("data"), loaded.get("scene")
-    by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
-    return by_signal or (isinstance(scene, dict) and "surface" in scene)
 
 
 def _validated(loaded: dict[str, Any], tables: Mapping[str, type[BaseModel]]) -> Any:

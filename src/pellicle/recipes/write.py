@@ -32,10 +32,7 @@ _WHOLE = 1e15
 
 
 def write_recipe(
-    scene: Scene | Surface,
-    path: str | os.PathLike[str],
-    *,
-    files: Iterable[str | os.PathLike[str]] = (),
+    scene: Scene | Surface, path: str | os.PathLike[str], *, files: Iterable[str | os.PathLike[str]] = ()
 ) -> None:
     """Write a scene as a recipe, a TOML file that `pellicle.read_recipe` reads as the same scene.
 

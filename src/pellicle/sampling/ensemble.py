@@ -31,12 +31,7 @@ _GROWTH = 1.25
 
 
 def run(
-    target: Target,
-    modes: Modes,
-    chain: Chain,
-    steps: int,
-    keep: Callable[[Chain], None],
-    progress: Progress,
+    target: Target, modes: Modes, chain: Chain, steps: int, keep: Callable[[Chain], None], progress: Progress
 ) -> tuple[Chain, Checks]:
     """The chain extended to at most `steps`, and its checks.
 

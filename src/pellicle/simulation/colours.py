@@ -61,11 +61,7 @@ def interference_colours(
 
 
 def interference_spectra(
-    scene: Scene,
-    wavelength: np.ndarray,
-    thickness: np.ndarray,
-    angle: np.ndarray,
-    layer: str | None = None,
+    scene: Scene, wavelength: np.ndarray, thickness: np.ndarray, angle: np.ndarray, layer: str | None = None
 ) -> np.ndarray:
     """Reflectance or transmittance of a film, (angles, thicknesses, wavelengths), wavelengths in nm.
 

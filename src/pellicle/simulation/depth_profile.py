@@ -239,7 +239,8 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
         fixed = sliced(fixed, SLICES)
         every = with_wavelength(fixed, np.concatenate([nm, chosen]))
         plan = exact(every)
-        R, T, layers, plates = _mean(plan, every)
+        powers = _mean_powers(tabulated(every), plan=plan.static_key, letters=_polarisations(plan, every))
+        R, T, layers, plates = jax.tree.map(np.asarray, powers)
         media, rows = [], []
         for i, run in enumerate(runs):
             start = 0
@@ -275,30 +276,18 @@ def _names(scene: Scene) -> tuple[list[str], list[list[tuple[str, int]]]]:
             plates.append(name)
             runs.append([])
         else:
-            runs[-1].append((name, _slices_of(item)))
+            slices = item.steps if isinstance(item, Interface) else 1
+            runs[-1].append((name, SLICES if isinstance(getattr(item, "material", None), Graded) else slices))
     if scene.substrate.back is not None:
         plates.append("substrate")
         runs.append([])
     return plates, runs
 
 
-def _slices_of(item: Layer | Interface) -> int:
-    """Number of homogeneous layers that stand for one of a scene."""
-    if isinstance(item, Interface):
-        return item.steps
-    return SLICES if isinstance(item.material, Graded) else 1
-
-
 def _polarisations(plan: Plan, scene: Scene) -> str:
     if not plan.on("oblique"):
         return "s"
     return "sp" if scene.light.polarisation == "unpolarised" else scene.light.polarisation
-
-
-def _mean(plan: Plan, scene: Scene) -> tuple[Any, ...]:
-    """R, T, and the absorptances of the layers of each group and of the plates, over the polarisations."""
-    found = _mean_powers(tabulated(scene), plan=plan.static_key, letters=_polarisations(plan, scene))
-    return jax.tree.map(np.asarray, found)
 
 
 @partial(jax.jit, static_argnames=("plan", "letters"))
@@ -358,11 +347,6 @@ def _sections(
     return tuple(sections)
 
 
-def _points(slices: int) -> int:
-    """Number of depths in each slice of a layer."""
-    return 1 if slices == SLICES else max(POINTS // slices, 2)
-
-
 def _depths(
     layers: tuple[tuple[str, float, float], ...],
     faces: np.ndarray,
@@ -375,7 +359,8 @@ def _depths(
     margin = max(MARGIN * total, 20.0)
     spans = [(above, -margin, 0.0, POINTS)]
     for (name, _, _), a, b in zip(layers, slices[:-1], slices[1:], strict=True):
-        spans += [(name, faces[j], faces[j + 1], _points(int(b - a))) for j in range(a, b)]
+        count = 1 if b - a == SLICES else max(POINTS // int(b - a), 2)  # of each slice
+        spans += [(name, faces[j], faces[j + 1], count) for j in range(a, b)]
     spans.append((below, total, total + margin, POINTS))
     shares = [np.linspace(EDGE, 1 - EDGE, count) if count > 1 else np.array([0.5]) for *_, count in spans]
     parts = [x + share * (y - x) for (_, x, y, _), share in zip(spans, shares, strict=True)]

@@ -185,13 +185,7 @@ def transmittance(
 
 
 def ellipsometry(
-    wavelength: Any,
-    thickness: Any,
-    layer: Medium,
-    substrate: Medium,
-    *,
-    ambient: Medium = 1.0,
-    angle: Any,
+    wavelength: Any, thickness: Any, layer: Medium, substrate: Medium, *, ambient: Medium = 1.0, angle: Any
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Ellipsometric angles Ψ and Δ of one or several layers on a half space.
 
@@ -330,7 +324,8 @@ def mueller(
     amplitudes = response.reflected
     if side == "transmission":
         # power in place of the electric field, p and s apart
-        flux = [normal_flux(film.substrate, _normal(film), letter) for letter in "ps"]
+        q = normal(film.substrate, transverse(film.ambient, film.angle)[0])
+        flux = [normal_flux(film.substrate, q, letter) for letter in "ps"]
         per_field = flux[0] / abs2(film.substrate), flux[1]
         p, s = (jnp.sqrt(jnp.maximum(x, 0.0) / response.incident) for x in per_field)
         t = _transmitted(film, response)
@@ -360,10 +355,6 @@ def _response(
 
 _polarised = jax.jit(polarised, static_argnames="dichroic")
 _dichroism = jax.jit(most_dichroic)
-
-
-def _normal(film: FilmArguments) -> Any:
-    return normal(film.substrate, transverse(film.ambient, film.angle)[0])
 
 
 def _transmitted(film: FilmArguments, response: Polarised) -> Elements:

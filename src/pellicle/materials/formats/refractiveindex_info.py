@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.tabular.text import Line
 from pellicle.errors import DataError
 from pellicle.materials.formats.optical_constants import (
     MaterialFile,
     MaterialText,
-    OpticalConstants,
     constants_of,
     material_file,
     read_rows,
@@ -86,9 +84,8 @@ def read_table(text: MaterialText) -> MaterialFile | None:
     if [kind for _, kind in headers] not in (["n"], ["n", "k"]) or headers[0][0] != 0:
         return None
     ends = [*(i for i, _ in headers[1:]), len(text.lines)]
-    n, *others = (
-        _block(text, text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)
-    )
+    blocks = [(text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)]
+    n, *others = (constants_of(read_rows(text.path, lines, ("wl", kind)), "um") for lines, kind in blocks)
     if n.axis.min() >= LONGEST_UM:
         if not others:
             return None
@@ -117,8 +114,3 @@ def _header(text: str) -> str | None:
     """Return n or k for a line `wl,n` or `wl,k`, separated in any way."""
     words = re.split(r"[\s,;]+", text.lower().replace('"', "").strip())
     return words[1] if len(words) == 2 and words[0] == "wl" and words[1] in ("n", "k") else None
-
-
-def _block(text: MaterialText, lines: tuple[Line, ...], kind: str) -> OpticalConstants:
-    """The columns of the block `wl,n` or `wl,k`, the second as its first column."""
-    return constants_of(read_rows(text.path, lines, ("wl", kind)), "um")
