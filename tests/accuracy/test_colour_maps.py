@@ -8,26 +8,18 @@ from pellicle.accuracy.film_colours import COMPARED, EXACT, colour_maps, films_o
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
 
+from ..airy import airy
+
 NM, DEGREES = np.linspace(0.0, 600.0, 16), np.array([0.0, 60.0])
 SOAP = pl.Scene(pl.Layer(1.33, 300.0), 1.0)
-
-
-def by_hand():
-    eye, nm = sensor(), NM[:, None, None]
-    q0 = np.cos(np.deg2rad(DEGREES))[:, None]
-    q1, total = np.sqrt(1.33**2 - 1 + q0**2), 0.0
-    turn = np.exp(4j * np.pi / eye.wavelength * nm * q1)
-    for a, b in ((q0, q1), (q0, q1 / 1.33**2)):
-        r = (a - b) / (a + b)
-        total = total + 0.5 * np.abs(r * (1 - turn) / (1 - r * r * turn)) ** 2
-    return total @ eye.weights
 
 
 @pytest.mark.slow  # compiles five programs; pages' commands show the figure
 def test_methods_against_the_formula():
     maps = {found.name: found for found in colour_maps(SOAP, NM, DEGREES)}
     assert tuple(maps) == COMPARED
-    exact = by_hand()
+    eye, cosine = sensor(), np.cos(np.deg2rad(DEGREES))[:, None]
+    exact = airy(eye.wavelength, NM[:, None, None], 1.33, 1.0, cosine) @ eye.weights
     np.testing.assert_allclose(maps[EXACT].xyz, exact, atol=1e-9)
     white = sensor().white
     for found in maps.values():

@@ -52,12 +52,6 @@ def test_aligned_axes_are_at_the_next_right_angles():
     assert "no optic axis is tilted" in str(BY_NAME["aligned axes"].apply(aligned()))
 
 
-@pytest.mark.slow  # compiles the 4×4 method; tests/optics compares both methods
-def test_general_matrices_agree_with_closed_forms():
-    case = aligned()
-    np.testing.assert_allclose(answer(case, "4×4 matrices"), answer(case, "float64"), atol=1e-13)
-
-
 def test_mean_of_the_depth_has_the_mean_permittivity():
     case = graded()
     mean = np.sqrt(0.5 * (1.5**2 + 2.0**2))

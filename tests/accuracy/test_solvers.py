@@ -85,10 +85,3 @@ def test_every_solver_finds_the_only_minimum():
     for solver in compared.results:
         assert solver.details["failures"] == 0, solver.name
         assert solver.error < 0.01, solver.name
-
-
-@pytest.mark.slow
-def test_a_search_is_needed_among_many_minima():
-    compared = {s.name: s for s in compare_solvers(simulated(50.0, 3000.0, 6), NOISE, quiet).results}
-    assert compared["scan + LM"].details["failures"] == 0
-    assert compared["LM, start once"].details["failures"] >= 4

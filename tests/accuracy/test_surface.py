@@ -20,22 +20,13 @@ from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.brdf import default_directions
 
+from ..airy import airy
+
 STEEL = surface_view(
     Surface("microfacet-film", {"thickness": Free(10, 70), "n": 2.9}), default_directions(), 40
 )
 PAINT = surface_view(Surface("granier-heidrich", {"thickness": Free(10, 70)}), default_directions(), 40)
 BY_NAME = {method.name: method for method in COLOUR_METHODS}
-
-
-def airy(wavelength, thickness, n, base, angle):
-    """The textbook formula, unpolarised, wavelengths last."""
-    thickness, sine = thickness[:, None, None], np.sin(angle)[None, :, None]
-    q0, q1, q2 = (np.sqrt(m**2 - sine**2 + 0j) for m in (1.0, n, base))
-    turn, total = np.exp(4j * np.pi / wavelength * q1 * thickness), 0.0
-    for e1, e2 in ((1, 1), (n**2, base**2)):
-        above, below = (e1 * q0 - q1) / (e1 * q0 + q1), (e2 * q1 - e1 * q2) / (e2 * q1 + e1 * q2)
-        total = total + 0.5 * np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
-    return total
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +35,17 @@ def films():
         return films_of(STEEL, random_draws(STEEL, 8))
 
 
+def by_formula(films):
+    """Spectra of these films in steps of 1 nm, (thicknesses, angles, wavelengths)."""
+    thickness, cosine = films.numbers["thickness"][:, None, None], np.cos(films.angle)[:, None]
+    return airy(sensor().wavelength, thickness, 2.9, 2.7 + 2.8j, cosine)
+
+
 @pytest.mark.slow
 def test_the_error_of_a_method_is_true(films):
     """Against the textbook formula at steps of 1 nm."""
     eye = sensor("1931", "D65")
-    true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
+    true = by_formula(films) @ eye.weights
     with jax.enable_x64(True):
         for name, least, most in (
             ("points-645-525-445", 1.0, 10.0),
@@ -66,7 +63,7 @@ def test_the_error_of_a_method_is_true(films):
 def renderer_errors(films, *names):
     """Errors of rungs from the textbook formula at steps of 1 nm."""
     eye, rungs = sensor(), {method.name: method for method in RENDERER_METHODS}
-    true = airy(eye.wavelength, films.numbers["thickness"], 2.9, 2.7 + 2.8j, films.angle) @ eye.weights
+    true = by_formula(films) @ eye.weights
     with jax.enable_x64(True):
         return [colour_methods.error(eye, true, rungs[name].apply(films).run()) for name in names]
 

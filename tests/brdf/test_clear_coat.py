@@ -86,11 +86,3 @@ def test_a_perfect_metal_under_a_coat_returns_what_the_face_lets_pass_twice():
     for theta in (0.0, 45.0):
         reflected = face(np.deg2rad(theta), 1.5)
         assert float(albedo(theta)) == pytest.approx(reflected + (1 - reflected) ** 2, abs=4e-3)
-
-
-@pytest.mark.slow
-def test_a_coat_of_no_contrast_leaves_the_film_in_air():
-    i, o = direction(np.array([20.0, 50.0]), 0.0), direction(np.array([35.0, 40.0]), 170.0)
-    bare = {key: x for key, x in NUMBERS.items() if not key.startswith("coat")}
-    thin = {key: x for key, x in NUMBERS.items() if key != "coat"} | {"coat_n": 1 + 1e-9}
-    np.testing.assert_allclose(EVALUATE(thin, i, o), model("microfacet-film")(bare, i, o), rtol=1e-6)

@@ -70,13 +70,6 @@ def test_microfacets_multiply_lobe_and_colour():
     np.testing.assert_allclose(FACETS(s, I, O), expected, rtol=1e-6)
 
 
-def test_a_thickness_map():
-    thickness = np.linspace(10, 70, N)
-    result = FACETS({**STEEL, "thickness": thickness}, I, O)
-    one = FACETS({**STEEL, "thickness": float(thickness[7])}, I, O)
-    np.testing.assert_allclose(result[7], one[7], rtol=1e-10)
-
-
 def test_microfacets_reflect_at_most_as_much_as_the_film():
     """On a perfect metal, which reflects everything, only light between facets is lost."""
     mirror = {**STEEL, "base_n": 0.001, "base_k": 50.0, "roughness": 0.05}
@@ -131,14 +124,8 @@ def test_total_reflection_is_total():
         assert float(reflectance(glass, jnp.array(1.2))[0]) == pytest.approx(1, rel=1e-12)
 
 
-_SLOW = pytest.mark.slow  # compile for 3 to 5 s each
-_LONGEST = ("clear-coat-film", "microfacet-film")
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=_SLOW) if name in _LONGEST else name for name in MODELS]
-)
+@pytest.mark.parametrize("name", MODELS)
 def test_every_model_has_finite_values_and_slopes(name):
     """At the defaults, in every parameter; 0 below the horizon; float32 in gives float32 out."""
     m = model(name)

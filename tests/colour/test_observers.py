@@ -52,13 +52,6 @@ def test_spaces_agree_with_colour_science():
     np.testing.assert_allclose(srgb(steps), colour.cctf_encoding(steps, function="sRGB"), atol=1e-6)
 
 
-@pytest.mark.parametrize("illuminant", ILLUMINANTS)
-def test_white_is_white_under_every_illuminant(illuminant):
-    white = sensor("1931", illuminant).white
-    np.testing.assert_allclose(linear_srgb(white, white), 1.0, atol=1e-12)
-    np.testing.assert_allclose(lab(white, white), [100, 0, 0], atol=1e-12)
-
-
 @pytest.mark.slow
 def test_differences():
     """ΔE2000: the first pair of Sharma, Wu and Dalal 2005, table 1."""

@@ -11,6 +11,8 @@ import pellicle as pl
 from pellicle.colour import FilmColourTable, delta_e2000, lab, sensor
 from pellicle.simulation.colours import colour_table
 
+from ..airy import airy
+
 EYE = sensor()
 RNG = np.random.default_rng(3)
 FILMS = {"soap": (1.33, 1.0, 600.0), "oxide on steel": (2.9, 2.7 + 2.8j, 150.0)}
@@ -22,14 +24,8 @@ def tables():
 
 
 def exact(thickness, cosine, n1, n2):
-    """XYZ (N, 3) by the textbook formula, unpolarised."""
-    d, c = thickness[:, None], cosine[:, None]
-    q0, q1, q2 = (np.sqrt(n**2 - 1 + c**2 + 0j) for n in (1.0, n1, n2))
-    turn, total = np.exp(4j * np.pi / EYE.wavelength * q1 * d), 0.0
-    for e1, e2 in ((1, 1), (n1**2, n2**2)):
-        r01, r12 = (e1 * q0 - q1) / (e1 * q0 + q1), (e2 * q1 - e1 * q2) / (e2 * q1 + e1 * q2)
-        total = total + 0.5 * np.abs((r01 + r12 * turn) / (1 + r01 * r12 * turn)) ** 2
-    return total @ EYE.weights
+    """XYZ (N, 3)."""
+    return airy(EYE.wavelength, thickness[:, None], n1, n2, cosine[:, None]) @ EYE.weights
 
 
 def films(name):

@@ -85,12 +85,6 @@ def test_precision_follows_the_wavelength(model):
 
 
 @EVERY_MODEL
-def test_shape_follows_the_wavelength(model):
-    assert model(500.0).shape == ()
-    assert model(WAVELENGTH.reshape(3, 3)).shape == (3, 3)
-
-
-@EVERY_MODEL
 def test_gradients_in_every_parameter_and_in_wavelength(model):
     """Against central differences, under jit; away from the knots of a table."""
     at = np.array([430.0, 530.0, 660.0])

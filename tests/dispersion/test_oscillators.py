@@ -232,14 +232,6 @@ def test_index_absorbs_and_keeps_its_precision(term):
     np.testing.assert_allclose(single, index, rtol=3e-4, atol=3e-4)
 
 
-def test_a_sum_is_the_sum():
-    pair = Oscillators(1.5, (TERMS["lorentz"], SILICON))
-    shares = [t.epsilon(2.1) for t in pair.terms]
-    assert complex(pair(HC / 2.1)) ** 2 == pytest.approx(
-        1.5 + sum(float(s.re) + 1j * float(s.im) for s in shares), rel=1e-13
-    )
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [

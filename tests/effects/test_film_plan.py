@@ -164,21 +164,3 @@ def test_ellipsometry_counts_in_degrees():
         one, other = (signals(p, whole, points, build).reshape(-1, 3) for p in (plan, full_plan(thing)))
     psi = [0.5 * np.rad2deg(np.arctan2(np.hypot(x[:, 1], x[:, 2]), x[:, 0])) for x in (one, other)]
     assert np.max(np.abs(psi[0] - psi[1])) <= 0.5 * plan.error_bound
-
-
-@pytest.fixture(scope="module")
-def drawing(load_script):
-    return load_script("benchmarks/tolerance.py")
-
-
-@pytest.mark.slow  # as test_the_bound_holds_and_no_gradient_is_lost
-@pytest.mark.parametrize("kind", ["fitted index"])
-def test_random_scenes_keep_their_bounds(drawing, kind):
-    """One of the thousand that `make tolerance` draws."""
-    rng = np.random.default_rng(11)
-    thing = drawing.KINDS[kind](rng, WAVELENGTH)
-    plan = pl.plan(thing, 1e-3)
-    points = drawing.fresh(rng, thing)
-    with jax.enable_x64(True):
-        assert drawing.measured(plan, thing, points) <= plan.error_bound <= 1e-3
-    assert points.shape == (drawing.FRESH, len(free_leaves(thing)))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -60,32 +58,6 @@ def candidate(
 def test_birefringence_is_called_what_it_is(difference, delta, expected):
     both = candidate("isotropic", difference), candidate("uniaxial", 0.0, delta)
     assert Comparison(both, 100.0).verdict.endswith(expected)
-
-
-@pytest.mark.slow  # compiles two fits
-def test_data_that_do_not_see_birefringence_have_no_huge_errors():
-    """R of p at one angle depends on two combinations of n_o, n_e and thickness: bounds limit them."""
-    light, nm = pl.Light(angle=60.0, polarisation="p"), np.linspace(400, 900, 64)
-
-    def index():
-        return pl.dispersion.Constant(pl.Free(1.5, 2.2, start=1.8))
-
-    def scene(material, thickness: Any = 150.0):
-        return pl.Scene(pl.Layer(material, thickness), "Si", light=light)
-
-    data = pl.simulate(scene(pl.Anisotropic(1.8, 1.83)), nm, noise=0.002, seed=3)
-    found = pl.compare(
-        data,
-        {
-            "isotropic": scene(index(), pl.Free(100, 200)),
-            "uniaxial": scene(pl.Anisotropic(index(), index()), pl.Free(100, 200)),
-        },
-    )
-    assert found.verdict.endswith("birefringence is not needed, and these data would not show it.")
-    for one in found.candidates:
-        assert one.fit.parameters["thickness"].stderr < 100 or np.isinf(
-            one.fit.parameters["thickness"].stderr
-        )
 
 
 @pytest.mark.parametrize("angles", [(), ("axis_theta",), ("film.axis_theta", "film.axis_phi")])

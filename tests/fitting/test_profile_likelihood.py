@@ -13,18 +13,13 @@ from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.progress import quiet
 
+from ..airy import airy
+
 SUBSTRATE = 3.9 + 0.02j
 
 
-def airy(nm, d, n):
-    """Reflectance of a layer at normal incidence."""
-    r1, r2 = (1 - n) / (1 + n), (n - SUBSTRATE) / (n + SUBSTRATE)
-    turn = r2 * np.exp(4j * np.pi * n * d / nm)
-    return np.abs((r1 + turn) / (1 + r1 * turn)) ** 2
-
-
 def chi2(data, d, n):
-    return float(np.sum(((data.values - airy(data.wavelength, d, n)) / data.sigma) ** 2))
+    return float(np.sum(((data.values - airy(data.wavelength, d, n, SUBSTRATE)) / data.sigma) ** 2))
 
 
 def least(data, at, near, width):
@@ -75,18 +70,6 @@ def test_an_index_with_one_open_side(film, measured):
     assert f"n is at least {fit['n'].lower_limit:.2g} (95 %)" in fit.warnings
 
 
-def test_pushed_against_a_bound_and_unseen_beside_one(film, measured):
-    """Both rest on a bound; of one the data see that the truth is beyond it."""
-    pushed = film(material=pl.dispersion.Constant(pl.Free(1.47, 1.6)))
-    fit = pl.fit(measured(film(), 430.0, sigma=True), pushed)
-    assert fit["n"].value == 1.47
-    assert fit["n"].stderr_noise < 0.01
-    unseen = film(pl.Free(1, 100), pl.dispersion.Constant(pl.Free(1.3, 1.9)))
-    fit = pl.fit(measured(unseen, 1.6, 15.0, noise=0.001, sigma=True), unseen)
-    assert fit["n"].value == 1.3
-    assert fit["n"].stderr == float("inf")
-
-
 def test_an_interval_by_profile_is_that_of_a_scan(film, measured, monkeypatch):
     """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best; and the
     misfit beside the best, for which nothing but the search's programs is compiled."""
@@ -119,7 +102,8 @@ def test_a_plateau_within_reach_of_noise_is_open(film, rise, status):
     """An absorbing film of 250 nm, of which any thicker one differs by `rise` in χ²: among so many
     thicknesses noise favours one by 7.5 too easily."""
     nm, n = np.linspace(400.0, 900.0, 128), 2.0 + 1.0j
-    values, thick = airy(nm, 250.0, n), airy(nm, 1e5, n)
+    values, thick = (airy(nm, d, n, SUBSTRATE) for d in (250.0, 1e5))
+    values = values + 1e-9 * (-1.0) ** np.arange(128)  # rounding alone may be correlated
     sigma = np.sqrt(np.sum((values - thick) ** 2) / rise)
     data = pl.Spectrum(nm, values, "R", sigma=np.full(128, sigma))
     fit = pl.fit(data, film(pl.Free(10, 3000), pl.dispersion.Constant(n.real, n.imag)))

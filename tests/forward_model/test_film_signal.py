@@ -12,7 +12,6 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant
 from pellicle.forward_model.film_signal import build, tabulated
-from pellicle.scene.free import insert, start_values
 
 WAVELENGTH = np.linspace(450.0, 850.0, 9)
 
@@ -160,24 +159,6 @@ def test_k_fixed_at_zero_costs_what_no_k_costs():
     assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
 
 
-def test_a_model_is_pure_and_can_be_traced():
-    """jit, vmap and gradients through the free parameters, in their own order."""
-    thing = scene(Constant(pl.Free(1.3, 1.7)), thickness=pl.Free(10, 900), angle=30.0)
-    model = build(pl.plan(thing))
-
-    @jax.jit
-    def predict(values):
-        return model(insert(thing, values))
-
-    start = start_values(thing)
-    many = jax.jit(jax.vmap(predict))(np.stack([start, 1.01 * start]))
-    assert many.shape == (2, 9)
-    slopes = jax.jacfwd(predict)(start)
-    h = 1e-6 * start
-    numeric = [(predict(start + e) - predict(start - e)) / (2 * np.sum(e)) for e in np.diag(h)]
-    np.testing.assert_allclose(slopes, np.transpose(numeric), rtol=1e-5, atol=1e-8)
-
-
 def test_wavelengths_outside_a_table_are_refused():
     high = pl.material("Si").wavelength_range[1]
     with pytest.raises(ValueError, match=r"Si .*is known from .* not at"):
@@ -185,10 +166,3 @@ def test_wavelengths_outside_a_table_are_refused():
 
 
 # the back face
-
-
-def test_an_opaque_plate_is_a_half_space():
-    glass = 1.52 + 0.01j
-    np.testing.assert_allclose(
-        predict(scene(substrate=pl.Substrate(glass, back=1.0))), predict(scene(substrate=glass)), rtol=1e-14
-    )

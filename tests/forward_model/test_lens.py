@@ -148,31 +148,6 @@ def test_equal_indices_are_an_isotropic_film(signal, polarisation, angle):
     np.testing.assert_allclose(*found, atol=1e-12)
 
 
-@pytest.mark.slow  # compiles a Mueller matrix
-def test_symmetries_at_normal_incidence():
-    """The cone has every rotation and reflection: those of the film alone remain."""
-    given = with_wavelength(
-        scene("mueller", pl.Anisotropic(1.62, 1.78, axis=(pl.Free(0, 180), pl.Free(0, 360)))), NM
-    )
-    model = jax.jit(lambda x: build(exact(given))(insert(given, x)).reshape(2, 15))
-
-    def matrices(theta: float, phi: float) -> np.ndarray:
-        rest = np.asarray(model(np.array([theta, phi])))
-        return np.concatenate([np.ones((2, 1)), rest], axis=1).reshape(2, 4, 4)
-
-    own = matrices(40.0, 25.0)
-    for degrees in (90.0, 30.0):
-        c, s = np.cos(2 * np.deg2rad(degrees)), np.sin(2 * np.deg2rad(degrees))
-        # the reflected light travels the other way, so that its frame turns back
-        turn = np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
-        np.testing.assert_allclose(turn @ matrices(40.0, 25.0 + degrees) @ turn, own, atol=1e-6)
-    mirror = np.diag([1, 1, -1, -1])
-    np.testing.assert_allclose(mirror @ matrices(40.0, -25.0) @ mirror, own, atol=1e-6)
-    reciprocal = np.diag([1, 1, -1, 1])
-    np.testing.assert_allclose(reciprocal @ own.swapaxes(1, 2) @ reciprocal, own, atol=1e-6)
-    np.testing.assert_allclose(matrices(140.0, 205.0), own, atol=1e-6)  # the same axis
-
-
 @pytest.mark.slow  # compiles derivatives of a cone
 @pytest.mark.parametrize("angle", [0.0, 50.0])
 def test_slopes_in_all_parameters(angle):

@@ -69,13 +69,6 @@ def test_two_plates_and_an_air_gap():
     np.testing.assert_allclose(predict(thing), pane**2 / (1 - back**2), rtol=1e-12)
 
 
-def test_a_substrate_with_a_back_is_a_plate():
-    layer = pl.Layer(2.1, 80.0)
-    back = scene(layer, pl.Substrate(1.52 + 1e-7j, "air", 2.0))
-    plate = scene([layer, pl.Plate(1.52 + 1e-7j, 2.0)], "air")
-    np.testing.assert_array_equal(predict(back), predict(plate))
-
-
 # uneven layers
 
 
@@ -86,18 +79,6 @@ def test_each_layer_of_a_stack_is_uneven_by_itself():
     plain = predict(scene([layers[0], pl.Layer(2.1 + 0.05j, 150.0)]))
     np.testing.assert_allclose(predict(scene(layers)), weights @ each, atol=1e-9)
     assert np.max(np.abs(plain - weights @ each)) > 1e-3
-
-
-def test_an_uneven_layer_in_ellipsometry_depolarises():
-    """Sums of intensities are averaged, so N, C, S come off the sphere as an instrument's do."""
-    thing = scene(pl.Layer(1.46, 600.0, thickness_spread=30.0), angle=65.0, signal="psi-delta")
-    n, c, s = predict(thing).reshape(-1, 3).T
-    square = n**2 + c**2 + s**2
-    assert np.all(square < 1)
-    assert np.min(square) < 0.95
-    spread = pl.Instrument(thickness_spread=30.0)
-    same = scene(pl.Layer(1.46, 600.0), angle=65.0, signal="psi-delta", instrument=spread)
-    np.testing.assert_array_equal(predict(same).reshape(-1, 3).T, [n, c, s])
 
 
 # interfaces

@@ -13,6 +13,8 @@ from pellicle.errors import DataError, UsageError
 from pellicle.mapping.lamp import LampCurve, lamp_curve
 from pellicle.mapping.pixels.fit import fit_pixels, prepare
 
+from ..airy import airy
+
 WAVELENGTH = np.linspace(450.0, 900.0, 60)
 NOISE = 0.003
 LAMP = (1 + 0.25 * (WAVELENGTH - 675) / 225) * (1 + 0.15 * np.exp(-0.5 * ((WAVELENGTH - 610) / 8) ** 2))
@@ -22,10 +24,8 @@ EVERY = (slice(None), slice(None))
 
 
 def reflectance(thickness):
-    """R of a film of 1.46 on 3.9 at normal incidence, by its two-beam sum (Airy)."""
-    top, bottom = (1 - 1.46) / (1 + 1.46), (1.46 - 3.9) / (1.46 + 3.9)
-    turn = np.exp(4j * np.pi * 1.46 * np.asarray(thickness)[..., None] / WAVELENGTH)
-    return np.abs((top + bottom * turn) / (1 + top * bottom * turn)) ** 2
+    """R of a film of 1.46 on 3.9 at normal incidence."""
+    return airy(WAVELENGTH, np.asarray(thickness)[..., None], 1.46, 3.9)
 
 
 def lit(thickness, seed=0):

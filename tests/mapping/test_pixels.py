@@ -129,14 +129,6 @@ def test_rivals_are_those_of_fit():
         assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
 
 
-@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
-def test_thickness_and_index_are_those_of_fit():
-    scene = pl.Scene(pl.Layer(pl.Free(1.3, 2.0), FREE), 3.9)
-    cube = cube_of(np.linspace(60, 850, 20), 1.62)  # σ is not given
-    best = check(cube, scene, (0, 19))
-    assert np.abs(best.values[:, 0, 0] - 1.62).max() < 0.03
-
-
 @pytest.mark.slow  # compiles a search of its own
 def test_priors_weigh_against_the_noise_of_the_residuals():
     prior = Normal(1.60, 0.004)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -47,22 +45,6 @@ def test_few_layers_agree_with_the_loop(count, angle, propagating):
         for name in ("reflected", "below"):
             r, expected = (to_complex(getattr(x, name)) / to_complex(x.denominator) for x in (one, many))
             np.testing.assert_allclose(r, expected, rtol=1e-13)
-
-
-def test_few_layers_stay_finite_in_single_precision():
-    """A metal, a total reflection at its critical angle and a gap, each a millimetre thick."""
-    angle = np.float32(np.arcsin(1 / 1.5))
-    media = [Pair(np.float32(0.05), np.float32(8.0)), np.float32(1.0), np.float32(0.8)]
-    phase = np.float32(2 * np.pi * 1e6 / 400)
-
-    def powers(k):
-        responses = coherent.responses(np.float32(1.5), media, np.float32(1.5), [k, k, k], angle)
-        return jnp.stack([power(x) for x in responses for power in POWERS])
-
-    value, slope = jax.jit(lambda k: (powers(k), jax.jacfwd(powers)(k)))(phase)
-    assert value.dtype == np.float32
-    assert np.all(np.isfinite(value))
-    assert np.all(np.isfinite(slope))
 
 
 def test_no_layer_is_the_bare_interface():

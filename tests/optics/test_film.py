@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import mpmath
@@ -12,8 +10,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from pellicle.optics import characteristic, film, interface, response
-from pellicle.optics.pair import Pair, to_pair
+from pellicle.optics import characteristic, film, response
+from pellicle.optics.pair import Pair
 
 
 def exact(Q, k):
@@ -182,76 +180,3 @@ def signals(layer, substrate, angle=ANGLE, propagating=False, ambient=AMBIENT):
     responses = film.film(ambient, layer, substrate, PHASE, angle, propagating=propagating)
     functions = (response.reflectance, response.transmittance, response.reflectance_below)
     return np.array([f(x) for x in responses for f in functions])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("k", [0.0, 0.3])
-@pytest.mark.parametrize("angle", [ANGLE, None], ids=["oblique", "normal"])
-def test_number_types_agree(k, angle):
-    """No independent check of the formula, which they share: tests/hard compares it with 50 digits."""
-    layer, substrate = REAL_LAYER + 1j * k, REAL_SUBSTRATE + 2j * k
-    versions = [signals(layer, substrate, angle), signals(to_pair(layer), to_pair(substrate), angle)]
-    if k == 0:
-        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle))
-        versions.append(signals(REAL_LAYER, REAL_SUBSTRATE, angle, propagating=True))
-        versions.append(signals(REAL_LAYER, interface.allow_tunnelling(REAL_SUBSTRATE), angle))
-    for version in versions[1:]:
-        np.testing.assert_allclose(version, versions[0], rtol=1e-11, atol=1e-13)
-
-
-def test_normal_incidence_computes_one_polarisation():
-    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE)) == 1
-    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE, ANGLE)) == 2
-    assert len(film.film(1.0, REAL_LAYER, REAL_SUBSTRATE, PHASE, ANGLE, "p")) == 1
-
-
-def test_from_below_is_the_film_turned_over():
-    """R′ from the substrate is R of the reversed order of media, at the refracted angle."""
-    layer = to_pair(REAL_LAYER + 0.2j)
-    refracted = np.arcsin(AMBIENT * np.sin(ANGLE) / REAL_SUBSTRATE)
-    forward = film.film(AMBIENT, layer, REAL_SUBSTRATE, PHASE, ANGLE)
-    turned = film.film(REAL_SUBSTRATE, layer, AMBIENT, PHASE, refracted)
-    for one, two in zip(forward, turned, strict=True):
-        np.testing.assert_allclose(
-            response.reflectance_below(one), response.reflectance(two), rtol=1e-10, atol=1e-13
-        )
-        np.testing.assert_allclose(response.transmittance(one), response.transmittance(two), rtol=1e-10)
-
-
-@partial(jax.jit, static_argnames="whole")
-def grid_and_slope(n, k, below, depth, angle, whole):
-    """R and T of every depth and n, and their slopes in n; `whole` gives each point an index of its own."""
-
-    def signals(n):
-        layer = Pair(*(jnp.broadcast_to(x, (9, 3)) if whole else x for x in (n, k)))
-        responses = film.film(jnp.ones((), n.dtype), layer, below, depth, angle)
-        return jnp.stack([f(x) for x in responses for f in (response.reflectance, response.transmittance)])
-
-    return jax.jvp(signals, (n,), (jnp.ones_like(n),))
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize(
-    ("layer", "substrate", "angle"),
-    [
-        (2.1 + 0.3j, 1.52 + 0j, 0.7),
-        (1.52 + 0j, 1.52 + 0j, 0.9593),  # matched to the substrate, at Brewster's angle of it
-        (1.0 + 0j, 1.52 + 0j, 0.7),  # matched to the ambient
-        (1.7 + 0.1j, 1.7 + 0.1j, 0.7),  # to an absorbing substrate
-        (0.05 + 4j, 0.9 + 0j, 1.4),  # a metal over total reflection
-        (1.0 + 0j, 1.0 + 0j, 1.55),  # next to nothing, next to grazing
-    ],
-)
-def test_a_grid_equals_its_points(layer, substrate, angle, dtype):
-    """Coefficients that a grid computes once for all thicknesses change no value and no slope."""
-    kind = np.result_type(dtype, np.complex64).type
-    depth = np.linspace(0, 20, 9).astype(dtype)[:, None]
-    spread = np.array([1.0, 1.0 + 1e-6, 1.1]).astype(dtype)
-    below = to_pair(np.broadcast_to(kind(substrate), 3))
-
-    n, k = kind(layer).real * spread, kind(layer).imag + 0 * spread
-    tolerance = 100 * float(np.finfo(dtype).eps)
-    both = (grid_and_slope(n, k, below, depth, dtype(angle), whole) for whole in (False, True))
-    for grid, points in zip(*both, strict=True):
-        size = 1 + np.abs(points)
-        np.testing.assert_allclose(grid / size, points / size, atol=tolerance)

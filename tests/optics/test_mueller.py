@@ -27,18 +27,6 @@ def test_definition(jones):
     np.testing.assert_allclose(mueller(jones), expected, rtol=0, atol=1e-14)
 
 
-def test_acts_on_stokes_vectors(jones):
-    def stokes_vector(p, s):
-        both = 2 * p * s.conj()
-        return np.array([abs(p) ** 2 + abs(s) ** 2, abs(p) ** 2 - abs(s) ** 2, both.real, both.imag])
-
-    field = np.array([0.3 - 0.2j, 0.7 + 0.5j])
-    for j in jones:
-        np.testing.assert_allclose(
-            mueller(j) @ stokes_vector(*field), stokes_vector(*(j @ field)), atol=1e-13
-        )
-
-
 def test_isotropic_sample():
     s, p = responses(1.0, [1.6 + 0.1j], 3.9 + 0.02j, [np.asarray(1.2)], np.asarray(1.1))
     n, c, sine = normalised_stokes(stokes(s, p))

@@ -8,13 +8,6 @@ import pytest
 from pellicle.optics import plate
 
 
-def test_bare_glass_plate():
-    """Two faces of 4 % each: R = 2r/(1 + r), T = (1 − r)/(1 + r) (any textbook)."""
-    face = plate.Face(0.04, 0.96, 0.04)
-    assert plate.plate_reflectance(face, 0.04, 1.0) == pytest.approx(2 * 0.04 / 1.04)
-    assert plate.plate_transmittance(face, 0.04, 0.96, 1.0) == pytest.approx(0.96 / 1.04)
-
-
 def test_the_bounces_are_summed():
     front, back, passed, internal = plate.Face(0.2, 0.7, 0.3), 0.5, 0.4, 0.8
     up = [0.7 * (internal**2 * back) ** (m + 1) * front.reflectance_below**m * 0.7 for m in range(60)]

@@ -9,7 +9,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.optics import film, response, stack
+from pellicle.optics import response, stack
 
 WAVELENGTH = 550.0
 
@@ -33,15 +33,6 @@ def test_agrees_with_tmm(count):
             assert complex(result.reflected / result.denominator) == pytest.approx(truth["r"], abs=1e-13)
             assert float(response.reflectance(result)) == pytest.approx(truth["R"], abs=1e-13)
             assert float(response.transmittance(result)) == pytest.approx(truth["T"], rel=1e-11, abs=1e-14)
-
-
-def test_one_layer_is_the_film_from_both_sides():
-    arguments = (1.3, jnp.asarray(2.1 + 0.3j), jnp.asarray(1.7 + 0.1j), 2 * np.pi / WAVELENGTH * 130.0, 0.7)
-    single = film.film(*arguments)
-    many = stack.stack(arguments[0], [arguments[1]], arguments[2], [arguments[3]], arguments[4])
-    for a, b in zip(single, many, strict=True):
-        for signal in (response.reflectance, response.reflectance_below, response.transmittance):
-            assert float(signal(b)) == pytest.approx(float(signal(a)), abs=1e-14)
 
 
 def test_a_thickness_is_required_for_each_layer():

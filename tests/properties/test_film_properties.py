@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import pellicle as pl
@@ -119,19 +119,6 @@ def test_only_the_ratio_of_thickness_and_wavelength_counts(
     one = both(letter, wavelength, thickness, layer, substrate, ambient, angle)
     two = both(letter, unit * wavelength, unit * thickness, layer, substrate, ambient, angle)
     np.testing.assert_allclose(one, two, atol=1e-9)
-
-
-@pytest.mark.slow
-@settings(max_examples=5)
-@given(st.integers(0, 2**32 - 1))
-@pytest.mark.parametrize("letter", "sp")
-@pytest.mark.parametrize("signal", "RT")
-def test_vmap_is_broadcast_is_loop(signal, letter, seed):
-    film = draw(np.random.default_rng(seed), 8)
-    one = compiled(signal, letter)
-    loop = [one(*row) for row in zip(*film, strict=True)]
-    np.testing.assert_allclose(one(*film), loop, rtol=1e-10, atol=1e-13)
-    np.testing.assert_allclose(jax.jit(jax.vmap(one))(*film), loop, rtol=1e-10, atol=1e-13)
 
 
 def draw(rng, count):

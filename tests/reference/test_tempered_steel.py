@@ -14,6 +14,8 @@ import pytest
 from pellicle.brdf import PRESETS, direction, model
 from pellicle.colour import film_colour
 
+from ..airy import airy
+
 HUES = {"straw": (60.0, 105.0), "purple": (285.0, 345.0), "blue": (235.0, 280.0)}
 """Of yellow and orange, of red-violet, and of blue, in degrees of CIELAB."""
 FILMS = {
@@ -40,9 +42,7 @@ def first(hues, name):
 
 def by_colour_science(index, base, thickness):
     at = np.arange(380.0, 781.0, 5.0)
-    turn = np.exp(4j * np.pi / at * index * thickness[:, None])
-    above, below = (1 - index) / (1 + index), (index - base) / (index + base)
-    seen = np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
+    seen = airy(at, thickness[:, None], index, base)
     shape = colour.SpectralShape(380, 780, 5)
     eye = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
     lamp = colour.SDS_ILLUMINANTS["D65"].copy().align(shape)

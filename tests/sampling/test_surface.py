@@ -11,48 +11,15 @@ import pytest
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf import fit as fitting
-from pellicle.fitting.minima import Minima
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
-TRUTH = {
-    "thickness": 320.0,
-    "n": (1.48, 1.5, 1.53),
-    "exponent_reflection": 60.0,
-    "exponent_transmission": 25.0,
-    "specular": 1.5,
-    "diffuse": 0.1,
-}
-BOUNDS = {
-    "thickness": (0, 1000),
-    "exponent_reflection": (1, 1000),
-    "exponent_transmission": (1, 1000),
-    "specular": (0, 100),
-    "diffuse": (0, 2),
-}
-FREE = Surface("granier-heidrich", {**TRUTH, **{key: Free(*ends) for key, ends in BOUNDS.items()}})
-UNITS = np.array([[0.32, *np.log([60, 25]) / np.log(1000), 0.015, 0.05]])
+from ..fitting.brdf.known_surface import BOUNDS, FREE, TRUTH, arcs, search_from
+
+UNITS = [0.32, *np.log([60, 25]) / np.log(1000), 0.015, 0.05]
 """The truth in the unit cube of the search."""
-
-
-def arcs() -> BrdfSamples:
-    """40 directions in the plane of incidence at each of five incidences."""
-    theta_o = np.tile(np.linspace(-78, 78, 40), 5)
-    theta_i, phi_o = np.repeat([10.0, 25, 40, 55, 70], 40), np.where(theta_o > 0, 180.0, 0.0)
-    return BrdfSamples(theta_i, np.zeros(200), np.abs(theta_o), phi_o, np.ones((200, 3)), ("R", "G", "B"))
-
-
-def search_from(units: np.ndarray):
-    """A replaced search that knows one start; baselines, of other numbers, start in the middle."""
-
-    def search(problem, effort, progress):
-        size = len(problem.parameters)
-        start = units if size == units.shape[1] else np.full((1, size), 0.5)
-        return Minima(start, np.zeros(1), np.ones(1, bool))
-
-    return search
 
 
 class Known(NamedTuple):
@@ -113,38 +80,6 @@ def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
     assert np.all(np.isfinite(band.model))
 
 
-@pytest.mark.slow  # needs the fit of the test above
-def test_a_prior_narrows_the_fit_and_its_posterior_alike(known, monkeypatch):
-    """Two independent measurements of one number: their inverse variances add.
-
-    The number is determined by the others no better than by itself, so that its own error counts alone.
-    """
-    p = known.fit["specular"]
-    prior = pl.priors.Normal(p.value + p.stderr, p.stderr)
-    free = {**FREE.numbers, "specular": Free(0, 100, prior=prior)}
-    monkeypatch.setattr(fitting, "search", search_from(UNITS))
-    posterior = pl.sample(known.samples, dataclasses.replace(FREE, numbers=free))
-    narrowed = posterior.fit["specular"]
-    assert narrowed.stderr == pytest.approx(p.stderr / np.sqrt(2), rel=0.02)
-    assert narrowed.value == pytest.approx(p.value + p.stderr / 2, abs=0.03 * p.stderr)
-    assert posterior["specular"].sd == pytest.approx(p.stderr / np.sqrt(2), rel=0.12)
-    assert posterior["specular"].mean == pytest.approx(narrowed.value, abs=0.2 * p.stderr)
-
-
-@pytest.mark.slow
-def test_correlated_samples_count_as_fewer(monkeypatch, known):
-    """Where four count as one, the posterior is twice as wide."""
-    [view] = known.ranked.problem.views
-    counted = known.ranked.problem._replace(views=(view.counting(view.samples.independent_fraction / 4),))
-    [view_fit] = known.ranked.fits
-    wider = dataclasses.replace(
-        known.ranked, problem=counted, fits=(dataclasses.replace(view_fit, variance=4 * view_fit.variance),)
-    )
-    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, wider))
-    posterior = pl.sample(known.samples, FREE)
-    assert posterior["specular"].sd == pytest.approx(2 * known.fit["specular"].stderr, rel=0.15)
-
-
 @pytest.mark.parametrize(
     ("status", "assumption"), [(pl.Status.NOT_IDENTIFIABLE, "there is a layer"), (pl.Status.AMBIGUOUS, "")]
 )
@@ -172,7 +107,7 @@ def turned():
 def test_an_azimuth_is_drawn_within_half_a_turn_of_the_best(turned, monkeypatch):
     """Across the ends of its bounds, and all directions of the disc are as likely."""
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
-    monkeypatch.setattr(fitting, "search", search_from(np.array([[0.43, 0.51]])))
+    monkeypatch.setattr(fitting, "search", search_from([0.43, 0.51]))
     posterior = pl.sample(turned, Surface("granier-heidrich", {**TRUTH, **free}), steps=300)
     best = posterior.fit["azimuth"].value
     azimuth = posterior.draws[..., posterior.names.index("azimuth")]

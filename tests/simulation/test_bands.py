@@ -11,6 +11,8 @@ from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, default_directions
 
+from ..airy import airy
+
 EYE = sensor("1931", "A")
 DIRECTIONS = Directions(*(x[:128] for x in default_directions()))
 FILM = {"thickness": 320.0, "n": 1.47, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.05}
@@ -19,16 +21,6 @@ FILM = {"thickness": 320.0, "n": 1.47, "base_n": 2.7, "base_k": 2.8, "roughness"
 def vectors(theta, phi):
     theta, phi = np.deg2rad(theta), np.deg2rad(phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
-def airy(cosine, nm, thickness, film, base):
-    """Unpolarised reflectance of a film (samples, wavelengths), by Airy's formula (Born and Wolf, 7.6)."""
-    c0 = cosine[:, None]
-    c1, c2 = (np.sqrt(1 - (1 - c0**2) / n**2 + 0j) for n in (film, base))
-    phase = np.exp(4j * np.pi * film * thickness * c1 / nm)
-    s = (c0 - film * c1) / (c0 + film * c1), (film * c1 - base * c2) / (film * c1 + base * c2)
-    p = (film * c0 - c1) / (film * c0 + c1), (base * c1 - film * c2) / (base * c1 + film * c2)
-    return sum(abs((r1 + r2 * phase) / (1 + r1 * r2 * phase)) ** 2 for r1, r2 in (s, p)) / 2
 
 
 def by_hand(directions, eye, numbers):
@@ -40,7 +32,8 @@ def by_hand(directions, eye, numbers):
     wall = [(np.sqrt(1 + a2 * (1 / v[:, 2] ** 2 - 1)) - 1) / 2 for v in (i, o)]
     lobe = density / (1 + wall[0] + wall[1]) / (4 * i[:, 2] * o[:, 2])
     base = numbers["base_n"] + 1j * numbers["base_k"]
-    spectrum = airy(np.sum(i * h, axis=-1), eye.wavelength, numbers["thickness"], numbers["n"], base)
+    cosine = np.sum(i * h, axis=-1)[:, None]
+    spectrum = airy(eye.wavelength, numbers["thickness"], numbers["n"], base, cosine)
     return lobe[:, None] * (spectrum @ (eye.weights / eye.white)) + numbers["diffuse"]
 
 

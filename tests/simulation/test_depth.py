@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 import tmm
@@ -84,12 +81,6 @@ def test_the_magnetic_field_has_the_poynting_vector_of_tmm(computed):
                 assert power[j, i] == pytest.approx(at["poyn"], rel=1e-10, abs=1e-12)
 
 
-def test_energy_is_conserved(computed):
-    for absorbed, R, T, _ in computed.values():
-        np.testing.assert_allclose(R + T + jnp.sum(absorbed, axis=0), 1, rtol=0, atol=1e-12)
-        assert np.all(np.asarray(absorbed) >= 0)
-
-
 def test_unpolarised_is_the_mean_with_the_components_of_both(computed):
     (A_s, *_, s), (A_p, *_, p), (A, *_, both) = (computed[x] for x in ("s", "p", "unpolarised"))
     np.testing.assert_allclose(A, 0.5 * (A_s + A_p), rtol=1e-14)
@@ -97,23 +88,6 @@ def test_unpolarised_is_the_mean_with_the_components_of_both(computed):
     np.testing.assert_allclose(both.absorbed, 0.5 * (s.absorbed + p.absorbed), rtol=1e-13)
     np.testing.assert_allclose(both.electric, s.electric + p.electric, rtol=1e-13)
     np.testing.assert_allclose(both.magnetic, s.magnetic + p.magnetic, rtol=1e-13)
-
-
-def test_the_density_integrates_to_the_absorptance_and_in_the_substrate_to_t():
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    film, light = (550.0, [80.0, 40.0], [2.0 + 0.3j, 0.4 + 2.5j], 3.0 + 0.5j), {"angle": 50.0}
-    ends = [0.0, 80.0, 120.0, 2000.0]  # 2000 nm are 20 skin depths of the substrate
-
-    @jax.jit
-    def at(depth):
-        return pl.field(*film, depth, **light).absorbed
-
-    found = []
-    for low, high in pairwise(ends):
-        half = 0.5 * (high - low)
-        found.append(half * weights @ np.asarray(at(low + half * (nodes + 1))))
-    A, T = pl.absorptance(*film, **light), pl.transmittance(*film, **light)
-    np.testing.assert_allclose(found, [*A, T], rtol=1e-9)
 
 
 @pytest.mark.slow  # compiles a stack of its own
@@ -150,21 +124,6 @@ def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
     assert none == 0
     assert float(little / 1e-12) == pytest.approx(float(slope), rel=1e-11)  # the next order is k
     assert slope > 1
-
-
-@pytest.mark.slow
-def test_a_second_call_compiles_nothing(caplog):
-    calls = [
-        lambda k: pl.absorptance(500.0, 30.0, 2.0 + 1j * k, 1.5),
-        lambda k: pl.field(500.0, 30.0, 2.0 + 1j * k, 1.5, 10.0),
-        lambda k: pl.ellipsometry(500.0, 30.0, 2.0 + 1j * k, 1.5, angle=60.0),
-    ]
-    for call in calls:
-        call(0.1)
-    with jax.log_compiles():
-        for call in calls:
-            call(0.2)
-    assert not [record.getMessage() for record in caplog.records if "ompil" in record.getMessage()]
 
 
 def test_what_is_refused():

@@ -47,29 +47,8 @@ def test_absorptances_as_tmm(both):
         exact = tmm.inc_tmm(letter, index, depths, list("icicci"), np.deg2rad(ANGLE), nm)
         absorbed = tmm.inc_absorp_in_each_layer(exact)[1:-1]
         np.testing.assert_allclose(profile.absorptance[:, i], absorbed, rtol=0, atol=2e-8)
-        assert profile.T[i] == pytest.approx(exact["T"], abs=2e-8)
-
-
-@pytest.mark.slow  # compiles stacks for 5 s; tests/simulation/test_depth.py has the same sum of a stack
-def test_energy_is_conserved_through_plates(both):
-    """Absorptances do not follow from R and T, so this can fail."""
-    _, profile = both
-    total = profile.R + profile.T + np.sum(profile.absorptance, axis=0)
-    np.testing.assert_allclose(total, 1, rtol=0, atol=1e-12)
+        assert (profile.R[i], profile.T[i]) == pytest.approx((exact["R"], exact["T"]), abs=2e-8)
     assert sum(x[0] for x in profile.shares.values()) == pytest.approx(1, abs=1e-12)
-
-
-@pytest.mark.slow  # needs the stacks of the tests above
-def test_the_density_integrates_to_each_layer(both):
-    _, profile = both
-    for section in profile.sections:
-        for name, upper, lower in section.layers:
-            here = np.array(section.medium) == name
-            x, y = section.depth[here], section.absorbed[0, here]
-            assert x[0] == pytest.approx(upper, abs=1e-3)
-            assert x[-1] == pytest.approx(lower, abs=1e-3)
-            total = np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x))
-            assert total == pytest.approx(profile.shares[name][0], rel=1e-4, abs=1e-12)
 
 
 @pytest.mark.slow  # compiles two stacks

@@ -103,15 +103,6 @@ def test_precision_follows_the_input(function, dtype):
 
 
 @BOTH
-def test_normal_incidence_has_one_polarisation(function):
-    one, two, mean = (call(function, p, angle=0.0) for p in ("s", "p", "unpolarised"))
-    assert float(two) == pytest.approx(float(one), rel=1e-13)
-    assert float(mean) == float(one)
-    traced = jax.jit(lambda angle: call(function, angle=angle))(0.0)
-    assert float(traced) == pytest.approx(float(mean), rel=1e-13)
-
-
-@BOTH
 @pytest.mark.parametrize("ambient", [1.33 + 0.1j, np.array([1.33 + 0j]), "Au"])
 def test_an_absorbing_ambient_is_refused(function, ambient):
     with pytest.raises(ValueError, match="the ambient must not absorb: give it a real index"):

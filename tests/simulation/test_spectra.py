@@ -19,13 +19,6 @@ def test_the_signal_of_the_scene():
     assert not made.plan.on("absorption")
 
 
-def test_transmittance_at_an_angle():
-    light = pl.Light(angle=35.0, signal="T", polarisation="p")
-    made = simulate_signal(pl.Scene(FILM, 1.5, light=light), NM)
-    expected = pl.transmittance(NM, 430.0, 1.46, 1.5, angle=35.0, polarisation="p")
-    np.testing.assert_allclose(made.clean, expected, rtol=1e-12)
-
-
 def test_scale_and_offset():
     clean = simulate_signal(pl.Scene(FILM, 3.9), NM).clean
     made = simulate_signal(pl.Scene(FILM, 3.9, instrument=pl.Instrument(2.0, 0.1)), NM).clean

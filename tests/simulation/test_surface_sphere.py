@@ -10,6 +10,8 @@ from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
 from pellicle.simulation.environment import Environment, one_lamp, sphere, studio
 from pellicle.simulation.surface_sphere import following, in_colour, in_plane, relief, render
 
+from ..airy import airy
+
 STEEL = {"n": 2.9, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.1}
 UNEVEN = pl.Surface("microfacet-film", STEEL | {"thickness": pl.Free(10, 70)})
 LAYERED = pl.Surface("granier-heidrich-diffuse", {"thickness": 260.0, "n": [1.4, 1.45, 1.6], "diffuse": 0.2})
@@ -30,15 +32,8 @@ def hemisphere(count):
 
 
 def film(nm, cosine, wavelength=EYE.wavelength):
-    """Spectra (..., wavelengths) of the oxide on steel by the textbook formula."""
-    q0 = cosine[..., None] + 0j
-    q1, q2 = (np.sqrt(n * n - 1 + q0**2) for n in (2.9, 2.7 + 2.8j))
-    turn = np.exp(4j * np.pi / wavelength * nm * q1)
-    total = 0.0
-    for a, b, c in ((q0, q1, q2), (q0, q1 / 2.9**2, q2 / (2.7 + 2.8j) ** 2)):
-        above, below = (a - b) / (a + b), (b - c) / (b + c)
-        total = total + 0.5 * np.abs((above + below * turn) / (1 + above * below * turn)) ** 2
-    return total
+    """Spectra (..., wavelengths) of the oxide on steel."""
+    return airy(wavelength, nm, 2.9, 2.7 + 2.8j, cosine[..., None])
 
 
 def lobe(i, o):

@@ -11,9 +11,10 @@ import pytest
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf import fit as fitting
-from pellicle.fitting.minima import Minima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
+
+from .known_surface import search_from
 
 TILTED = Surface(
     "granier-heidrich",
@@ -60,7 +61,7 @@ GREY = {
 }
 """A surface of one channel at 550 nm."""
 FREE = {"thickness": (0, 1000), "exponent_reflection": (1, 1000), "specular": (0, 100)}
-START = np.array([[0.32, np.log(60) / np.log(1000), 0.015]])
+START = [0.32, np.log(60) / np.log(1000), 0.015]
 """The truth in the unit cube of these numbers."""
 
 
@@ -101,9 +102,4 @@ def truth() -> dict[str, float]:
 def no_search(monkeypatch):
     """Replace the search by the truth as the only start; baselines start in the middle of their bounds."""
 
-    def search(problem, effort, progress):
-        size = len(problem.parameters)
-        start = START if size == START.shape[1] else np.full((1, size), 0.5)
-        return Minima(start, np.zeros(1), np.ones(1, bool))
-
-    monkeypatch.setattr(fitting, "search", search)
+    monkeypatch.setattr(fitting, "search", search_from(START))

@@ -10,7 +10,6 @@ import pytest
 
 import pellicle as pl
 from pellicle.brdf import direction, model
-from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.errors import UsageError
 from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.result import Status
@@ -18,42 +17,9 @@ from pellicle.reporting.json_record import to_json
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
-TRUTH = {
-    "thickness": 320.0,
-    "n": (1.48, 1.5, 1.53),
-    "exponent_reflection": 60.0,
-    "exponent_transmission": 25.0,
-    "deviation": 0.0,
-    "azimuth": 0.0,
-    "specular": 1.5,
-    "diffuse": 0.1,
-}
-FREE = Surface(
-    "granier-heidrich",
-    {
-        "thickness": Free(0, 1000),
-        "n": (1.48, 1.5, 1.53),
-        "exponent_reflection": Free(1, 1000),
-        "exponent_transmission": Free(1, 1000),
-        "specular": Free(0, 100),
-        "diffuse": Free(0, 2),
-    },
-)
-NAMES = ("thickness", "exponent_reflection", "exponent_transmission", "specular", "diffuse")
+from .known_surface import BOUNDS, FREE, TRUTH, arcs
 
-
-def arcs(values, sigma):
-    """40 directions in the plane of incidence at each of five incidences, as a goniometer takes them."""
-    theta_o = np.tile(np.linspace(-78, 78, 40), 5)
-    return BrdfSamples(
-        np.repeat([10.0, 25, 40, 55, 70], 40),
-        np.zeros(200),
-        np.abs(theta_o),
-        np.where(theta_o > 0, 180.0, 0.0),
-        values,
-        ("R", "G", "B"),
-        sigma=sigma,
-    )
+NAMES = tuple(BOUNDS)
 
 
 def noisy(rho, seed):
@@ -65,7 +31,7 @@ def noisy(rho, seed):
 @pytest.fixture(scope="module")
 def known():
     """A fit of samples of the truth."""
-    empty = arcs(np.ones((200, 3)), None)
+    empty = arcs()
     i, o = direction(empty.theta_i, empty.phi_i), direction(empty.theta_o, empty.phi_o)
     rho = np.asarray(jax.jit(lambda: model("granier-heidrich")(TRUTH, i, o))())
     return fit(noisy(rho, seed=3), FREE)

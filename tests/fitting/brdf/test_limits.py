@@ -21,12 +21,14 @@ from pellicle.fitting.brdf.problem import make
 from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.conclusion import Conclusion, conclude, linearised
 from pellicle.fitting.discrepancy import discrepancy
-from pellicle.fitting.minima import Minima, minima
+from pellicle.fitting.minima import minima
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Status
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
+
+from .known_surface import search_from
 
 TRUTH = {
     "thickness": 320.0,
@@ -113,17 +115,6 @@ def test_a_limit_is_where_the_profile_has_risen(simulated, judged, name, side):
     limit, other = (p.upper_limit, p.lower_limit) if side > 0 else (p.lower_limit, p.upper_limit)
     assert limit == pytest.approx(expected, rel=0.02)
     assert other is None
-
-
-def search_from(start: list[float]):
-    """A replaced search that knows one start, for problems of as many numbers; baselines start anywhere."""
-
-    def search(problem, effort, progress):
-        size = len(problem.parameters)
-        unit = np.array([start]) if size == len(start) else np.full((1, size), 0.3)
-        return Minima(unit, np.zeros(1), np.ones(1, bool))
-
-    return search
 
 
 @pytest.fixture(scope="module")

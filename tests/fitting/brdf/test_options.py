@@ -87,18 +87,6 @@ def test_huber_against_scipy(grey, grey_samples):
     agrees(pl.fit(samples, grey(), loss="huber"), values)
 
 
-@pytest.mark.slow  # compiles for 4 s; tests/effects/test_surface_plan.py has such plans
-def test_a_tolerance_leaves_an_effect_out(grey, grey_samples):
-    """A diffuse part of 1e-6 changes no value by 1 % of a hundredth of a white one."""
-    samples = grey_samples()
-    whole, reduced = (pl.fit(samples, grey(diffuse=1e-6), tolerance=t) for t in (0.0, 0.01))
-    assert whole.plan.on("diffuse")
-    assert not reduced.plan.on("diffuse")
-    assert reduced.plan.on("precision")
-    agrees(reduced, [p.value for p in whole.free], 0.1)
-    assert reduced.warnings == whole.warnings
-
-
 @pytest.mark.slow  # compiles two plans
 def test_a_fit_beyond_its_tolerance_is_done_again(grey, grey_samples, truth, monkeypatch):
     """As where the design of the plan missed the values of the best fit."""

@@ -13,6 +13,8 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.colour_targets import measured_colours
 from pellicle.fitting.film.problem import make
 
+from ...airy import airy
+
 EYE = sensor("1931", "D65")
 NM = EYE.wavelength[::5]
 SENSOR = NM, EYE.weights[::5] / EYE.weights[::5, 1].sum()
@@ -74,9 +76,7 @@ def test_one_colour_of_unknown_exposure_has_several_thicknesses():
     assert sum(share for _, share in orders) == pytest.approx(1.0)
     # the posterior on a grid; the prior of the exposure is uniform in its logarithm
     grid, gains = np.arange(50.0, 700.0, 2.0), np.geomspace(0.5, 2.0, 801)
-    r01, r12 = (1 - 1.46) / (1 + 1.46), (1.46 - 3.9) / (1.46 + 3.9)
-    phase = np.exp(4j * np.pi * 1.46 * grid[:, None] / NM)
-    seen = np.abs((r01 + r12 * phase) / (1 + r01 * r12 * phase)) ** 2 @ SENSOR[1]
+    seen = airy(NM, grid[:, None], 1.46, 3.9) @ SENSOR[1]
     np.testing.assert_allclose(seen[125], xyz(300.0, ANGLES[:1])[0], rtol=1e-9)
     code = encoding("srgb", SENSOR[1].sum(axis=0))
     density = np.empty(len(grid))

@@ -20,7 +20,6 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured
-from pellicle.optics.hoisting import stack_rows
 
 CANDIDATES, POINTS = 16, 64
 FREE = {"parameter", "constant", "broadcast", "bitcast", "copy", "reshape", "slice", "transpose", "tuple"}
@@ -142,23 +141,3 @@ def test_nothing_is_computed_twice(name):
     deviance, jacobian = evaluations(case.scene)
     assert 50 < deviance <= case.deviance
     assert deviance < jacobian <= case.jacobian
-
-
-def test_the_count_shows_what_a_stack_costs():
-    """A sum over points of rows that a long product precedes: joined by `stack`, and stored before."""
-    x = np.linspace(0.1, 0.9, CANDIDATES * POINTS).reshape(CANDIDATES, POINTS)
-
-    def rows(x):
-        power = x
-        for i in range(30):
-            power = power * x + i
-        return [power, power * x, power + x]
-
-    def joined(x):
-        return jnp.stack(rows(x), 1)
-
-    def stored(x):
-        return jax.vmap(lambda x: stack_rows(rows(x)))(x)
-
-    counts = [operations(jax.jit(f).lower(x).compile()) / x.size for f in (joined, stored)]
-    assert counts[0] > 3 * counts[1]

@@ -11,7 +11,6 @@ from pellicle.fitting import minima as solver
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.targets import measured as as_numbers
-from pellicle.fitting.minima import minima
 from pellicle.fitting.progress import quiet
 
 
@@ -99,15 +98,6 @@ def test_minima_are_distinct_and_best_first(film, measured):
     apart = np.abs(thickness[:, None] - thickness) * 990 > 0.5
     apart |= np.abs(index[:, None] - index) > 0.02
     assert apart[~np.eye(len(apart), dtype=bool)].all()
-
-
-def test_one_minimum_from_many_starts_is_one(film, measured):
-    scene = film()
-    problem = built(scene, measured(scene, 700.0))
-    near = (690 + np.linspace(0, 15, 7) - 10)[:, None] / 990
-    result = minima(problem, near)
-    assert len(result.units) == 1
-    assert 10 + 990 * result.units[0, 0] == pytest.approx(700, abs=1)
 
 
 def test_progress_is_reported(film, measured):
