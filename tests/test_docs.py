@@ -138,7 +138,7 @@ ELSEWHERE = {
     "python benchmarks/camera_colours.py": "minutes; tests/fitting/film/test_colour_fit.py: a few films",
     "python benchmarks/multiple_scattering.py": "tests/brdf/test_multiple_scattering.py: its limits",
     "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
-    "python benchmarks/brdf_errors.py": "tests/fitting/brdf/test_errors.py: fewer runs",
+    "python benchmarks/brdf_errors.py": _LONG_STUDY,
     "python benchmarks/brdf_recovery.py": _LONG_STUDY,
     "python benchmarks/mitsuba_films.py": "tests/rendering/test_mitsuba.py: one film",
     "python scripts/render_blade.py": "renders for minutes; tests/rendering/test_mitsuba.py: its materials",

@@ -16,23 +16,16 @@ from pellicle.effects.gradient import gradient, signals
 from pellicle.forward_model.film_signal import build
 from pellicle.scene.free import free_leaves, insert
 
-WAVELENGTH = np.linspace(450.0, 850.0, 9)
+from ..films import scene
+
 FREE_K = pl.Free(0, 1, start=0.0)
 FREE_ANGLE = pl.Free(0, 60, start=0.0)
-
-
-def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
-    light = {"wavelength": WAVELENGTH} | light
-    layer = layer if isinstance(layer, pl.Layer) else pl.Layer(layer, thickness)
-    return pl.Scene(layer, substrate, ambient, pl.Light(**light), instrument or pl.Instrument())
 
 
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
 GRADED = pl.Graded(1.46, 2.0, pl.profile.Linear(0.0, pl.Free(0.5, 1.0)))
 TABLE = [
     ("absorption", False, "no layer has any extinction", scene()),
-    ("absorption", False, "no layer has any extinction", scene(Constant(1.46, 0.0))),
-    ("absorption", False, "no layer has any extinction", scene(Cauchy(pl.Free(1.4, 1.6)))),
     ("absorption", True, "extinction is free, or not zero", scene(1.46 + 0.1j)),
     ("anisotropy", False, "no medium is birefringent", scene()),
     ("anisotropy", True, "s and p stay apart", scene(pl.Anisotropic(1.5, 1.6))),
@@ -47,13 +40,11 @@ TABLE = [
     ("stack", True, "a graded layer", scene(GRADED)),
     ("orders", False, "averaged over nodes instead", scene(GRADED, instrument=BANDWIDTH)),
     ("tunnelling", True, "in the layer is possible", scene(GRADED, ambient=1.52, angle=75.0)),
-    ("tunnelling", False, "normal incidence", scene()),
     ("tunnelling", False, "no real index can fall below", scene(angle=60.0)),
     ("tunnelling", True, "in the layer is possible", scene(1.33, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "in the substrate is possible", scene(2.1, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", True, "layer and substrate", scene(1.2, 1.0, ambient=1.52, angle=65.0)),
     ("tunnelling", False, "no real index", scene(1.33 + 0.1j, ambient=1.52, angle=65.0)),
-    ("tunnelling", True, "in the layer", scene(Cauchy(pl.Free(1.3, 2)), angle=65.0)),
     ("tunnelling", True, "in the layer", scene(angle=FREE_ANGLE)),
     ("tunnelling", True, "in the layer", scene(angle=60.0, wavelength=None)),
     ("oblique", False, "normal incidence, and the angle is not free", scene()),

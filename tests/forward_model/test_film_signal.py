@@ -13,19 +13,7 @@ import pellicle as pl
 from pellicle.dispersion import Cauchy, Constant
 from pellicle.forward_model.film_signal import build, tabulated
 
-WAVELENGTH = np.linspace(450.0, 850.0, 9)
-
-
-def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
-    light = {"wavelength": WAVELENGTH} | light
-    return pl.Scene(
-        pl.Layer(layer, thickness), substrate, ambient, pl.Light(**light), instrument or pl.Instrument()
-    )
-
-
-def predict(thing):
-    return np.asarray(jax.jit(build(pl.plan(thing)))(thing))
-
+from ..films import WAVELENGTH, predict, scene
 
 PLATE = pl.Substrate(1.52, back=1.0)
 DENSE = {"ambient": 1.52, "angle": 65.0}
@@ -144,14 +132,6 @@ LEAVES_NO_TRACE = {
 def test_an_absent_effect_leaves_no_trace(name):
     without, with_it = LEAVES_NO_TRACE[name]
     assert primitives(without) < primitives(with_it)
-
-
-def test_one_polarisation_is_half_the_work():
-    one, both = primitives(scene(angle=30.0, polarisation="s")), primitives(scene(angle=30.0))
-    assert one < 0.65 * both
-    normal = primitives(scene())
-    assert normal < one
-    assert primitives(scene(polarisation="p")) == normal
 
 
 def test_k_fixed_at_zero_costs_what_no_k_costs():

@@ -10,30 +10,9 @@ import pellicle as pl
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.scene.free import insert
 
-WAVELENGTH = np.linspace(450.0, 850.0, 9)
-
-
-def scene(layer=1.46, substrate=3.9 + 0.02j, thickness=300.0, ambient=1.0, instrument=None, **light):
-    light = {"wavelength": WAVELENGTH} | light
-    return pl.Scene(
-        pl.Layer(layer, thickness), substrate, ambient, pl.Light(**light), instrument or pl.Instrument()
-    )
-
-
-def predict(thing):
-    return np.asarray(jax.jit(build(pl.plan(thing)))(thing))
-
+from ..films import WAVELENGTH, predict, scene
 
 PLATE = pl.Substrate(1.52, back=1.0)
-
-
-def test_a_window_of_nothing_changes_nothing():
-    """A free bandwidth at 0 is the closed form, to the bound of the orders."""
-    free = pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0))
-    thing = scene(instrument=free)
-    bound = pl.plan(thing).row("orders").error_bound
-    found = build(pl.plan(thing))(insert(thing, [0.0]))
-    np.testing.assert_allclose(found, predict(scene()), atol=bound)
 
 
 @pytest.mark.parametrize("which", ["bandwidth", "thickness_spread"])

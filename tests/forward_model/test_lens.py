@@ -84,6 +84,14 @@ def test_intensities(signal, polarisation, angle, half):
     assert np.max(np.abs(found - of(np.stack(bare), polarisation))) > 1e-4
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("polarisation", ["s", "p", "unpolarised"])
+def test_an_isotropic_film(polarisation):
+    found = predict(scene(medium=1.46, depth=900.0, angle=55.0, half=8.0, polarisation=polarisation))[:, 0]
+    both, _ = truth(55.0, 8.0, [(np.eye(3) * 1.46**2, 900.0)], 3.9 + 0.02j)
+    np.testing.assert_allclose(found, of(both, polarisation), atol=1e-6)
+
+
 @pytest.mark.slow  # compiles an absorbing biaxial film
 def test_an_absorbing_biaxial_film_transmits_unlike_from_opposite_sides():
     """Reciprocity does not halve the rays of transmitted light."""

@@ -18,21 +18,13 @@ from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
 from pellicle.simulation.spectra import simulate_signal
 
-WAVELENGTH = np.linspace(450.0, 850.0, 9)
+from ..films import WAVELENGTH, predict, scene
+
 NODES = np.linspace(-8.0, 8.0, 161)
 WEIGHTS = np.exp(-0.5 * NODES**2) / np.sum(np.exp(-0.5 * NODES**2))
 
 
-def scene(layers, substrate=3.9 + 0.02j, instrument=None, **light):
-    light = {"wavelength": WAVELENGTH} | light
-    return pl.Scene(layers, substrate, light=pl.Light(**light), instrument=instrument or pl.Instrument())
-
-
 reflected_at = jax.jit(pl.reflectance, static_argnames="polarisation")
-
-
-def predict(thing):
-    return np.asarray(jax.jit(build(pl.plan(thing)))(thing))
 
 
 # plates anywhere
@@ -164,46 +156,6 @@ def test_a_cone_at_normal_incidence_is_an_average_over_the_pupil():
     assert row.error_bound < 1e-6
     np.testing.assert_allclose(predict(thing), truth, atol=1e-6)
     assert np.max(np.abs(predict(scene(pl.Layer(1.46, 1500.0))) - truth)) > 0.05
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("polarisation", ["s", "p", "unpolarised"])
-def test_a_cone_at_an_angle(polarisation):
-    """Brute rays with vectors: each is turned about its own axis, and its field with it."""
-    half = 8.0
-    thing = scene(
-        pl.Layer(1.46, 900.0),
-        angle=55.0,
-        polarisation=polarisation,
-        instrument=pl.Instrument(angle_spread=half),
-    )
-    radius = np.sin(np.deg2rad(half)) * np.sqrt((np.arange(60) + 0.5) / 60)
-    phi = 2 * np.pi * (np.arange(64) + 0.5) / 64
-    normal = np.array([np.sin(np.deg2rad(55)), 0, np.cos(np.deg2rad(55))])
-    start = {"s": [np.array([0.0, 1, 0])], "p": [np.array([1.0, 0, 0])]}
-    start["unpolarised"] = [*start["s"], *start["p"]]
-    angles, shares = [], []
-    for rho in radius:
-        for azimuth in phi:
-            axis = np.array([-np.sin(azimuth), np.cos(azimuth), 0])
-            turn = _rotation(axis, np.arcsin(rho))
-            ray = turn @ np.array([0, 0, 1.0])
-            across = np.cross(ray, normal)
-            across = across / np.linalg.norm(across)
-            angles.append(np.rad2deg(np.arccos(ray @ normal)))
-            shares.append(np.mean([(turn @ e @ across) ** 2 for e in start[polarisation]]))
-    rows = [
-        reflected_at(WAVELENGTH, 900.0, 1.46, 3.9 + 0.02j, angle=np.array(angles)[:, None], polarisation=p)
-        for p in "sp"
-    ]
-    share = np.array(shares)[:, None]
-    truth = np.mean(share * rows[0] + (1 - share) * rows[1], axis=0)
-    np.testing.assert_allclose(predict(thing), truth, atol=2e-5)
-
-
-def _rotation(axis, angle):
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 @pytest.mark.parametrize("angle", [0.0, pytest.param(40.0, marks=pytest.mark.slow)])

@@ -42,14 +42,13 @@ def test_blocks_are_whole_chunks_of_the_input():
     assert min(size) > 48
 
 
-def test_rows_of_a_line_scanner_stay_whole():
-    assert blocks_of(lazy(5000, 2048, 100, chunks=(1, 2048, 100))).size == (8, 2048)
-
-
-def test_a_chunk_that_is_too_large_is_divided():
-    size = blocks_of(lazy(1024, 1024, 100, chunks=(1024, 1024, 1))).size
-    assert size == (128, 128)
-
-
-def test_several_frames_of_a_small_image_are_one_block():
-    assert blocks_of(lazy(1000, 8, 16, 50)).size == (128, 8, 16)
+@pytest.mark.parametrize(
+    ("shape", "chunks", "size"),
+    [
+        ((5000, 2048, 100), (1, 2048, 100), (8, 2048)),  # rows of a line scanner stay whole
+        ((1024, 1024, 100), (1024, 1024, 1), (128, 128)),  # a chunk that is too large is divided
+        ((1000, 8, 16, 50), None, (128, 8, 16)),  # several frames of a small image are one block
+    ],
+)
+def test_sizes_of_blocks(shape, chunks, size):
+    assert blocks_of(lazy(*shape, chunks=chunks)).size == size

@@ -58,14 +58,6 @@ def test_energy(wavelength, thickness, layer, substrate, ambient, angle, letter)
     assert reflected + passed <= 1 + 1e-12
 
 
-@given(wavelength, thickness, transparent, transparent, ambient, angle, letters)
-def test_nothing_is_lost_where_nothing_absorbs(
-    wavelength, thickness, layer, substrate, ambient, angle, letter
-):
-    reflected, passed = both(letter, wavelength, thickness, layer, substrate, ambient, angle)
-    assert reflected + passed == pytest.approx(1, abs=1e-11)
-
-
 @given(wavelength, thickness, transparent, index, ambient, angle, letters)
 def test_a_transparent_film_takes_nothing(wavelength, thickness, layer, substrate, ambient, angle, letter):
     """What it does not reflect enters the substrate, absorbing or not: there p has its own power factor."""
