@@ -26,13 +26,10 @@ COUNT = 5
 class SphereFlags(Flags):
     """Flags of the sphere of a surface."""
 
-    light: Annotated[
-        float, Parameter(help="Surfaces: angle between the main lamp and the line of sight in degrees.")
-    ] = 35.0
-    environment: Annotated[
-        Literal["studio", "lamp"],
-        Parameter(help="Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."),
-    ] = "studio"
+    light: float = 35.0
+    """Surfaces: angle between the main lamp and the line of sight in degrees."""
+    environment: Literal["studio", "lamp"] = "studio"
+    """Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."""
 
 
 def chart(

@@ -23,18 +23,14 @@ USUAL_EYE = (("observer", "1931"), ("illuminant", "D65"))
 class CostFlags(Flags):
     """Flags of the methods that are compared."""
 
-    reference: Annotated[
-        str, Parameter(help="Reference of the errors: float64, or mpmath with 50 digits.")
-    ] = "float64"
-    tolerance: Annotated[
-        float | None, Parameter(help="Error that is small enough: in R, T, degrees or, of colours, ΔE2000.")
-    ] = None
-    datasets: Annotated[
-        int, Parameter(help="Number of simulated spectra that every solver fits; 0 for no solvers.")
-    ] = 20
-    time_limit: Annotated[
-        float, Parameter(help="Seconds after which no further simulated spectrum is fitted.")
-    ] = 120.0
+    reference: str = "float64"
+    """Reference of the errors: float64, or mpmath with 50 digits."""
+    tolerance: float | None = None
+    """Error that is small enough: in R, T, degrees or, of colours, ΔE2000."""
+    datasets: int = 20
+    """Number of simulated spectra that every solver fits; 0 for no solvers."""
+    time_limit: float = 120.0
+    """Seconds after which no further simulated spectrum is fitted."""
 
     def check(self) -> None:
         """Raise UsageError for an impossible number."""

@@ -30,14 +30,14 @@ Record = TypeVar("Record", bound=Options)
 Kind = TypeVar("Kind", bound="OptionFlags")
 
 
-def flag(group: Group, help: str) -> Parameter:
-    """A flag with a value."""
-    return Parameter(group=group, help=help)
+def flag(group: Group, help: str | None = None, **how: Any) -> Parameter:
+    """A flag with a value; without `help`, the text below the field of a class is its help."""
+    return Parameter(group=group, **how) if help is None else Parameter(group=group, help=help, **how)
 
 
-def switch(group: Group, help: str) -> Parameter:
+def switch(group: Group, help: str | None = None) -> Parameter:
     """A flag without a value, and without a --no- form."""
-    return Parameter(group=group, help=help, negative="")
+    return flag(group, help, negative="")
 
 
 def named(names: Iterable[str]) -> list[str]:
@@ -126,45 +126,42 @@ class SceneFlags(Flags):
         str | None,
         flag(
             SCENE,
-            "Layer: a material (SiO2), an index (1.46, 2.9+0.1j), a file of n and k, or a dispersion model: "
-            "constant, cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, "
-            "cody-lorentz, spline or spline-kk, with free parameters; cauchy(1.46,3000) fixes them. Recipes "
-            "can also mix and add models.",
+            "Layer: a material (SiO2), an index (1.46, 2.9+0.1j), a file of n and k, or a dispersion "
+            "model: constant, cauchy, cauchy-urbach, sellmeier, lorentz, drude, gaussian, tauc-lorentz, "
+            "cody-lorentz, spline or spline-kk, with free parameters; cauchy(1.46,3000) fixes them. "
+            "Recipes can also mix and add models.",
         ),
     ] = None
-    substrate: Annotated[str | None, flag(SCENE, "Substrate: the same forms as --layer.")] = None
-    ambient: Annotated[str | None, flag(SCENE, "Medium in front of the layer (air).")] = None
-    thickness: Annotated[str | None, flag(SCENE, "Bounds LO:HI in nm (1:5000), or one number to fix it.")] = (
-        None
-    )
+    substrate: Annotated[str | None, flag(SCENE)] = None
+    """Substrate: the same forms as --layer."""
+    ambient: Annotated[str | None, flag(SCENE)] = None
+    """Medium in front of the layer (air)."""
+    thickness: Annotated[str | None, flag(SCENE)] = None
+    """Bounds LO:HI in nm (1:5000), or one number to fix it."""
     free: Annotated[
         str | None,
         flag(
             SCENE,
-            "Parameters of the layer to free: n,k or A=1.4:1.6. To the index of a material or a model, n and "
-            "k are added (n=-0.1:0.1); of a number they are the index (n=1.3:1.7).",
+            "Parameters of the layer to free: n,k or A=1.4:1.6. To the index of a material or a model, n "
+            "and k are added (n=-0.1:0.1); of a number they are the index (n=1.3:1.7).",
         ),
     ] = None
-    back: Annotated[
-        str | None, flag(SCENE, "Medium behind a substrate that is a plate; or rough, or taped.")
-    ] = None
-    plate_mm: Annotated[float | None, flag(SCENE, "Thickness of the plate in mm (1).")] = None
-    back_collected: Annotated[
-        str | None,
-        flag(SCENE, "Share of the light from the back face that is collected, 0 to 1, free, or LO:HI (1)."),
-    ] = None
-    back_reflections: Annotated[
-        int | None, flag(SCENE, "Most reflections at the back face of light that is collected (any number).")
-    ] = None
-    scale: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (1).")] = None
-    offset: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (0).")] = None
-    bandwidth: Annotated[
-        str | None, flag(INSTRUMENT, "Full width at half maximum in nm, free, or LO:HI.")
-    ] = None
-    uncertainty: Annotated[
-        str | None,
-        flag(INSTRUMENT, "usual: errors include those of ordinary instruments and samples; or none."),
-    ] = None
+    back: Annotated[str | None, flag(SCENE)] = None
+    """Medium behind a substrate that is a plate; or rough, or taped."""
+    plate_mm: Annotated[float | None, flag(SCENE)] = None
+    """Thickness of the plate in mm (1)."""
+    back_collected: Annotated[str | None, flag(SCENE)] = None
+    """Share of the light from the back face that is collected, 0 to 1, free, or LO:HI (1)."""
+    back_reflections: Annotated[int | None, flag(SCENE)] = None
+    """Most reflections at the back face of light that is collected (any number)."""
+    scale: Annotated[str | None, flag(INSTRUMENT)] = None
+    """free, slow or a number (1)."""
+    offset: Annotated[str | None, flag(INSTRUMENT)] = None
+    """free, slow or a number (0)."""
+    bandwidth: Annotated[str | None, flag(INSTRUMENT)] = None
+    """Full width at half maximum in nm, free, or LO:HI."""
+    uncertainty: Annotated[str | None, flag(INSTRUMENT)] = None
+    """usual: errors include those of ordinary instruments and samples; or none."""
 
     @property
     def assumed(self) -> list[str]:
@@ -239,15 +236,14 @@ def light(reading: FileOptions, azimuth: Any = None) -> Light:
 class BatchFlags(Flags):
     """Flags of the results of several files."""
 
-    out: Annotated[
-        str | None,
-        flag(OUTPUT, "Folder for report, figures and tables; an interrupted chain in it is continued."),
-    ] = None
-    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False
-    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1
-    refit: Annotated[
-        bool, switch(OUTPUT, "Fit all files, also those whose results an earlier run left in --out.")
-    ] = False
+    out: Annotated[str | None, flag(OUTPUT)] = None
+    """Folder for report, figures and tables; an interrupted chain in it is continued."""
+    json: Annotated[bool, switch(OUTPUT)] = False
+    """Print one JSON object a line."""
+    jobs: Annotated[int, flag(OUTPUT)] = 1
+    """Number of processes that share several files (1)."""
+    refit: Annotated[bool, switch(OUTPUT)] = False
+    """Fit all files, also those whose results an earlier run left in --out."""
 
     def checked(self) -> BatchFlags:
         """These flags. Raises UsageError for an impossible number of processes."""
@@ -266,62 +262,53 @@ OF_RECIPE = ("signal", "polarisation", "noise", "range", "wavelength_unit", "sig
 class CubeOnlyFlags(Flags):
     """Flags that only a cube has, None where not given."""
 
-    variable: Annotated[
-        str | None, flag(READING, "Name of the variable to read, where a cube has several.")
-    ] = None
+    variable: Annotated[str | None, flag(READING)] = None
+    """Name of the variable to read, where a cube has several."""
     wavelengths: Annotated[
         str | None,
         flag(
             READING,
-            "Wavelengths of a cube's bands, where its file has none: START:STOP:STEP, numbers with commas, "
-            "or a file with one a line.",
+            "Wavelengths of a cube's bands, where its file has none: START:STOP:STEP, numbers with "
+            "commas, or a file with one a line.",
         ),
     ] = None
-    without_bands: Annotated[
-        str | None, flag(READING, "Dead bands to leave out in nm: LO:HI or single ones, as in 755:775,820.")
-    ] = None
-    mask: Annotated[
-        str | None,
-        flag(READING, "Pixels to use: PNG, TIFF or .npy that is not zero there, or the name of a variable."),
-    ] = None
-    white_frame: Annotated[
-        str | None,
-        flag(FRAMES, "Counts of a white reference: an image, a line or a spectrum; the cube is counts too."),
-    ] = None
-    dark_frame: Annotated[str | None, flag(FRAMES, "Counts without light, in the same forms.")] = None
-    white_reflectance: Annotated[
-        float | str | None,
-        Parameter(
-            group=FRAMES,
-            help="Reflectance of the white: a number, a CSV, or a material such as Si (1).",
-            negative="",
-        ),
-    ] = None
-    saturation: Annotated[
-        float | None, flag(FRAMES, "Counts from which a pixel is saturated (the largest of its type).")
-    ] = None
+    without_bands: Annotated[str | None, flag(READING)] = None
+    """Dead bands to leave out in nm: LO:HI or single ones, as in 755:775,820."""
+    mask: Annotated[str | None, flag(READING)] = None
+    """Pixels to use: PNG, TIFF or .npy that is not zero there, or the name of a variable."""
+    white_frame: Annotated[str | None, flag(FRAMES)] = None
+    """Counts of a white reference: an image, a line or a spectrum; the cube is counts too."""
+    dark_frame: Annotated[str | None, flag(FRAMES)] = None
+    """Counts without light, in the same forms."""
+    white_reflectance: Annotated[float | str | None, switch(FRAMES)] = None
+    """Reflectance of the white: a number, a CSV, or a material such as Si (1)."""
+    saturation: Annotated[float | None, flag(FRAMES)] = None
+    """Counts from which a pixel is saturated (the largest of its type)."""
 
 
 @dataclass(frozen=True)
 class CubeFlags(CubeOnlyFlags):
     """Flags for reading a cube, None where not given; a recipe's [data] supplies some."""
 
-    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
-    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
-    signal_unit: Annotated[
-        str | None, flag(READING, "fraction, percent, absorbance, or the stored number that stands for 1.")
-    ] = None
-    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
-    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
+    wavelength_unit: Annotated[str | None, flag(READING)] = None
+    """nm, um, A, eV, cm-1 or THz."""
+    signal: Annotated[str | None, flag(READING)] = None
+    """R, T or psi-delta, if the file does not name it."""
+    signal_unit: Annotated[str | None, flag(READING)] = None
+    """fraction, percent, absorbance, or the stored number that stands for 1."""
+    angle: Annotated[float | None, flag(READING)] = None
+    """Angle of incidence in degrees (the recipe's)."""
+    polarisation: Annotated[str | None, flag(READING)] = None
+    """s, p or unpolarised."""
     range: Annotated[
-        str | tuple[float, float] | None,
-        Parameter(group=READING, help="Wavelengths to use in nm.", metavar="LO:HI", negative="", n_tokens=1),
+        str | tuple[float, float] | None, Parameter(group=READING, metavar="LO:HI", negative="", n_tokens=1)
     ] = None
+    """Wavelengths to use in nm."""
     noise: Annotated[
         float | str | None,
-        Parameter(
-            group=READING,
-            help='Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
+        flag(
+            READING,
+            'Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
             "name of a variable.",
             metavar="SIGMA",
             negative="",

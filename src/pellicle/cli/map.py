@@ -31,40 +31,28 @@ STORE, NETCDF, RATES = "map.zarr", "map.nc", "rate.nc"
 class RunFlags(Flags):
     """Flags of the computation of a map, None where not given."""
 
-    workers: Annotated[
-        int | None, flag(RUN, "Processes on this machine, one thread each (its cores, if that saves time).")
-    ] = None
-    scheduler: Annotated[
-        str | None, flag(RUN, "Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels.")
-    ] = None
-    neighbours: Annotated[
-        bool | None,
-        Parameter(group=RUN, help="Decide ambiguous pixels by the order of their neighbours.", negative=""),
-    ] = None
+    workers: Annotated[int | None, flag(RUN)] = None
+    """Processes on this machine, one thread each (its cores, if that saves time)."""
+    scheduler: Annotated[str | None, flag(RUN)] = None
+    """Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels."""
+    neighbours: Annotated[bool | None, switch(RUN)] = None
+    """Decide ambiguous pixels by the order of their neighbours."""
     lamp_curve: Annotated[
         str | None,
         flag(
             RUN,
-            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT, from a"
-            " region of known reflectance.",
+            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT, "
+            "from a region of known reflectance.",
         ),
     ] = None
-    lamp_reference: Annotated[
-        str | None, flag(RUN, "Recipe of the region of --lamp-curve (the bare substrate).")
-    ] = None
-    preview: Annotated[
-        bool | None,
-        Parameter(
-            group=RUN, help="Fit a few thousand pixels only, into the folder OUT-preview.", negative=""
-        ),
-    ] = None
-    resume: Annotated[
-        bool | None,
-        Parameter(group=OUTPUT, help="Go on with the map that an earlier run left in --out (the default)."),
-    ] = None
-    overwrite: Annotated[
-        bool | None, Parameter(group=OUTPUT, help="Replace a map that is in --out.", negative="")
-    ] = None
+    lamp_reference: Annotated[str | None, flag(RUN)] = None
+    """Recipe of the region of --lamp-curve (the bare substrate)."""
+    preview: Annotated[bool | None, switch(RUN)] = None
+    """Fit a few thousand pixels only, into the folder OUT-preview."""
+    resume: Annotated[bool | None, flag(OUTPUT)] = None
+    """Go on with the map that an earlier run left in --out (the default)."""
+    overwrite: Annotated[bool | None, switch(OUTPUT)] = None
+    """Replace a map that is in --out."""
 
 
 def map_cube(

@@ -27,12 +27,8 @@ if TYPE_CHECKING:
 class SimulationFlags(Flags):
     """Flags of the noise and of the effects of a simulation."""
 
-    noise: Annotated[
-        float | str | None,
-        Parameter(
-            help='Standard deviation of the noise, or "2 %" of a BRDF (the recipe\'s, or 0).', metavar="SIGMA"
-        ),
-    ] = None
+    noise: Annotated[float | str | None, Parameter(metavar="SIGMA")] = None
+    """Standard deviation of the noise, or "2 %" of a BRDF (the recipe's, or 0)."""
     depolarisation_noise: Annotated[
         float | None,
         Parameter(
@@ -41,10 +37,10 @@ class SimulationFlags(Flags):
             metavar="SIGMA",
         ),
     ] = None
-    seed: Annotated[int, Parameter(help="Seed of the noise.")] = 0
-    tolerance: Annotated[
-        float, Parameter(help="Leave out effects that change the signal by less than this (0: none).")
-    ] = 0.0
+    seed: int = 0
+    """Seed of the noise."""
+    tolerance: float = 0.0
+    """Leave out effects that change the signal by less than this (0: none)."""
 
     def spread(self) -> float | str | None:
         """The noise: a number from 0, or a share of the signal as text. Raises UsageError."""
