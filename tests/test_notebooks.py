@@ -23,23 +23,14 @@ def test_every_notebook_has_a_script():
 
 
 @pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_notebook_and_script_agree(path):
-    notebook = jupytext.read(path.with_suffix(".ipynb"))
-    assert sources(notebook) == sources(jupytext.read(path, fmt="py:percent")), (
-        "jupytext --sync notebooks/*.py"
-    )
+def test_notebooks(path):
+    """A notebook agrees with its script, contains no outputs and is a page of the documentation."""
+    notebook, script = jupytext.read(path.with_suffix(".ipynb")), jupytext.read(path, fmt="py:percent")
+    assert sources(notebook) == sources(script), "jupytext --sync notebooks/*.py"
     assert notebook.metadata.kernelspec.name == "python3"
-
-
-@pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_notebooks_contain_no_outputs(path):
-    code = [cell for cell in jupytext.read(path.with_suffix(".ipynb")).cells if cell.cell_type == "code"]
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert all(not cell.outputs and cell.execution_count is None for cell in code)
-
-
-@pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
-def test_notebooks_are_pages_of_the_documentation(path):
     assert f": tutorials/{path.stem}.md\n" in (ROOT / "mkdocs.yml").read_text("utf-8")
-    title = jupytext.read(path, fmt="py:percent").cells[0]
+    title = script.cells[0]
     assert title.cell_type == "markdown"
     assert title.source.startswith("# ")

@@ -18,7 +18,6 @@ from pellicle.dispersion.base import HC
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.film.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real
-from pellicle.simulation.spectra import simulate_signal
 
 KNOTS = (300.0, 400.0, 500.0, 700.0, 1000.0)
 AT = np.linspace(300.0, 1000.0, 141)
@@ -121,18 +120,8 @@ def test_impossible_splines(make, said):
         make()
 
 
-@pytest.mark.slow  # compiles a scene of its own
-def test_a_fit_scans_a_spline_as_a_whole(tmp_path):
+def test_a_fit_scans_a_spline_as_a_whole():
     """The index of every knot moves together: 8 candidates a thickness, not 8 to the number of knots."""
-    truth = Spline((400.0, 500.0, 600.0, 800.0), (2.9, 2.7, 2.6, 2.5))
-    wavelength = np.linspace(400, 800, 101)
-    measured = simulate_signal(pl.Scene(pl.Layer(truth, 120.0), "Si"), wavelength, 0.001, 1)
-    path = tmp_path / "data.csv"
-    np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
-    free = tuple(pl.Free(1.2, 4.0, start=1.5) for _ in truth.n)
-    layer = pl.Layer(Spline(truth.knots, free), pl.Free(110, 130))
+    free = tuple(pl.Free(1.2, 4.0, start=1.5) for _ in range(4))
+    layer = pl.Layer(Spline((400.0, 500.0, 600.0, 800.0), free), pl.Free(110, 130))
     assert {p.group for p in parameters(pl.Scene(layer, "Si"))} == {"n", "thickness"}
-    fit = pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
-    for i, n in enumerate(truth.n):
-        found = fit.parameters[f"n{i + 1}"]
-        assert found.value == pytest.approx(n, abs=4 * found.stderr_noise)

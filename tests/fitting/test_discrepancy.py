@@ -13,21 +13,23 @@ X = np.linspace(-1, 1, 200)
 SIGMA = 0.01
 
 
-def problem(residual, *effects, least=1.0, correlation=lambda rest: 1.0):
+LINE = np.stack([np.ones_like(X), X], axis=1)
+"""Slopes of a straight line, (points, 2)."""
+NAMES = ("level", "slope")
+
+
+def evidence(residual, *effects, least=1.0, correlation=lambda rest: 1.0):
+    """Residuals (points, channels) of a line that is the same in all channels."""
+    sigma = np.full(residual.shape, SIGMA)
+    jacobian = np.repeat(LINE[:, None], residual.shape[1], axis=1)
+    return Evidence(residual, jacobian, sigma, SIGMA, 1 / sigma, effects, correlation, least)
+
+
+def problem(residual, *effects, **options):
     """A straight line of two parameters with wide bounds, at the middle of them."""
-    jacobian = np.stack([np.ones_like(X), X], axis=1)
-    one = Evidence(
-        residual[:, None],
-        jacobian[:, None, :],
-        np.full((X.size, 1), SIGMA),
-        SIGMA,
-        np.full((X.size, 1), 1 / SIGMA),
-        effects,
-        correlation,
-        least,
-    )
-    scaled = Scaled(np.vstack([jacobian / SIGMA, np.zeros((2, 2))]), np.eye(2), ("level", "slope"))
-    return discrepancy([one], scaled, np.full(2, 0.5)), jacobian
+    one = evidence(residual[:, None], *effects, **options)
+    scaled = Scaled(np.vstack([LINE / SIGMA, np.zeros((2, 2))]), np.eye(2), NAMES)
+    return discrepancy([one], scaled, np.full(2, 0.5)), LINE
 
 
 def effect(change, size=1.0, **more):
@@ -53,17 +55,12 @@ def test_generalised_least_squares_with_the_effect_in_the_covariance():
 
 def test_a_prior_that_pulls_the_fit_is_no_discrepancy():
     """At the best fit under a prior the residuals are not free of the line, and the shift is zero."""
-    jacobian = np.stack([np.ones_like(X), X], axis=1)
     mean, weight = np.array([0.004, 0.0]), np.array([1500.0, 0.0])
     measured = np.random.default_rng(0).normal(0, SIGMA, X.size)
-    normal = jacobian.T @ jacobian / SIGMA**2 + np.diag(weight**2)
-    best = np.linalg.solve(normal, jacobian.T @ measured / SIGMA**2 + weight**2 * mean)
-    sigma = np.full((X.size, 1), SIGMA)
-    residual = (measured - jacobian @ best)[:, None]
-    one = Evidence(residual, jacobian[:, None, :], sigma, SIGMA, 1 / sigma, (), lambda rest: 1.0)
-    rows = np.vstack([jacobian / SIGMA, np.diag(weight)])
-    scaled = Scaled(rows, np.eye(2), ("level", "slope"), weight * (best - mean))
-    found = discrepancy([one], scaled, np.full(2, 0.5))
+    normal = LINE.T @ LINE / SIGMA**2 + np.diag(weight**2)
+    best = np.linalg.solve(normal, LINE.T @ measured / SIGMA**2 + weight**2 * mean)
+    scaled = Scaled(np.vstack([LINE / SIGMA, np.diag(weight)]), np.eye(2), NAMES, weight * (best - mean))
+    found = discrepancy([evidence((measured - LINE @ best)[:, None])], scaled, np.full(2, 0.5))
     assert abs(best[0] - np.mean(measured)) > 1e-3
     np.testing.assert_allclose(found.shift, 0.0, atol=1e-12)
     np.testing.assert_allclose(found.errors.covariance, np.linalg.inv(normal), rtol=1e-6, atol=1e-20)
@@ -134,12 +131,8 @@ def test_a_channel_that_is_wrong_as_a_whole_is_no_outlier(wrong):
     """As C, but not N and S, where Δ is 180 degrees less than the file has it."""
     rest = np.random.default_rng(3).normal(0, SIGMA, (X.size, 3))
     rest[:, 1] += wrong * np.cos(8 * np.pi * X)
-    sigma = np.full(rest.shape, SIGMA)
-    jacobian = np.repeat(np.stack([np.ones_like(X), X], axis=1)[:, None], 3, axis=1)
-    one = Evidence(rest, jacobian, sigma, SIGMA, 1 / sigma, (), lambda rest: 1.0)
-    found = discrepancy(
-        [one], Scaled(jacobian.reshape(-1, 2) / SIGMA, np.eye(2), ("a", "b")), np.full(2, 0.5)
-    )
+    rows = np.repeat(LINE, 3, axis=0) / SIGMA
+    found = discrepancy([evidence(rest)], Scaled(rows, np.eye(2), NAMES), np.full(2, 0.5))
     # the median absolute value of a cosine is 0.707; that of normal noise is 0.6745 standard deviations
     amplitude = wrong * np.sqrt(0.5) / 0.6745 / SIGMA
     assert found.remaining[0].ratio == pytest.approx(max(amplitude, 1.0), rel=0.15)
@@ -157,22 +150,11 @@ def test_bulk_of_pixels():
 
 def test_effects_of_the_sample_are_shared_by_its_data():
     """Twice the same data: one shared effect is known better than two of their own."""
-    change = 0.03 * np.exp(X)
-    jacobian = np.stack([np.ones_like(X), X], axis=1)
 
     def both(shared):
-        own = effect(change, shared=shared)
-        one = Evidence(
-            noise()[:, None],
-            jacobian[:, None, :],
-            np.full((X.size, 1), SIGMA),
-            SIGMA,
-            np.full((X.size, 1), 1 / SIGMA),
-            [own],
-            lambda rest: 1.0,
-        )
-        rows = np.vstack([jacobian / SIGMA, jacobian / SIGMA, np.zeros((2, 2))])
-        return discrepancy([one, one], Scaled(rows, np.eye(2), ("level", "slope")), np.full(2, 0.5))
+        one = evidence(noise()[:, None], effect(0.03 * np.exp(X), shared=shared))
+        rows = np.vstack([LINE / SIGMA, LINE / SIGMA, np.zeros((2, 2))])
+        return discrepancy([one, one], Scaled(rows, np.eye(2), NAMES), np.full(2, 0.5))
 
     assert len(both(True).contributions) == 1
     assert len(both(False).contributions) == 2

@@ -16,7 +16,6 @@ from pellicle.fitting.film.parameters import parameters
 from pellicle.forward_model.film_signal import build
 from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
-from pellicle.simulation.spectra import simulate_signal
 
 from ..films import WAVELENGTH, predict, scene
 
@@ -168,20 +167,6 @@ def test_a_free_cone_has_a_finite_slope_at_zero(angle):
     assert np.max(np.abs(slope(0.0))) < 1e-10  # even in the half angle
     numeric = (predict(6.001) - predict(5.999)) / 2e-3
     np.testing.assert_allclose(slope(6.0), numeric, rtol=1e-5, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_a_microscope_reads_a_wrong_thickness_without_its_cone():
-    """The reason for the effect: 5 to 30 nm at a numerical aperture of 0.5."""
-    wavelength = np.linspace(450.0, 850.0, 128)
-    truth = pl.Scene(pl.Layer(1.46, 2000.0), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
-    values = simulate_signal(truth, wavelength, 0.002, 1).values
-    spectrum = pl.Spectrum(wavelength, values, "R", sigma=np.full(128, 0.002))
-    thickness = pl.Free(1500, 2500)
-    cone = pl.Scene(pl.Layer(1.46, thickness), "Si", instrument=pl.Instrument(numerical_aperture=0.5))
-    found = pl.fit(spectrum, cone)
-    assert abs(found["thickness"].value - 2000) < 4 * found["thickness"].stderr_noise < 4.0
-    assert abs(pl.fit(spectrum, pl.Scene(pl.Layer(1.46, thickness), "Si"))["thickness"].value - 2000) > 5
 
 
 REFUSED = [

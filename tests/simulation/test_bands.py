@@ -7,7 +7,6 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import sensor
-from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, default_directions
 
@@ -60,19 +59,3 @@ def test_layered_lobes_integrate_over_bands_too():
     lobes = f + (1 - f) ** 2 + 2 * cosine * np.sqrt(f) * (1 - f)
     base = rd + td + 2 * cosine * np.sqrt(rd * td)
     np.testing.assert_allclose(found, lobes + 0.2 * base, rtol=2e-4)
-
-
-@pytest.mark.slow
-def test_a_fit_that_knows_the_bands_finds_the_film():
-    """Simulated by hand with a noise of 1 %: within 1 nm over bands, while single wavelengths do not fit."""
-    clean = by_hand(DIRECTIONS, EYE, FILM)
-    noise = 1 + 0.01 * np.random.default_rng(0).standard_normal(clean.shape)
-    samples = pl.simulate(Surface("microfacet-film", FILM, sensor=EYE), directions=DIRECTIONS, noise="1 %")
-    data = type(samples)(*DIRECTIONS, clean * noise, samples.channels, sigma=samples.sigma)
-    free = FILM | {"thickness": Free(100, 600), "n": Free(1.3, 1.8), "roughness": Free(0.05, 0.6)}
-    known = pl.fit(data, Surface("microfacet-film", free, sensor=EYE))
-    assert known.status == "converged"
-    assert abs(known["thickness"].value - 320) < 3 * known["thickness"].stderr < 1.5
-    centres = tuple(EYE.wavelength @ (EYE.weights / EYE.white))
-    single = pl.fit(data, Surface("microfacet-film", free, centres))
-    assert single.chi2_reduced > 5 * known.chi2_reduced

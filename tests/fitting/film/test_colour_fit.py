@@ -115,13 +115,6 @@ def test_a_chart_says_what_an_unknown_camera_sees():
     assert by_chart["thickness"].value == pytest.approx(300.0, abs=0.05)
     # the error of the chart adds to that of the colours
     assert by_chart["thickness"].stderr > 1.02 * alone["thickness"].stderr
-    # nine modes of a matrix that is nearly known do not use up nine values
-    off = values + 2e-3 * np.array([[1, -1, 1], [-1, 1, -1], [1, 1, -1]])
-    one, other = (
-        pl.fit(Colours(off, SENSOR, "rgb", angle=ANGLES, sigma=sigma, camera=camera), scene()).chi2_reduced
-        for camera in (known, exact)
-    )
-    assert one == pytest.approx(other, rel=0.3)
 
 
 @pytest.mark.slow

@@ -39,15 +39,10 @@ def test_no_clear_fringes(values):
     assert fringes(X, values) is None
 
 
-@pytest.mark.parametrize("signal", [pytest.param("R", marks=pytest.mark.slow), "T"])
-def test_a_fit_that_misses_the_fringes_says_what_they_suggest(film, measured, signal):
+def test_a_fit_that_misses_the_fringes_says_what_they_suggest(film, measured):
     """The bounds of the thickness exclude the truth."""
-    light = pl.Light(signal=signal)
-    substrate = pl.dispersion.Constant(3.9 if signal == "R" else 1.46)
-    material = 1.46 if signal == "R" else 2.2
-    scenes = [
-        film(pl.Free(*ends), material, substrate=substrate, light=light) for ends in ((10, 500), (10, 3000))
-    ]
+    seen = {"substrate": pl.dispersion.Constant(1.46), "light": pl.Light(signal="T")}
+    scenes = [film(pl.Free(*ends), 2.2, **seen) for ends in ((10, 500), (10, 3000))]
     data = measured(scenes[0], 1300.0)
     fits = [pl.fit(data, scene) for scene in scenes]
     assert [fit.status for fit in fits] == ["misfit", "converged"]

@@ -50,21 +50,3 @@ def test_a_rotating_analyser_sees_n_and_c_as_they_are(ncs):
     n, c, _ = ncs
     seen = spectrum(np.array([n, c, np.sqrt(1 - n**2 - c**2)]))
     np.testing.assert_allclose(residual(replace(seen, folded=True)), 0, atol=1e-12)
-
-
-@pytest.mark.slow
-def test_a_fit_needs_the_back_face(ncs):
-    rng = np.random.default_rng(4)
-    data = spectrum(ncs)
-    noisy = replace(
-        data,
-        values=data.values + rng.normal(0, 0.05, 40),
-        delta=data.delta + rng.normal(0, 0.1, 40),
-        sigma=np.full(40, 0.05),
-        delta_sigma=np.full(40, 0.1),
-    )
-    found = pl.fit(noisy, SCENE)
-    assert found.status == "converged"
-    # the data have noise and no systematic effects
-    assert abs(found["thickness"].value - 120.0) < 4 * found["thickness"].stderr_noise < 0.1
-    assert "The back face matters" in found.verdict
