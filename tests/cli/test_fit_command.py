@@ -8,22 +8,8 @@ import pytest
 
 from pellicle.api import fits
 
-RESULT_KEYS = [
-    "schema",
-    "data",
-    "status",
-    "verdict",
-    "parameters",
-    "rivals",
-    "chi2_reduced",
-    "rms",
-    "correlation",
-    "budget",
-    "plan",
-    "warnings",
-    "versions",
-    "seconds",
-]
+RESULT_KEYS = {"schema", "data", "status", "verdict", "parameters", "rivals", "chi2_reduced", "rms"}
+RESULT_KEYS |= {"correlation", "budget", "plan", "warnings", "versions", "seconds"}
 
 
 def test_stdout_is_the_report_and_stderr_the_talk(pellicle, spectrum_file, scene):
@@ -40,7 +26,7 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     file = spectrum_file()
     ran = pellicle("fit", file, *scene, "--json")
     (found,) = ran.objects
-    assert set(RESULT_KEYS) <= set(found)
+    assert set(found) >= RESULT_KEYS
     assert found["schema"] == "pellicle.fit/1"
     assert found["status"] == "converged"
     assert found["data"] == {
@@ -62,39 +48,31 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     assert {"pellicle", "jax"} <= set(found["versions"])
 
 
-@pytest.mark.slow  # a fit of its own; tests/fitting/test_status.py has an infinite error
-def test_an_infinite_error_is_null(pellicle, spectrum_file):
-    """20 µm of an absorber: no light comes back from below."""
-    flags = ("--layer", "1.46+0.9j", "--substrate", "3.9", "--thickness", "2000:4000", "--noise", "1")
-    (found,) = pellicle("fit", spectrum_file(), *flags, "--json").objects
-    assert found["status"] == "not-identifiable"
-    assert found["parameters"]["thickness"]["stderr"] is None
-
-
 def test_several_files_in_order_and_one_that_cannot_be_read(pellicle, spectrum_file, scene, tmp_path):
-    bad = tmp_path / "bad.csv"
+    """A folder for each fit, and a summary of all."""
+    bad, out = tmp_path / "bad.csv", tmp_path / "all"
     bad.write_text("wavelength_nm,R\n400,0.1\n401,much\n")
-    one, two = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0)
-    ran = pellicle("fit", one, bad, two, *scene, "--json")
+    files = spectrum_file("one.csv", 250.0), bad, spectrum_file("two.csv", 420.0)
+    ran = pellicle("fit", *files, *scene, "--json", "--out", out)
     assert ran.code == 3
     found = ran.objects
-    assert [f["data"]["path"] for f in found] == [str(one), str(bad), str(two)]
+    assert [f["data"]["path"] for f in found] == list(map(str, files))
     assert [f["status"] for f in found] == ["converged", "failed", "converged"]
     assert "line 3" in found[1]["error"]
-    assert set(RESULT_KEYS) <= set(found[1])
+    assert set(found[1]) >= RESULT_KEYS
     assert "line 3" in ran.err
     assert "Traceback" not in ran.err
-    thickness = [f["parameters"]["thickness"]["value"] for f in (found[0], found[2])]
-    assert abs(thickness[0] - 250) < 1
-    assert abs(thickness[1] - 420) < 1
-
-
-def test_no_clear_answer_is_4(pellicle, spectrum_file):
-    ran = pellicle(
-        "fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250"
-    )
-    assert ran.code == 4
-    assert "converged" not in ran.out
+    assert {p.name for p in (out / "one").iterdir()} == {p.name for p in (out / "two").iterdir()} == FILES
+    assert not (out / "bad").exists()
+    lines = (out / "summary.csv").read_text().splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert [row["path"] for row in rows] == list(map(str, files))
+    assert [row["status"] for row in rows] == ["converged", "failed", "converged"]
+    for record, row, truth in ((found[0], rows[0], 250), (found[2], rows[2], 420)):
+        value = record["parameters"]["thickness"]["value"]
+        assert abs(value - truth) < 1
+        assert float(row["thickness"]) == pytest.approx(value)
+    assert "line 3" in rows[1]["error"]
 
 
 def test_the_assumed_thickness_is_said(pellicle, spectrum_file):
@@ -119,21 +97,6 @@ def test_out_writes_the_five_files(pellicle, spectrum_file, scene, tmp_path):
     assert again.code == 0  # a folder of pellicle's own is written anew
 
 
-def test_several_files_get_a_folder_each_and_a_summary(pellicle, spectrum_file, scene, tmp_path):
-    out = tmp_path / "all"
-    files = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0), tmp_path / "gone.csv"
-    assert pellicle("fit", *files, *scene, "--out", out).code == 3
-    assert {p.name for p in (out / "one").iterdir()} == FILES
-    assert {p.name for p in (out / "two").iterdir()} == FILES
-    assert not (out / "gone").exists()
-    lines = (out / "summary.csv").read_text().splitlines()
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
-    assert [row["path"] for row in rows] == [str(f) for f in files]
-    assert [row["status"] for row in rows] == ["converged", "converged", "failed"]
-    assert abs(float(rows[1]["thickness"]) - 420) < 1
-    assert "no such file" in rows[2]["error"]
-
-
 def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(
     pellicle, spectrum_file, scene, tmp_path, monkeypatch
 ):
@@ -149,34 +112,6 @@ def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(
         ran = pellicle("fit", *files, *scene, "--out", out)
         ran.refused(2, "pellicle did not write", "--out")
         assert [p.name for p in out.iterdir()] == ["thesis.txt"]
-
-
-def test_nothing_is_written_where_the_fit_fails(pellicle, scene, tmp_path):
-    bad = tmp_path / "bad.csv"
-    bad.write_text("wavelength_nm,R\n400,0.1\n401,much\n")
-    out = tmp_path / "out"
-    assert pellicle("fit", bad, *scene, "--out", out).code == 3
-    assert not out.exists() or not list(out.iterdir())
-
-
-def test_ctrl_c_keeps_what_is_done(pellicle, spectrum_file, scene, tmp_path, monkeypatch):
-    real, calls = fits.fit, []
-
-    def interrupted(*arguments, **options):
-        calls.append(arguments)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return real(*arguments, **options)
-
-    monkeypatch.setattr(fits, "fit", interrupted)
-    files = [spectrum_file(f"{name}.csv") for name in ("one", "two", "three")]
-    ran = pellicle("fit", *files, *scene, "--json", "--out", tmp_path / "out")
-    assert ran.code == 130
-    assert "interrupted after 1 of 3" in ran.err
-    assert [f["status"] for f in ran.objects] == ["converged"]
-    assert {p.name for p in (tmp_path / "out" / "one").iterdir()} == FILES
-    assert not (tmp_path / "out" / "two").exists()
-    assert "one.csv" in (tmp_path / "out" / "summary.csv").read_text()
 
 
 RECIPE = """
@@ -212,30 +147,13 @@ def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, t
     assert next(row["why"] for row in found["plan"] if row["effect"] == "oblique") == "incidence at 40°"
 
 
-def test_flags_that_describe_the_scene_are_refused_beside_a_recipe(pellicle, tmp_path):
-    recipe = tmp_path / "film.toml"
-    recipe.write_text(RECIPE)
-    ran = pellicle("fit", "--recipe", recipe, "--layer", "SiO2")
-    ran.refused(2, "--layer")
-
-
-@pytest.mark.parametrize("noise", [0.002, 0.004])
-def test_noise_is_absolute(pellicle, spectrum_file, scene, noise):
-    (found,) = pellicle("fit", spectrum_file(), *scene, "--noise", noise, "--json").objects
-    assert found["chi2_reduced"] == pytest.approx((0.002 / noise) ** 2, rel=0.3)
-
-
 @pytest.mark.slow  # six fits; a scene of its own each
 def test_flags_reach_the_scene(pellicle, spectrum_file):
     """Angle, polarisation, range, ambient: each changes what is simulated, or it would be a decoration."""
     base = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "280:320", "--json")
     file = spectrum_file()
     plain = pellicle("fit", file, *base).objects[0]["parameters"]["thickness"]["value"]
-    for flags in (
-        ("--angle", "30", "--polarisation", "s"),
-        ("--ambient", "1.1"),
-        ("--range", "410:750"),
-    ):
+    for flags in (("--angle", "30", "--polarisation", "s"), ("--ambient", "1.1"), ("--range", "410:750")):
         (found,) = pellicle("fit", file, *base, *flags).objects
         assert found["parameters"]["thickness"]["value"] != plain, flags
     (plate,) = pellicle("fit", file, *base, "--back", "air", "--plate-mm", "0.5").objects

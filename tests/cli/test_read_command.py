@@ -41,7 +41,7 @@ def test_conversion(pellicle, write, tmp_path):
     ran = pellicle("read", write(WIDE), "--out", folder)
     assert ran.code == 0
     assert sorted(path.name for path in folder.iterdir()) == [
-        *("film-left.csv", "film-left.png", "film-right.csv", "film-right.png"),
+        *("film-left.csv", "film-left.png", "film-right.csv", "film-right.png")
     ]
     np.testing.assert_allclose(read_spectrum(folder / "film-right.csv").values[0], 0.34, rtol=1e-15)
     again = pellicle("read", write(WIDE), "--out", folder)

@@ -140,10 +140,6 @@ def test_what_cannot_be_asked_of_a_surface(pellicle, tmp_path):
         ("cost", ("--reference", "mpmath"), "--reference is for films"),
         ("cost", ("--tolerance", 0), "--tolerance must be above zero"),
         ("plan", ("--tolerance", -1), "--tolerance must be above zero"),
-        (
-            "simulate",
-            ("--out", tmp_path / "x.csv", "--noise", -1),
-            "--noise must be a standard deviation",
-        ),
+        ("simulate", ("--out", tmp_path / "x.csv", "--noise", -1), "--noise must be a standard deviation"),
     ):
         pellicle(command, tmp_path / "bare.toml", *flags).refused(2, said)

@@ -32,20 +32,76 @@ def test_binary(tmp_path, refused):
         refused(path, DataError, "binary", "export")
 
 
-@pytest.mark.parametrize("text", ["", "\n\n  \n"])
-def test_empty(write, text, refused):
-    refused(write(text), DataError, "is empty", "expected rows")
-
-
-def test_comments_only(write, refused):
-    refused(write("# nothing\n# here\n"), DataError, "only comments", "expected rows")
+NONE = {}
+R = {"signal": "R"}
+DATA = [
+    (NONE, "", "is empty", "expected rows"),
+    (NONE, "\n\n  \n", "is empty", "expected rows"),
+    (NONE, "# nothing\n# here\n", "only comments", "expected rows"),
+    (NONE, "wavelength,R\n", "line", "without any row of two numbers", "expected rows"),
+    (NONE, "some words\nand more\n", "without any row of two numbers"),
+    (NONE, "400\n500\n600\n", "without any row of two numbers"),
+    (NONE, ">>>>>Begin\t1\t2\n", "without any row of two numbers"),
+    (NONE, "wl,R\n400,5,0,11\n500,5,0,21\n", "4 values", "names 2 columns", "semicolons", "decimal commas"),
+    (NONE, "wavelength,R\n400,0.1\n500, # dust\n600,0.3\n", "line 3", "is empty; fill"),
+    *((NONE, f"wavelength,R\n{row}\n{GOOD}", "line 2, column") for row in ("400,abc", "abc,0.1", "400,nan")),
+    (R, "400,abc\n500,0.2\n600,0.3\n", "line 1, column 2", "'abc'"),
+    (NONE, f"wavelength,R\n{GOOD}end of file\n", "line 5", "'end of file'"),
+    ({"range": (400, 800)}, f"wavelength,R\n300,abc\n{GOOD}700,0.1\n800,0.1\n", "line 2", "'abc'"),
+    (NONE, "wavelength,R\n400,0.1\n500,0,2\n600,0.3\n", "line 3 has 3 values", "decimal comma"),
+    (NONE, "wavelength,R\n400,0.1,nan?\n500,0.2\n600,0.3\n", "line 2 has 3 values"),
+    (NONE, "wavelength,R\n400,0,1\n500,0,2\n", "line 2 has 3 values", "header on line 1"),
+    (NONE, "wavelength;R\n1,050;0.49\n1,051;0.50\n", "'1,050'", "'0.49'", "decimal mark", "export it again"),
+    (NONE, "nm,angle,R\n400,30,0.1\n400,60,0.1\n400,60,0.2\n", "line 4", "400 of line 3", "within one angle"),
+    *((NONE, f"wl,R\n{value},0.1\n{GOOD}", "line 2", "not above zero", "delete") for value in (0, -500)),
+    (NONE, "wavelength,R\n0.4,0.1\n0.5,0.2\n0.6,0.3\n", "is unlike nm", "`wavelength_unit="),
+    (R, "1.5,0.1\n2.5,0.2\n3.5,0.3\n", "is unlike nm", "`wavelength_unit="),
+    (NONE, "wl,R\n400,12\n500,49.5\n", "line 3, column", "49.5 is above 1.5", '`signal_unit="percent"`'),
+    ({"signal_unit": "fraction"}, "wavelength,R\n400,1\n500,49.5\n", "line 3", "above 1.5", "`range`"),
+    (NONE, "wl,T (%)\n400,12\n500,151\n", "line 3", "1.51 is above 1.5 for a transmittance", "`range`"),
+    ({"noise": 0.002}, "wavelength,R\n400,0.1\n500,-0.04\n600,0.2\n", "line 3", "more than noise"),
+    (R, "wl,intensity\n400,-1\n500,0\n", "nowhere positive", "check"),
+    (NONE, "nm,R,sigma\n4,0.1,0.01\n5,0.1,0\n", "line 3", "sigma", "not above zero"),
+    *((NONE, f"nm,angle,R\n400,{x},0\n", "line 2, column 'angle'", "90 degrees") for x in (-1, 90, 120)),
+    (NONE, "wl,angle (rad),R\n400,0.3,0.1\n500,0.3,0.1\n", "'rad'", "in degrees"),
+    (NONE, "wavelength,psi_err\n400,1\n500,2\n", "no column is a signal", "`columns=["),
+    (NONE, "x,R\n400,0.1\n500,0.2\n", "'x', 'R'", "`columns=["),
+    *((NONE, f"{names}\n4,0,1\n5,0,1\n", "twice", "`columns`") for names in ("nm,R,R", "nm,R,r", "nm,nm,R")),
+    *((NONE, f"wl,{name},R\n400,0,1\n500,0,1\n", "each be", "`columns`") for name in ("lambda", "energy")),
+    (NONE, "wavenumber,T\n1e-305,0.1\n1e-304,0.2\n", "line 2", "far from any wavelength"),
+    (NONE, "nm,A\n400,-400\n500,0.1\n", "line 2", "column 'A'"),
+    (NONE, f"wavelength (pm),R\n{GOOD}", "'pm'", "`wavelength_unit`"),
+    (NONE, f"wavelength,R (dB)\n{GOOD}", "'db'", "`signal_unit="),
+    ({"columns": "wavelength"}, f"a,b\n{GOOD}", "no column is a signal"),
+]  # fmt: skip
+UM = "wavelength_um,R (%)\n0.4,10\n0.5,20\n"
+TWO = "wl,Rs,Rp\n400,0.1,0.2\n500,0.1,0.2\n"
+USAGE = [
+    (NONE, GOOD, "no header", '`signal="R"`'),
+    (R, "1,2,3,4,5\n2,3,4,5,6\n", "5 columns", "`columns=["),
+    (NONE, "wl,R,T\n400,0.1,0.2\n500,0.1,0.2\n", "both R and T", EITHER),
+    (NONE, "wl,intensity\n400,1\n500,2\n", "uncalibrated", EITHER),
+    (R, "wl,T\n400,0.1\n500,0.2\n", "has T", 'contradicts `signal="R"`'),
+    (NONE, TWO, "'Rs', 'Rp'", '`polarisation="s"`'),
+    ({"polarisation": "unpolarised"}, TWO, "'Rs', 'Rp'", '`polarisation="s"`'),
+    ({"polarisation": "p"}, "wl,Rs\n400,0.1\n500,0.2\n", "measured in s", 'contradicts `polarisation="p"`'),
+    (NONE, "nm,glow,gloss\n4,1,2\n5,2,3\n", "'glow', 'gloss' state no quantity", '`signal=', "`columns=["),
+    (R, "wl,psi,delta\n400,20,170\n500,21,171\n", "psi and delta", 'contradicts `signal="R"`'),
+    (NONE, "theta_i,phi_i,theta_o,phi_o,R\n30,0,30,180,0.4\n", "samples of a BRDF", "`recipe`"),
+    (NONE, "nm,R,Reflectance\n4,0,0\n5,0,0\n", "2 spectra: 'R', 'Ref", '`spectrum="R"`', '`spectrum="all"`'),
+    ({"wavelength_unit": "nm"}, UM, "in um", 'contradicts `wavelength_unit="nm"`', "leave that out"),
+    ({"signal_unit": "fraction"}, UM, "in percent", 'contradicts `signal_unit="fraction"`', "leave that out"),
+    ({"columns": "wavelength,R,T"}, f"a,b\n{GOOD}", "3 names", "has 2"),
+    ({"columns": "wavelength,gloss"}, f"a,b\n{GOOD}", "'gloss'", "use wavelength"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "text", ["wavelength,R\n", "some words\nand more\n", "400\n500\n600\n", ">>>>>Begin\t1\t2\n"]
+    ("error", "row"), [*((DataError, row) for row in DATA), *((UsageError, row) for row in USAGE)]
 )
-def test_no_row_of_two_numbers(write, text, refused):
-    refused(write(text), DataError, "line", "without any row of two numbers", "expected rows")
+def test_refused(write, refused, error, row):
+    options, text, *parts = row
+    refused(write(text), error, *parts, **options)
 
 
 @pytest.mark.parametrize(
@@ -101,46 +157,6 @@ def test_remedies_for_a_whole_axis(write, nm, remedy, refused):
     refused(write(text), DataError, "within one angle", remedy)
 
 
-def test_decimal_commas_between_commas(write, refused):
-    text = "wavelength,R\n400,5,0,11\n500,5,0,21\n600,5,0,31\n"
-    refused(write(text), DataError, "4 values", "names 2 columns", "semicolons", "decimal commas")
-
-
-def test_a_comment_after_an_empty_cell(write, refused):
-    refused(write("wavelength,R\n400,0.1\n500, # dust\n600,0.3\n"), DataError, "line 3", "is empty; fill")
-
-
-@pytest.mark.parametrize("row", ["400,abc", "abc,0.1", "400,nan"])
-def test_a_bad_first_row_is_no_preamble(write, row, refused):
-    refused(write(f"wavelength,R\n{row}\n500,0.2\n600,0.3\n"), DataError, "line 2, column")
-
-
-def test_a_bad_first_row_without_a_header_is_no_preamble(write, refused):
-    refused(write("400,abc\n500,0.2\n600,0.3\n"), DataError, "line 1, column 2", "'abc'", signal="R")
-
-
-def test_text_after_the_rows_began(write, refused):
-    refused(write("wavelength,R\n" + GOOD + "end of file\n"), DataError, "line 5", "'end of file'")
-
-
-def test_parse_errors_apply_outside_the_range_too(write, refused):
-    path = write("wavelength,R\n300,abc\n" + GOOD + "700,0.1\n800,0.1\n")
-    refused(path, DataError, "line 2", "'abc'", range=(400, 800))
-
-
-def test_too_many_values_in_a_row(write, refused):
-    refused(
-        write("wavelength,R\n400,0.1\n500,0,2\n600,0.3\n"), DataError, "line 3 has 3 values", "decimal comma"
-    )
-    refused(write("wavelength,R\n400,0.1,nan?\n500,0.2\n600,0.3\n"), DataError, "line 2 has 3 values")
-    refused(write("wavelength,R\n400,0,1\n500,0,2\n"), DataError, "line 2 has 3 values", "header on line 1")
-
-
-def test_mixed_decimal_marks(write, refused):
-    path = write("wavelength;R\n1,050;0.49\n1,051;0.50\n")
-    refused(path, DataError, "'1,050'", "'0.49'", "decimal mark", "export it again")
-
-
 @pytest.mark.parametrize(
     ("values", "line", "what"),
     [
@@ -156,34 +172,6 @@ def test_wavelengths_that_are_not_monotone(write, values, line, what, refused):
     refused(path, DataError, f"line {line}, column 'wavelength'", what, "delete or correct")
 
 
-def test_wavelengths_that_are_not_monotone_within_one_angle(write, refused):
-    path = write("wavelength,angle,R\n400,30,0.1\n500,30,0.1\n400,60,0.1\n400,60,0.2\n")
-    refused(path, DataError, "line 5", "400 repeats 400 of line 4", "within one angle")
-
-
-@pytest.mark.parametrize("value", ["0", "-500"])
-def test_wavelength_not_above_zero(write, value, refused):
-    refused(write(f"wavelength,R\n{value},0.1\n" + GOOD), DataError, "line 2", "not above zero", "delete")
-
-
-@pytest.mark.parametrize("rows", ["0.4,0.1\n0.5,0.2\n0.6,0.3\n", "1.5,0.1\n2.5,0.2\n3.5,0.3\n"])
-@pytest.mark.parametrize("header", ["", "wavelength,R\n"])
-def test_an_axis_that_looks_like_another_unit(write, header, rows, refused):
-    signal = None if header else "R"
-    refused(write(header + rows), DataError, "is unlike nm", "`wavelength_unit=", signal=signal)
-
-
-def test_percent_without_a_sign(write, refused):
-    path = write("wavelength,R\n400,12\n500,49.5\n600,30\n")
-    refused(path, DataError, "line 3, column 'R'", "49.5 is above 1.5", '`signal_unit="percent"`')
-    refused(path, DataError, "line 3", "above 1.5", "`range`", signal_unit="fraction")
-
-
-def test_above_one_and_a_half_in_percent_too(write, refused):
-    path = write("wavelength,T (%)\n400,12\n500,151\n600,30\n")
-    refused(path, DataError, "line 3", "1.51 is above 1.5 for a transmittance", "`range`")
-
-
 @pytest.mark.parametrize(
     ("header", "row"),
     [("R", "-0.06"), ("R (%)", "-6"), ("R,sigma", "-0.02,0.001"), ("R,sigma", "-0.11,0.02")],
@@ -194,147 +182,16 @@ def test_negative_beyond_noise(write, header, row, refused):
     refused(path, DataError, "line 3, column 'R", "below zero by more than noise", "`range`")
 
 
-def test_negative_beyond_the_noise_of_the_flag(write, refused):
-    path = write("wavelength,R\n400,0.1\n500,-0.04\n600,0.2\n")
-    refused(path, DataError, "line 3", "more than noise", noise=0.002)
-
-
-def test_an_intensity_that_is_nowhere_positive(write, refused):
-    refused(write("wl,intensity\n400,-1\n500,0\n"), DataError, "nowhere positive", "check", signal="R")
-
-
-def test_sigma_not_above_zero(write, refused):
-    refused(write("wl,R,sigma\n400,0.1,0.01\n500,0.1,0\n"), DataError, "line 3", "sigma", "not above zero")
-
-
-@pytest.mark.parametrize("angle", ["-1", "90", "120"])
-def test_impossible_angle(write, angle, refused):
-    path = write(f"wl,angle,R\n400,30,0.1\n500,{angle},0.1\n")
-    refused(path, DataError, "line 3, column 'angle'", "90 degrees", "delete")
-
-
-def test_angle_in_radians(write, refused):
-    refused(write("wl,angle (rad),R\n400,0.3,0.1\n500,0.3,0.1\n"), DataError, "'rad'", "in degrees")
-
-
-def test_no_header_and_no_signal(write, refused):
-    refused(write(GOOD), UsageError, "no header", '`signal="R"`')
-
-
-def test_no_header_and_five_columns(write, refused):
-    refused(write("1,2,3,4,5\n2,3,4,5,6\n"), UsageError, "5 columns", "`columns=[", signal="R")
-
-
-def test_both_r_and_t(write, refused):
-    refused(
-        write("wl,R,T\n400,0.1,0.2\n500,0.1,0.2\n"),
-        UsageError,
-        "both R and T",
-        EITHER,
-    )
-
-
-def test_intensity_without_a_signal(write, refused):
-    refused(write("wl,intensity\n400,1\n500,2\n"), UsageError, "uncalibrated", EITHER)
-
-
-def test_signal_that_is_not_there(write, refused):
-    refused(write("wl,T\n400,0.1\n500,0.2\n"), UsageError, "has T", 'contradicts `signal="R"`', signal="R")
-
-
-def test_two_polarisations(write, refused):
-    path = write("wl,Rs,Rp\n400,0.1,0.2\n500,0.1,0.2\n")
-    refused(path, UsageError, "'Rs', 'Rp'", '`polarisation="s"`')
-    refused(path, UsageError, "'Rs', 'Rp'", '`polarisation="s"`', polarisation="unpolarised")
-    refused(
-        write("wl,Rs\n400,0.1\n500,0.2\n"),
-        UsageError,
-        "measured in s",
-        'contradicts `polarisation="p"`',
-        polarisation="p",
-    )
-
-
-def test_no_signal_column(write, refused):
-    path = write("wavelength,brightness,gloss\n400,0.1,0.2\n500,0.2,0.3\n")
-    refused(path, UsageError, "'brightness', 'gloss' state no quantity", '`signal="R"`', "`columns=[")
-    refused(write("wavelength,psi_err\n400,1\n500,2\n"), DataError, "no column is a signal", "`columns=[")
-
-
 def test_names_that_differ_by_case_are_different_quantities(write):
     spectrum = read_spectrum(write("wavelength,x,y,Y,R\n400,0.1,0.2,0.3,0.4\n500,0.1,0.2,0.3,0.5\n"))
     assert spectrum.values.tolist() == [0.4, 0.5]
 
 
-def test_no_wavelength_column(write, refused):
-    refused(write("x,R\n400,0.1\n500,0.2\n"), DataError, "'x', 'R'", "`columns=[")
-
-
-def test_psi_and_delta_are_not_read_as_something_else(write, refused):
-    path = write("wl,psi,delta\n400,20,170\n500,21,171\n")
-    refused(path, UsageError, "psi and delta", 'contradicts `signal="R"`', signal="R")
-
-
-@pytest.mark.parametrize("header", ["wavelength,R,R", "wavelength,R,r", "wavelength,wavelength,R"])
-def test_a_name_twice(write, header, refused):
-    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "twice", "`columns`")
-
-
-@pytest.mark.parametrize("header", ["wavelength,lambda,R", "wavelength,energy,R"])
-def test_two_columns_that_could_be_the_same(write, header, refused):
-    refused(write(f"{header}\n400,0.1,0.2\n500,0.1,0.2\n"), DataError, "could each be", "`columns`")
-
-
-def test_numbers_that_overflow(write, refused):
-    refused(write("wavenumber,T\n1e-305,0.1\n1e-304,0.2\n"), DataError, "line 2", "far from any wavelength")
-    path = write("nm,A\n400,-400\n500,0.1\n")
-    refused(path, DataError, "line 2", "column 'A'")
-
-
-def test_samples_of_a_brdf(write, refused):
-    path = write("theta_i,phi_i,theta_o,phi_o,R\n30,0,30,180,0.4\n30,0,40,180,0.2\n")
-    refused(path, UsageError, "samples of a BRDF", "`recipe`")
-
-
-def test_two_signals_of_one_kind(write, refused):
-    path = write("wl,R,Reflectance\n400,0.1,0.2\n500,0.1,0.2\n")
-    refused(path, UsageError, "has 2 spectra", "'R', 'Reflectance'", "`spectrum=", '`spectrum="all"`')
-
-
-def test_unknown_units(write, refused):
-    refused(write("wavelength (pm),R\n" + GOOD), DataError, "'pm'", "`wavelength_unit`")
-    refused(write("wavelength,R (dB)\n" + GOOD), DataError, "'db'", "`signal_unit=")
+def test_unknown_units(write):
     path = write("wavelength,R\n" + GOOD)
     for flag in ("wavelength_unit", "signal_unit"):
         with pytest.raises(UsageError, match=f"`{flag}` must be one of .*, not 'furlong'"):
             read_spectrum(path, **{flag: "furlong"})
-
-
-def test_a_flag_that_contradicts_the_file(write, refused):
-    path = write("wavelength_um,R (%)\n0.4,10\n0.5,20\n")
-    refused(
-        path,
-        UsageError,
-        "in um",
-        'contradicts `wavelength_unit="nm"`',
-        "leave that out",
-        wavelength_unit="nm",
-    )
-    refused(
-        path,
-        UsageError,
-        "in percent",
-        'contradicts `signal_unit="fraction"`',
-        "leave that out",
-        signal_unit="fraction",
-    )
-
-
-def test_columns_flag_that_fits_nothing(write, refused):
-    path = write("a,b\n" + GOOD)
-    refused(path, UsageError, "3 names", "has 2", columns="wavelength,R,T")
-    refused(path, UsageError, "'gloss'", "use wavelength", columns="wavelength,gloss")
-    refused(path, DataError, "no column is a signal", columns="wavelength")
 
 
 @pytest.mark.parametrize("noise", [0, -0.1, np.nan, np.inf])

@@ -34,10 +34,7 @@ def packed(*names: str) -> bytes:
         (b'<?xml version="1.0"?>', "a web page or XML"),
         (b'{"wavelength": [400, 500]}', "JSON"),
         (b'[{"R": 0.1}]', "JSON"),
-        (
-            b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n",
-            "a recipe; give it as `recipe`",
-        ),
+        (b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n", "a recipe; give it as `recipe`"),
     ],
 )
 def test_what_is_none_is_named(content, said, refusal, tmp_path):

@@ -8,7 +8,6 @@ import pytest
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, delta_sigma
 
@@ -111,18 +110,6 @@ def test_reflectance_beside_them_is_of_the_same_film(write):
     assert [one.signal for one in found] == [SIGNAL, "R"]
     with pytest.raises(UsageError, match="has generalised psi and delta as well as R"):
         read_spectrum(write(f"nm,{NAMES},R", *COLUMNS, 0.3))
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".nxs"])
-def test_written_files_are_read_back(suffix, tmp_path):
-    sigma = np.linspace(0.01, 0.2, 18).reshape(6, 3)
-    azimuth = np.full(6, 30.0)
-    about = {"delta": DELTA % 360, "delta_sigma": 2 * sigma, "ratios": RATIOS, "azimuth": azimuth}
-    spectrum = Spectrum(NM, PSI, SIGNAL, sigma=sigma, angle=np.full(6, 65.0), **about)
-    back = read_spectrum(write_spectrum(tmp_path / f"film{suffix}", spectrum))
-    for name in ("wavelength", "values", "sigma", "delta", "delta_sigma", "angle", "azimuth"):
-        np.testing.assert_allclose(getattr(back, name), getattr(spectrum, name), rtol=1e-12, err_msg=name)
-    assert back.ratios == RATIOS
 
 
 def test_repeats_are_averaged_on_the_spheres():

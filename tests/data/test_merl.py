@@ -53,13 +53,6 @@ def numbered(tmp_path_factory):
     return path
 
 
-def test_grazing_cells_are_left_out_before_samples_are_chosen(numbered):
-    read = read_brdf_samples(numbered, samples=2000, max_theta=70)
-    assert len(read) == 2000
-    assert max(read.theta_i.max(), read.theta_o.max()) <= 70
-    assert "a direction more than 70 degrees from the normal" in read.notes[-1]
-
-
 def test_each_value_has_the_directions_of_its_cell(numbered):
     read = read_brdf_samples(numbered, samples=2000)
     assert read.channels == ("R", "G", "B")

@@ -34,12 +34,6 @@ def test_counts_of_several_columns_are_ambiguous(tmp_path):
     assert read_counts(path, columns="wavelength,_,counts").values[0] == 2
 
 
-def test_counts_cut_to_a_range(tmp_path):
-    path = tmp_path / "raw.csv"
-    path.write_text("".join(f"{w} {w}\n" for w in range(400, 500, 10)))
-    assert len(read_counts(path, range=(420, 480))) == 7
-
-
 def test_quotient_of_counts_less_the_dark():
     known = np.array([0.5, 0.4, 0.35, 0.33, 0.32])
     truth = np.array([0.1, 0.2, 0.3, 0.2, 0.1])

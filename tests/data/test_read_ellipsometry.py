@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 
 NM = np.array([400.0, 500.0, 600.0])
@@ -45,18 +44,6 @@ def test_names(write, header):
     assert spectrum.sigma is None
     assert spectrum.delta_sigma is None
     assert "psi and delta in degrees" in spectrum.notes
-
-
-@pytest.mark.parametrize("name", ["angle_deg", "angle", "aoi_deg", "aoi", "AOI"])
-def test_angles(write, name):
-    spectrum = read_spectrum(write(f"delta,psi,{name},wavelength\n{rows(DELTA, PSI, [70, 70, 70], NM)}"))
-    assert_film(spectrum)
-    np.testing.assert_array_equal(spectrum.angle, [70, 70, 70])
-
-
-def test_energies(write):
-    spectrum = read_spectrum(write(f"energy,psi,delta\n{rows(1239.8419843320026 / NM, PSI, DELTA)}"))
-    assert_film(spectrum)
 
 
 @pytest.mark.parametrize("given", [DELTA - 360 * (DELTA > 180), DELTA, DELTA - 360 * (DELTA > 185)])
@@ -194,12 +181,6 @@ def test_missing_delta_without_a_flag(write, refused):
     )
 
 
-def test_missing_wavelength(write, refused):
-    refused(
-        write("x,psi,delta\n400,20,170\n"), DataError, "no column is a wavelength", '"angle", "psi", "delta"'
-    )
-
-
 def test_radians_are_not_taken_for_degrees(write, refused):
     small = write("wl,psi,delta\n400,0.35,2.9\n500,0.36,3.0\n")
     refused(small, DataError, "look like radians", "psi_deg")
@@ -225,43 +206,12 @@ def test_impossible_ncs(write, row, refused):
     )
 
 
-def test_angles_of_incidence(write, refused):
-    refused(write("wl,aoi,psi,delta\n400,90,20,170\n"), DataError, "line 2, column 'aoi': 90", "below 90")
-    refused(write("wl,aoi (rad),psi,delta\n400,1,20,170\n"), DataError, "'rad'", "angles in degrees")
-
-
 def test_flags_without_a_meaning(write, refused):
     path = write(f"wl,psi,delta\n{rows(NM, PSI, DELTA)}")
     refused(path, UsageError, "`signal_unit`", signal_unit="percent")
     refused(path, UsageError, "`polarisation`", polarisation="p")
     with pytest.raises(UsageError, match=r"R, T, psi-delta"):
         read_spectrum(path, signal="psi")
-
-
-def test_what_is_written_is_read_again(write):
-    rng = np.random.default_rng(3)
-    nm, angle = np.repeat(np.linspace(300, 900, 30), 3), np.tile([55.0, 65.0, 75.0], 30)
-    made = Spectrum(
-        nm,
-        rng.uniform(0, 90, 90),
-        "psi-delta",
-        sigma=rng.uniform(0.01, 1, 90),
-        angle=angle,
-        delta=rng.uniform(0, 359, 90),
-        delta_sigma=rng.uniform(0.01, 1, 90),
-    )
-    names = {
-        "wavelength_nm": "wavelength",
-        "angle_deg": "angle",
-        "psi_deg": "values",
-        "delta_deg": "delta",
-        "sigma_psi": "sigma",
-        "sigma_delta": "delta_sigma",
-    }
-    table = rows(*(getattr(made, name) for name in names.values()))
-    again = read_spectrum(write(",".join(names) + "\n" + table))
-    for name in names.values():
-        np.testing.assert_allclose(getattr(again, name), getattr(made, name), rtol=1e-11)
 
 
 SHARE = np.array([0.01, 0.2, -0.004])

@@ -7,7 +7,6 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError, UsageError
 
 NM = np.linspace(400.0, 800.0, 6)
@@ -124,19 +123,6 @@ def test_elements_beside_a_reflectance(write):
     assert read_spectrum(path, signal="R").signal == "R"
     with pytest.raises(UsageError, match='Mueller matrix, which contradicts `signal="R"`'):
         read_spectrum(write("nm,m12", M12), signal="R")
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".nc", ".nxs"])
-def test_a_written_spectrum_is_read_back(tmp_path, suffix):
-    random = np.random.default_rng(0)
-    values, sigma = random.uniform(-1, 1, (6, 3)), random.uniform(0.001, 0.01, (6, 3))
-    angle = np.repeat([60.0, 70.0], 3)
-    nm = np.tile([400.0, 500.0, 600.0], 2)
-    spectrum = Spectrum(nm, values, "mueller", sigma=sigma, angle=angle, elements=("m12", "m23", "m44"))
-    back = read_spectrum(write_spectrum(tmp_path / f"matrix{suffix}", spectrum))
-    assert back.elements == spectrum.elements
-    for name in ("wavelength", "angle", "values", "sigma"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(spectrum, name))
 
 
 def test_points_are_sorted_with_their_elements():

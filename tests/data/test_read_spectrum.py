@@ -31,18 +31,6 @@ def assert_film(spectrum):
     np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "   ", ", ", " ; "])
-def test_separators(write, separator):
-    assert_film(read_spectrum(write(f"wavelength{separator}R\n{rows(separator)}")))
-
-
-@pytest.mark.parametrize("separator", [";", "\t", "  "])
-def test_decimal_commas(write, separator):
-    spectrum = read_spectrum(write(f"wavelength_nm{separator}R\n{rows(separator).replace('.', ',')}"))
-    assert_film(spectrum)
-    assert any("decimal commas" in note for note in spectrum.notes)
-
-
 @pytest.mark.parametrize("quotes_in_header", [True, False])
 def test_decimal_commas_in_quotes(write, quotes_in_header):
     """As spreadsheets of a German locale write a CSV with commas between the columns."""
@@ -54,11 +42,6 @@ def test_decimal_commas_in_quotes(write, quotes_in_header):
     assert_film(spectrum)
     assert "decimal commas" in spectrum.notes
     assert not any("separated" in note for note in spectrum.notes)
-
-
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
-def test_encodings(write, encoding):
-    assert_film(read_spectrum(write(f"wavelength,R,Température (°C)\n{rows()}", encoding=encoding)))
 
 
 def test_line_ends_of_windows_and_comments_keep_their_line_numbers(write):
@@ -91,13 +74,6 @@ def test_falling_wavelengths_are_turned_round_with_all_that_belongs_to_them(writ
     np.testing.assert_array_equal(spectrum.lines, [4, 3, 2])
 
 
-def test_no_header_two_columns(write):
-    spectrum = read_spectrum(write(rows(" ")), signal="T")
-    assert_film(spectrum)
-    assert spectrum.signal == "T"
-    assert "no header: column 1 read as the wavelength, column 2 as T" in spectrum.notes
-
-
 def test_no_header_three_and_four_columns_as_refnx_writes_them(write):
     for tail in ("", "\t0.5"):
         text = "".join(f"{w}\t{v}\t0.01{tail}\n" for w, v in zip(WAVELENGTH, VALUES, strict=True))
@@ -122,55 +98,11 @@ def test_a_separator_at_the_end_of_each_row(write):
     assert_film(read_spectrum(write("wavelength,R,\n" + text)))
 
 
-def test_a_preamble_as_filmetrics_writes_it(write):
-    text = (
-        "Sample: oxide 3, wafer 12\nMeasured 03/04/2015 10:32\n\nIntegration 100\n"
-        "Wavelength (nm)\tReflectance (%)\n"
-    )
-    spectrum = read_spectrum(write(text + rows("\t", 100)))
-    np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
-    assert "3 lines of preamble skipped" in spectrum.notes
-
-
 def test_a_preamble_without_column_names(write):
     for separator in (",", " "):
         spectrum = read_spectrum(write("Exported spectrum\n\n" + rows(separator)), signal="R")
         assert_film(spectrum)
         assert "1 line of preamble skipped" in spectrum.notes
-
-
-def test_a_preamble_as_ocean_optics_writes_it(write):
-    text = (
-        "SpectraSuite Data File\n++++++++++++++++++++++++\nDate: Mon May 04 10:11:12 CEST 2015\n"
-        "Integration Time (usec):\t100000 (USB2+H)\nBoxcar:\t5\n"
-        "Number of Pixels in Processed Spectrum: 2048\n"
-        ">>>>>Begin Processed Spectral Data<<<<<\n"
-    )
-    path = write(text + rows("\t") + ">>>>>End Processed Spectral Data<<<<<\n")
-    spectrum = read_spectrum(path, signal="R", signal_unit="fraction")
-    assert_film(spectrum)
-    assert dict(spectrum.declared)["date"] == "Mon May 04 10:11:12 CEST 2015"
-
-
-def test_a_row_of_units_below_the_names(write):
-    spectrum = read_spectrum(write("Wavelength,R\nnm,%\n" + rows(",", 100)))
-    np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
-    assert "signal unit: percent" in spectrum.notes
-
-
-@pytest.mark.parametrize(
-    ("header", "kwargs"),
-    [
-        ("wavelength,R (%)", {}),
-        ("wavelength,%R", {}),
-        ("wavelength,R", {"signal_unit": "percent"}),
-        ("wavelength,R (%)", {"signal_unit": "percent"}),
-        ("x,y", {"columns": "wavelength,R_percent"}),
-    ],
-)
-def test_percent_by_name_or_flag(write, header, kwargs):
-    spectrum = read_spectrum(write(f"{header}\n{rows(scale=100)}"), **kwargs)
-    np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
 
 
 def test_sigma_is_in_the_unit_of_the_signal_unless_it_says_its_own(write):

@@ -52,16 +52,8 @@ def test_a_lamp_in_energies_rises_in_wavelength(written):
     [
         (read_sensitivities, "wavelength_nm,R,G\n500,1,2\n600,1,2\n", ("2 columns beside",)),
         (read_sensitivities, "angle,R,G,B\n5,1,2,3\n6,1,2,3\n", ("0 wavelength columns",)),
-        (
-            read_sensitivities,
-            "wavelength_nm,R,G,B\n500,1,2,3\n600,1,,3\n",
-            ("line 3", "empty"),
-        ),
-        (
-            read_sensitivities,
-            "wavelength_nm,R,G,B\n500,1,2,3\n600,1,-2,3\n",
-            ("line 3", "below zero"),
-        ),
+        (read_sensitivities, "wavelength_nm,R,G,B\n500,1,2,3\n600,1,,3\n", ("line 3", "empty")),
+        (read_sensitivities, "wavelength_nm,R,G,B\n500,1,2,3\n600,1,-2,3\n", ("line 3", "below zero")),
         (read_sensitivities, "wavelength_nm,R,G,B\n500,1,0,3\n600,1,0,3\n", ("'G' is nowhere above zero",)),
         (read_lamp, "wavelength_nm,power\n500,1\n500,2\n600,1\n", ("repeats",)),
         (read_lamp, "wavelength_nm,power\n500,1\n", ("two or more wavelengths",)),

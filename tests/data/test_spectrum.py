@@ -20,31 +20,15 @@ NM = np.array([500.0, 600.0, 700.0])
         (0.3, {"angle": np.full(3, 95.0)}, "`angle` at 500 nm: 95 is not from 0 to 90 degrees"),
         (0.3, {"wavelength": NM - 500}, "`wavelength` at 0 nm: 0 is not above zero"),
         (0.3, {"wavelength": NM.clip(600)}, "`wavelength` at 600 nm: 600 comes twice at one angle"),
-        (
-            95.0,
-            {"signal": "psi-delta", "delta": NM / 10},
-            "`values` at 500 nm: 95 is not from 0 to 90",
-        ),
-        (
-            45.0,
-            {"signal": "psi-delta", "delta": NM},
-            "`delta` at 500 nm: 500 is not from -180 to 360",
-        ),
+        (95.0, {"signal": "psi-delta", "delta": NM / 10}, "`values` at 500 nm: 95 is not from 0 to 90"),
+        (45.0, {"signal": "psi-delta", "delta": NM}, "`delta` at 500 nm: 500 is not from -180 to 360"),
         (
             45.0,
             {"signal": "psi-delta", "delta": NM / 10, "depolarisation": np.full(3, 2.3)},
             "`depolarisation` at 500 nm: 2.3 is not from -0.5 to 1.05, as a depolarisation is, a fraction",
         ),
-        (
-            30.0,
-            {"path": "a.csv", "name": "Rp"},
-            "a.csv [Rp]: `values` at 500 nm: 30 is",
-        ),
-        (
-            30.0,
-            {"path": "a.csv", "lines": np.arange(3)},
-            "a.csv: line 0, `values` at 500 nm: 30 is",
-        ),
+        (30.0, {"path": "a.csv", "name": "Rp"}, "a.csv [Rp]: `values` at 500 nm: 30 is"),
+        (30.0, {"path": "a.csv", "lines": np.arange(3)}, "a.csv: line 0, `values` at 500 nm: 30 is"),
     ],
 )
 def test_impossible_values(values, changes, message):

@@ -13,7 +13,7 @@ from pellicle.data.repeated_sweeps import mean_spectrum
 from pellicle.errors import UsageError
 
 NM = np.linspace(400, 700, 7)
-ARRAYS = ("wavelength", "values", "sigma", "angle", "delta", "delta_sigma", "depolarisation")
+ARRAYS = ("wavelength", "values", "sigma", "angle", "delta", "delta_sigma", "depolarisation", "azimuth")
 
 
 def reflectance(**changes):
@@ -36,6 +36,19 @@ def angles(**changes):
     )
 
 
+def elements():
+    random, angle = np.random.default_rng(0), np.repeat([60.0, 70.0], 3)
+    about = {"sigma": random.uniform(0.001, 0.01, (6, 3)), "elements": ("m12", "m23", "m44")}
+    return pl.Spectrum(np.tile(NM[:3], 2), random.uniform(-1, 1, (6, 3)), "mueller", angle=angle, **about)
+
+
+def ratios():
+    psi, sigma = np.linspace(0, 60, 21).reshape(7, 3), np.linspace(0.01, 0.2, 21).reshape(7, 3)
+    about = {"delta": 5 * psi, "delta_sigma": 2 * sigma, "ratios": ("ane", "aps", "asp")}
+    place = {"angle": np.full(7, 65.0), "azimuth": np.full(7, 30.0)}
+    return pl.Spectrum(NM, psi, "generalised-psi-delta", sigma=sigma, **about, **place)
+
+
 CASES = {
     "R": reflectance(),
     "T with errors": reflectance(signal="T", sigma=np.full(7, 1 / 3)),
@@ -43,17 +56,25 @@ CASES = {
     "sweeps": mean_spectrum([reflectance(values=0.3 + 0.01 * np.cos(NM + k)) for k in range(3)]),
     "declared": reflectance(declared=(("instrument", "A # 1"), ("date", "2024-01-01"))),
     "ellipsometry": angles(),
+    "Mueller": elements(),
+    "generalised": ratios(),
     "folded": dataclasses.replace(angles(), delta=np.linspace(5, 175, 14), folded=True),
 }
 
 
-@pytest.mark.parametrize("spectrum", CASES.values(), ids=CASES.keys())
-def test_csv_is_read_back_unchanged(tmp_path, spectrum):
-    path = pl.write_spectrum(tmp_path / "out.csv", spectrum)
-    again = read_spectrum(path)
+FILES = [(name, ".csv") for name in CASES]
+FILES += [(name, suffix) for name in ("ellipsometry", "Mueller", "generalised") for suffix in (".nc", ".nxs")]
+
+
+@pytest.mark.parametrize(("name", "suffix"), FILES)
+def test_a_written_spectrum_is_read_back_unchanged(tmp_path, name, suffix):
+    if suffix != ".csv":
+        pytest.importorskip("h5netcdf")
+    spectrum = CASES[name]
+    again = read_spectrum(pl.write_spectrum(tmp_path / f"out{suffix}", spectrum))
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(again, name), getattr(spectrum, name), err_msg=name)
-    for name in ("signal", "polarisation", "calibrated", "folded"):
+    for name in ("signal", "polarisation", "calibrated", "folded", "elements", "ratios"):
         assert getattr(again, name) == getattr(spectrum, name)
     assert len(again.sweeps) == len(spectrum.sweeps)
     assert dict(again.declared).items() >= dict(spectrum.declared).items()

@@ -15,7 +15,7 @@ from pellicle.materials import Material, UnknownMaterial, material, names, pages
 from pellicle.materials import catalogue as catalogue_module
 from pellicle.materials import contents as index
 from pellicle.materials.page import contents, csv_contents, database_entries, entry_contents, load_yaml
-from pellicle.optics.pair import Pair, imag, is_real, real
+from pellicle.optics.pair import imag, is_real, real
 
 NAMES = [entry.name for entry in names()]
 PAGES = [page.path for page in pages()]
@@ -92,22 +92,6 @@ def test_pages_agree_with_the_resampled_tables(shared_data):
     assert compared >= 45
 
 
-@pytest.mark.parametrize(
-    ("name", "nm", "n", "tolerance"),
-    [
-        ("SiO2", 587.5618, 1.45846, 5e-6),  # Malitson 1965
-        ("BK7", 587.5618, 1.51680 + 9.75e-9j, 5e-6),  # SCHOTT data sheet
-        ("Si", 550.0, 4.077 + 0.02797j, 1e-3),  # Green 2008, table 1: n 4.077, α 6.39e3 /cm
-        ("Au", 616.8, 0.21 + 3.272j, 1e-9),  # Johnson and Christy 1972, table I, 2.01 eV
-        ("water", 550.0, 1.333 + 1.96e-9j, 1e-9),  # Hale and Querry 1973, table I
-        ("sapphire", 587.6, 1.7682, 1e-4),  # Malitson 1962
-        ("HgS/Bond-o", 620.0, 2.9028, 3e-3),  # Bond 1967, measured; Bhar's formula is a fit to it
-    ],
-)
-def test_published_indices(name, nm, n, tolerance):
-    assert abs(at(name, nm) - n) < tolerance
-
-
 def test_defaults_are_the_pages_that_their_reasons_speak_of():
     expected = {
         "Au": "main/Au/Johnson",
@@ -169,10 +153,6 @@ def test_a_table_whose_k_is_zero_is_real_and_needs_no_warning():
     assert source.has_extinction
     assert is_real(source.index(jnp.array([500.0])))
     assert source.warnings() == []
-
-
-def test_an_absorbing_page_is_a_pair():
-    assert isinstance(material("Au").index(500.0), Pair)
 
 
 def test_formula_with_tabulated_k_is_known_where_both_are():

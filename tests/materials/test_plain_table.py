@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.materials import material
-from pellicle.optics.pair import imag, is_real, real
+from pellicle.optics.pair import imag, real
 
 
 @pytest.fixture
@@ -40,18 +40,6 @@ def test_the_same_table_in_many_spellings(write, text):
     value = source.index(np.array([450.0, 500.0]))
     np.testing.assert_allclose(real(value), [1.475, 1.45], rtol=1e-6)
     np.testing.assert_allclose(imag(value), [0.0875, 0.075], rtol=1e-6)
-
-
-def test_without_k_it_is_real_and_warns(write):
-    source = material(write("wavelength_nm,n\n400,1.5\n600,1.4\n"))
-    assert is_real(source.index(500.0))
-    assert "no data for k" in source.warnings()[0]
-
-
-def test_k_of_zero_is_real_and_needs_no_warning(write):
-    source = material(write("wavelength_nm,n,k\n400,1.5,0\n600,1.4,0\n"))
-    assert is_real(source.index(500.0))
-    assert source.warnings() == []
 
 
 def test_any_existing_file_is_a_table(write):

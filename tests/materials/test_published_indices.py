@@ -11,6 +11,14 @@ from pellicle.materials import material
 
 # page, wavelength (nm), n + ik, tolerance, source
 PUBLISHED = [
+    # the first pages, by the papers and data sheets
+    ("SiO2", 587.5618, 1.45846, 5e-6, "Malitson 1965"),
+    ("BK7", 587.5618, 1.51680 + 9.75e-9j, 5e-6, "SCHOTT data sheet"),
+    ("Si", 550.0, 4.077 + 0.02797j, 1e-3, "Green 2008, table 1: n 4.077, α 6.39e3 /cm"),
+    ("Au", 616.8, 0.21 + 3.272j, 1e-9, "Johnson and Christy 1972, table I, 2.01 eV"),
+    ("water", 550.0, 1.333 + 1.96e-9j, 1e-9, "Hale and Querry 1973, table I"),
+    ("sapphire", 587.6, 1.7682, 1e-4, "Malitson 1962"),
+    ("HgS/Bond-o", 620.0, 2.9028, 3e-3, "Bond 1967, measured; Bhar's formula is a fit to it"),
     # crystals and glasses: handbooks of minerals and gems, data sheets of the makers
     ("quartz", 589.3, 1.54424, 1e-4, "CRC Handbook, quartz n_o"),
     ("SiO2/Ghosh-e", 589.3, 1.55335, 1e-4, "CRC Handbook, quartz n_e"),

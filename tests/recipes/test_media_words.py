@@ -94,8 +94,7 @@ def test_a_call_fixes_them():
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [("cauchy(1,2,3,4)", "1 to 3 numbers"), ("cauchy()", "got 0"), ("cauchy(a)", "'a'")],
+    ("text", "message"), [("cauchy(1,2,3,4)", "1 to 3 numbers"), ("cauchy()", "got 0"), ("cauchy(a)", "'a'")]
 )
 def test_calls_refused(text, message):
     with pytest.raises(UsageError, match=message):

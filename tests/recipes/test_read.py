@@ -48,10 +48,7 @@ def test_a_byte_order_mark(write):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            b"\xff\xfe\x00",
-            "is not UTF-8 text, and a recipe is a TOML file; data files are arguments",
-        ),
+        (b"\xff\xfe\x00", "is not UTF-8 text, and a recipe is a TOML file; data files are arguments"),
         ("[scene\n", "is not TOML, as a recipe must be: .*line 1"),
         ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
         (SURFACE.replace("model", "modle"), r"scene\.surface\.model is missing"),

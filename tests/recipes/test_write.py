@@ -185,10 +185,7 @@ class _Own(AbstractDispersion):
         (pl.Scene(pl.Layer(_Own(), 100.0, "top"), "Si"), "top: a recipe cannot express a medium .* _Own"),
         (pl.Scene(pl.Layer(1.5, 9.0), WithExtinction(pl.medium(1.5), pl.medium(0.1))), "the substrate"),
         (pl.Scene(pl.Layer(1.5, 9.0), "Si", instrument=pl.Instrument(scale=Drift(1))), "scale"),
-        (
-            pl.Scene(pl.Layer(1.5, 9.0), "Si", light=pl.Light([500.0, 600.0], [0.0, 9.0])),
-            "angle",
-        ),
+        (pl.Scene(pl.Layer(1.5, 9.0), "Si", light=pl.Light([500.0, 600.0], [0.0, 9.0])), "angle"),
         (pl.Scene(pl.Layer(D.Spline((400.0, 700.0), (1.5, 1.4)), 9.0), "Si"), "layer 1: .* Spline"),
     ],
 )

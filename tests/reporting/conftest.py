@@ -60,10 +60,7 @@ def fit() -> Fit:
             "instrument.offset": Estimate("instrument.offset", 0.3, 0.02, "", -math.inf, math.inf, True),
             "B": Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
         },
-        rivals=(
-            Rival({"A": 1.33, "thickness": 242.87}, 0.69),
-            Rival({"A": 1.4, "thickness": 963.57}, 14.2),
-        ),
+        rivals=(Rival({"A": 1.33, "thickness": 242.87}, 0.69), Rival({"A": 1.4, "thickness": 963.57}, 14.2)),
         chi2_reduced=1.02,
         rms=0.00141,
         effective_points=12.0,
@@ -98,13 +95,7 @@ def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
     psi, delta = np.linspace(20.0, 40.0, size), np.linspace(300.0, 420.0, size) % 360
     turned = (delta + 2.0) % 360
     spectrum = Spectrum(
-        wavelength,
-        psi + 0.1,
-        "psi-delta",
-        angle=angle,
-        path="/data/film.csv",
-        sha256="ab" * 32,
-        delta=turned,
+        wavelength, psi + 0.1, "psi-delta", angle=angle, path="/data/film.csv", sha256="ab" * 32, delta=turned
     )
     zeros = np.zeros(size)
     arrays = {

@@ -241,16 +241,7 @@ def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tm
     frame = pd.read_csv(tmp_path / "summary.csv", comment="#")
     names = ("thickness", "k", "instrument.scale", "n")
     columns = [column for name in names for column in (name, f"{name}_stderr")]
-    assert list(frame) == [
-        "path",
-        "status",
-        "verdict",
-        *columns,
-        "rms",
-        "chi2_reduced",
-        "sha256",
-        "error",
-    ]
+    assert list(frame) == ["path", "status", "verdict", *columns, "rms", "chi2_reduced", "sha256", "error"]
     assert list(frame["status"]) == ["converged", "failed", "converged"]
     assert frame["path"][1] == "c, d.csv"
     assert frame["error"][1] == "no such file"

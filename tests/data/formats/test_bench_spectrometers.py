@@ -120,20 +120,6 @@ def test_jasco_what_cannot_be_read(refused):
 DPT = (SAMPLES / "bruker_dpt/energies.dpt").read_text(encoding="utf-8")
 
 
-HITACHI = """\
-Sample:\tfilm 7
-File name:\ta.UDS
-Run Date:\t10:00:00, 03/05/2024
-Model:\tUH4150 Spectrophotometer
-Data Mode:\t%R
-Starting Wavelength:\t800.00 nm
-Data Points
-nm\t%R
-800.00\t12.5
-799.00\t25.0
-"""
-
-
 def test_a_dpt_states_nothing(write):
     path = write(DPT, "film.dpt")
     for asked in ({}, {"signal": "R"}, {"signal": "R", "wavelength_unit": "cm-1"}):
@@ -148,26 +134,3 @@ def test_a_dpt_in_nm(write):
     path = write(DPT.replace("3999.5", "900").replace("2000.0", "800").replace("1000.0", "700"), "film.DPT")
     asked = {"signal": "T", "wavelength_unit": "nm", "signal_unit": "absorbance"}
     np.testing.assert_allclose(read_spectrum(path, **asked).values, 10.0 ** -np.array([0.75, 0.5, 0.25]))
-
-
-def test_hitachi(write):
-    spectrum = read_spectrum(write(HITACHI))
-    np.testing.assert_array_equal(spectrum.values, [0.25, 0.125])
-    facts = dict(spectrum.declared)
-    assert (spectrum.signal, facts["sample"]) == ("R", "film 7")
-    assert facts["instrument"] == "UH4150 Spectrophotometer"
-
-
-@pytest.mark.parametrize(
-    ("text", "signal", "values"),
-    [
-        ('"Wavelength(nm)","%T"\n800,50\n799,25\n', "T", [0.25, 0.5]),
-        ("nm, A\n800.000000,1.0\n799.000000,2.0\n", "T", [0.01, 0.1]),
-        ("Wavelength(nm);Reflectance(%)\n800,5;12,5\n799;25,0\n", "R", [0.25, 0.125]),
-        ('"Wavelength (nm)"\t"Reflectance"\n800\t0,5\n799,5\t0,25\n', "R", [0.25, 0.5]),
-    ],
-)
-def test_thermo_uv_winlab_and_filmetrics(write, text, signal, values):
-    spectrum = read_spectrum(write(text))
-    assert spectrum.signal == signal
-    np.testing.assert_allclose(spectrum.values, values)

@@ -175,11 +175,7 @@ def test_static(write):
 
 
 def test_dynamic(write, refused):
-    refused(
-        TIMES,
-        "has 3 spectra: '4.953 s', '14.858 s', '24.766 s'; choose one",
-        '`spectrum="4.953 s"`',
-    )
+    refused(TIMES, "has 3 spectra: '4.953 s', '14.858 s', '24.766 s'; choose one", '`spectrum="4.953 s"`')
     second = read_spectrum(write(TIMES), spectrum="14.858 s")
     np.testing.assert_allclose(second.values, [30.0, 45.0], atol=1e-3)
     np.testing.assert_allclose(second.delta, [30.0, 180.0], atol=1e-3)
@@ -201,12 +197,6 @@ def test_film_sense_refused(refused):
     refused(FILM_SENSE.replace("0.99845\t16.5071", ""), "line 5 is not N, C, S")
     refused(FILM_SENSE.replace("0.50000\t", "1.50000\t"), "line 5", "degree of polarisation")
     refused(FILM_SENSE.replace("450.25", "blue"), "line 5", "'blue'")
-    refused(
-        TIMES.replace("Blue_N", "Blue_X"),
-        "should name Time and N, C, S and P of each of its 2 LEDs",
-    )
+    refused(TIMES.replace("Blue_N", "Blue_X"), "should name Time and N, C, S and P of each of its 2 LEDs")
     refused(TIMES.partition("Thick")[0], "no measurement")
-    refused(
-        TIMES.replace("\t0.0019\t3.25\n24", "\n24"),
-        "line 7 has 13 values where the heading names 15",
-    )
+    refused(TIMES.replace("\t0.0019\t3.25\n24", "\n24"), "line 7 has 13 values where the heading names 15")

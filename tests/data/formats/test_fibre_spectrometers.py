@@ -42,11 +42,6 @@ def test_avantes_facts(write):
     assert (facts["sample"], facts["integration_time"]) == ("film 3", "175 ms")
 
 
-def test_zeros_in_the_text(write):
-    content = AVASOFT_7.encode().replace(b"Wave", b"Wave\0").replace(b"1501000U1", b"1501000U1\0\0")
-    np.testing.assert_array_equal(read_spectrum(write(content)).values, [0.5, 0.25, 0.125])
-
-
 def test_absorbance(write):
     text = AVASOFT_7.replace("Reflectance", "Absorbance").replace("[%]", "[A.U.]")
     values = read_spectrum(

@@ -54,13 +54,7 @@ def test_the_forms_of_a_table_are_decoded(form, write):
 
 def test_the_example_of_the_standard(write):
     """McDonald and Wilks, table VII: one sequence of ordinates in four forms."""
-    forms = (
-        "1 1 2 3 3 2 1 0 -1 -2 -3",
-        "1+1+2+3+3+2+1+0-1-2-3",
-        "1ABCCBA@abc",
-        "1AJJ%jjjjjj",
-        "1AJJ%jX",
-    )
+    forms = ("1 1 2 3 3 2 1 0 -1 -2 -3", "1+1+2+3+3+2+1+0-1-2-3", "1ABCCBA@abc", "1AJJ%jjjjjj", "1AJJ%jX")
     for form in forms:
         text = jcamp(form, FIRSTX="300", LASTX="309", NPOINTS="10", XFACTOR="300", YFACTOR="0.01")
         values = read_spectrum(write(text), calibrated=False).values

@@ -8,8 +8,7 @@ import pytest
 
 from pellicle.data.formats import hdf5_reading, isolated
 from pellicle.data.formats import nexus as nexus_reader
-from pellicle.data.read_spectrum import read_spectra, read_spectrum
-from pellicle.data.write_spectrum import write_spectrum
+from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
 
 h5py = pytest.importorskip("h5py")
@@ -23,11 +22,10 @@ DELTA = np.array([[170.0, 171.0, 172.0], [160.0, 161.0, 162.0]])
 
 @pytest.fixture(autouse=True)
 def in_this_process(request, monkeypatch):
-    """Read without a child process, whose start takes 0.25 s; tests named `in_a_child` do as users do."""
+    """Read without a child process, whose start takes 0.25 s; tests/data/test_write_spectrum.py has it."""
     if "in_a_child" not in request.node.name:
-        monkeypatch.setattr(
-            isolated, "call", lambda reader, content, path: nexus_reader.read_hdf5(content, path)
-        )
+        own = lambda reader, content, path: nexus_reader.read_hdf5(content, path)  # noqa: E731
+        monkeypatch.setattr(isolated, "call", own)
 
 
 def nexus(fill):
@@ -161,22 +159,6 @@ def test_two_groups_are_chosen_by_name(write, refused):
     np.testing.assert_allclose(read_spectrum(write(content), spectrum="/entry/other").values, R / 2)
 
 
-def test_what_pellicle_writes_is_read_back_in_a_child(write, tmp_path):
-    pytest.importorskip("h5netcdf")
-    pytest.importorskip("xarray")
-    rows = (
-        "wavelength_nm,angle_deg,psi_deg,delta_deg,depolarisation\n400,60,20,170,0.01\n500,60,21,171,0.02\n"
-    )
-    [one] = read_spectra(write(rows, "one.csv"))
-    for name in ("one.nxs", "one.nc"):
-        [again] = read_spectra(write_spectrum(tmp_path / name, one))
-        np.testing.assert_allclose(again.wavelength, one.wavelength)
-        np.testing.assert_allclose(again.values, one.values)
-        np.testing.assert_allclose(again.delta, one.delta)
-        np.testing.assert_allclose(again.angle, 60)
-        np.testing.assert_allclose(again.depolarisation, [0.01, 0.02])
-
-
 def linked(link):
     def fill(file):
         data = nxdata(file)
@@ -263,10 +245,6 @@ def test_the_extra_is_named(refused, monkeypatch):
     content = nexus(nxdata)
     monkeypatch.setitem(sys.modules, "h5py", None)
     refused(content, "h5py", "pip install 'pellicle[formats]'")
-
-
-def test_files_are_refused_in_a_child(refused):
-    refused(nexus(lambda file: put(file, "image", np.ones((3, 3)))), "without a wavelength")
 
 
 READERS = """
