@@ -38,8 +38,3 @@ def test_a_table_of_films_at_normal_incidence():
 def test_other_films_are_refused(scene, reason):
     with pytest.raises(ValueError, match=reason):
         colour_cost(scene)
-
-
-def test_a_tolerance_must_be_above_zero():
-    with pytest.raises(ValueError, match="above zero"):
-        pl.cost(pl.Scene(pl.Layer(1.4, 10.0), 3.9), space="srgb", tolerance=0.0)

@@ -136,18 +136,6 @@ def test_the_energy_warning_gives_the_albedo():
     assert energy_warning(PUBLISHED, SURFACE | {"specular": 0.01, "diffuse": 0.1}) is None
 
 
-def test_albedo_of_known_surfaces():
-    def grey(p, i, o):
-        return p["rho"] / jnp.pi + 0 * o
-
-    assert np.asarray(directional_albedo(grey, {"rho": 0.6}, 50.0)) == pytest.approx(0.6, rel=1e-6)
-
-    def mirror(p, i, o):  # normal incidence: ∫ cos^20 cos dω = 2π/22
-        return o[..., 2:3] ** 20 + 0 * o
-
-    assert np.asarray(directional_albedo(mirror, {}, 0.0)) == pytest.approx(2 * np.pi / 22, rel=1e-6)
-
-
 KEYS = ("thickness", "exponent_reflection", "exponent_transmission", "deviation", "azimuth", "n")
 
 

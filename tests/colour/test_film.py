@@ -133,13 +133,6 @@ def test_gradients(name):
     )
 
 
-def test_total_reflection_in_the_film():
-    """A film of lower index than the ambient, beyond its critical angle."""
-    result = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="gaussians-8").xyz
-    expected = film_colour(300.0, 1.2, 1.5, ambient=1.5, angle=70.0, method="uniform-64").xyz
-    np.testing.assert_allclose(result, expected, atol=0.01)
-
-
 @pytest.mark.parametrize("name", ["rainbow", "points-645-525", "uniform-0", "nodes-7-500", "gaussians-9"])
 def test_unknown_methods_are_refused(name):
     with pytest.raises(ValueError, match="expected"):

@@ -68,13 +68,6 @@ def test_each_rule_by_its_definition():
 
 
 @EVERY_RULE
-@given(part, part)
-def test_limits(rule, host, inclusion):
-    assert epsilon(rule, host, inclusion, 0.0) == pytest.approx(complex(*host) ** 2, rel=1e-9, abs=1e-12)
-    assert epsilon(rule, host, inclusion, 1.0) == pytest.approx(complex(*inclusion) ** 2, rel=1e-9, abs=1e-12)
-
-
-@EVERY_RULE
 @given(st.floats(0.3, 5.0), st.floats(0.3, 5.0), st.floats(0.0, 1.0))
 def test_wiener_bounds(rule, host, inclusion, f):
     """Between the harmonic and the arithmetic mean of transparent permittivities."""

@@ -148,11 +148,6 @@ def test_a_tolerance_that_is_none_is_refused(tolerance):
         pl.plan(OVER_GOLD, tolerance)
 
 
-def test_a_tolerance_needs_wavelengths():
-    with pytest.raises(ValueError, match="give the light its wavelengths"):
-        pl.plan(scene(wavelength=None), 1e-3)
-
-
 @pytest.mark.slow
 def test_ellipsometry_counts_in_degrees():
     thing = scene(1.46 + 1e-4j, signal="psi-delta", angle=70.0)

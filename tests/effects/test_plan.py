@@ -23,6 +23,12 @@ FREE_ANGLE = pl.Free(0, 60, start=0.0)
 
 
 BANDWIDTH = pl.Instrument(bandwidth=5.0)
+UNEVEN = pl.Instrument(thickness_spread=3)
+SHIFTED = pl.Instrument(angle_shift=FREE_ANGLE)
+CONE = pl.Instrument(numerical_aperture=0.3)
+BLURRED = scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH)
+THICK = scene(thickness=2.5e5)
+PLATES = pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air"))
 GRADED = pl.Graded(1.46, 2.0, pl.profile.Linear(0.0, pl.Free(0.5, 1.0)))
 TABLE = [
     ("absorption", False, "no layer has any extinction", scene()),
@@ -53,13 +59,8 @@ TABLE = [
     ("oblique", True, "the angle of incidence is free", scene(angle=FREE_ANGLE)),
     ("oblique", True, "the angle of incidence is shifted", scene(instrument=pl.Instrument(angle_shift=1.0))),
     ("tunnelling", False, "no real index", scene(1.33, ambient=1.52, angle=55.0)),
-    (
-        "tunnelling",
-        True,
-        "in the layer",
-        scene(1.33, ambient=1.52, angle=55.0, instrument=pl.Instrument(angle_shift=FREE_ANGLE)),
-    ),
-    ("polarisation", True, "mean of s and p", scene(instrument=pl.Instrument(angle_shift=FREE_ANGLE))),
+    ("tunnelling", True, "in the layer", scene(1.33, ambient=1.52, angle=55.0, instrument=SHIFTED)),
+    ("polarisation", True, "mean of s and p", scene(instrument=SHIFTED)),
     ("polarisation", False, "s and p are equal at normal incidence", scene()),
     ("polarisation", False, "the light is p-polarised", scene(angle=30.0, polarisation="p")),
     ("polarisation", True, "the mean of s and p", scene(angle=30.0)),
@@ -72,65 +73,30 @@ TABLE = [
     ("coherence", False, "monochromatic", scene()),
     ("coherence", False, "monochromatic", scene(instrument=pl.Instrument(bandwidth=0, thickness_spread=0.0))),
     ("coherence", True, "damped by bandwidth", scene(instrument=BANDWIDTH)),
-    ("coherence", True, "by uneven thickness", scene(instrument=pl.Instrument(thickness_spread=3))),
-    (
-        "coherence",
-        True,
-        "by bandwidth and uneven thickness",
-        scene(instrument=pl.Instrument("free", 0.0, 1, 1)),
-    ),
+    ("coherence", True, "by uneven thickness", scene(instrument=UNEVEN)),
+    ("coherence", True, "by bandwidth and uneven", scene(instrument=pl.Instrument("free", 0.0, 1, 1))),
     ("coherence", True, "bandwidth", scene(instrument=pl.Instrument(bandwidth=pl.Free(0, 9, start=0.0)))),
-    (
-        "coherence",
-        True,
-        "each averaged over 15 nodes",
-        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
-    ),
-    (
-        "orders",
-        False,
-        "averaged over nodes instead",
-        scene(signal="psi-delta", angle=60.0, instrument=BANDWIDTH),
-    ),
-    (
-        "coherence",
-        True,
-        "fringes every 0.99 nm are narrower than the sampling of 50 nm",
-        scene(thickness=2.5e5),
-    ),
+    ("coherence", True, "each averaged over 15 nodes", BLURRED),
+    ("orders", False, "averaged over nodes instead", BLURRED),
+    ("coherence", True, "fringes every 0.99 nm are narrower than the sampling of 50 nm", THICK),
     ("coherence", False, "monochromatic", scene(thickness=pl.Free(10, 2.5e5))),
     ("coherence", False, "monochromatic", scene(thickness=2.5e5, wavelength=np.array([600.0]))),
-    ("orders", True, "no order remains", scene(thickness=2.5e5)),
+    ("orders", True, "no order remains", THICK),
     ("roughness", False, "no face has a roughness", scene()),
     ("roughness", True, "1 rough: up to 3 nm", scene(pl.Layer(1.46, 300.0, roughness=3.0))),
     ("stack", True, "rough faces", scene(pl.Layer(1.46, 300.0, roughness=FREE_K))),
     ("angle-spread", False, "no cone of light", scene()),
-    (
-        "angle-spread",
-        True,
-        "within 17.5° of its axis",
-        scene(instrument=pl.Instrument(numerical_aperture=0.3)),
-    ),
+    ("angle-spread", True, "within 17.5° of its axis", scene(instrument=CONE)),
     ("oblique", True, "the light's cone has oblique rays", scene(instrument=pl.Instrument(angle_spread=5.0))),
     ("polarisation", True, "cone has s and p", scene(instrument=pl.Instrument(angle_spread=5.0))),
-    (
-        "back-face",
-        True,
-        "2 incoherent",
-        pl.Scene([pl.Plate(1.5), pl.Layer(1.46, 9.0)], pl.Substrate(1.5, "air")),
-    ),
+    ("back-face", True, "2 incoherent", PLATES),
     ("dispersion", False, "no index varies", scene()),
     ("dispersion", False, "one wavelength", scene(Cauchy(1.4, 1e4), wavelength=np.array([600.0]))),
     ("dispersion", True, "the index of layer and substrate varies", scene("SiO2", "Si")),
     ("dispersion", True, "the index of layer varies", scene(Cauchy(1.4, pl.Free(0, 1)))),
     ("opaque", False, "light may reach every layer", scene(0.2 + 3j)),
     ("precision", True, "double", scene()),
-    (
-        "coherence",
-        True,
-        "by uneven thickness, each averaged over 15 nodes",
-        scene(2 + 0.1j, instrument=pl.Instrument(thickness_spread=3)),
-    ),
+    ("coherence", True, "by uneven thickness, each averaged", scene(2 + 0.1j, instrument=UNEVEN)),
     ("orders", False, "the closed form sums all orders", scene()),
     ("orders", True, "over the bounds", scene(instrument=BANDWIDTH)),
 ]

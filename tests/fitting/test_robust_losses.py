@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import least_squares
 
 import pellicle as pl
-from pellicle.errors import UsageError
 from pellicle.fitting.robust_losses import LOSSES, inflation, spread
 
 from ..airy import airy
@@ -68,8 +67,3 @@ def test_spread_and_inflation_of_normal_noise():
     huber = LOSSES["huber"]
     variance = inflation(huber, z) / np.mean(huber.weight(z))
     assert variance == pytest.approx(1 / 0.95, rel=0.01)
-
-
-def test_an_unknown_loss_is_refused(film, measured):
-    with pytest.raises(UsageError, match=r"loss must be one of least-squares, huber, student-t, not 'L1'"):
-        pl.fit(measured(film(), 430.0), film(), loss="L1")

@@ -161,18 +161,27 @@ def test_the_first_status_that_holds_is_given():
     assert judge(**wrong) is Status.CONVERGED
 
 
+def judged(*parameters, rivals=(), natural=frozenset()):
+    """The status of a fit that has converged and is no misfit."""
+    return judge(
+        parameters={p.name: p for p in parameters},
+        converged=True,
+        misfit=False,
+        rivals=rivals,
+        natural=natural,
+    )
+
+
 def test_a_rival_within_the_errors_is_no_rival():
-    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False}
-    right["parameters"] = {"thickness": estimate(stderr=10.0)}
-    assert judge(**(right | {"rivals": (Rival({"thickness": 325.0}, 1.0),)})) is Status.CONVERGED
-    assert judge(**(right | {"rivals": (Rival({"thickness": 335.0}, 1.0),)})) is Status.AMBIGUOUS
+    near, far = ((Rival({"thickness": nm}, 1.0),) for nm in (325.0, 335.0))
+    assert judged(estimate(stderr=10.0), rivals=near) is Status.CONVERGED
+    assert judged(estimate(stderr=10.0), rivals=far) is Status.AMBIGUOUS
 
 
-def test_natural_bounds_and_instrument_bounds_do_not_count():
-    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False, "rivals": ()}
-    right["parameters"] = {"k": estimate("k", 0.0, 0.1, True), "thickness": estimate()}
-    assert judge(**right) is Status.AT_BOUND
-    assert judge(**(right | {"natural": frozenset({"k"})})) is Status.CONVERGED
+def test_natural_bounds_do_not_count():
+    k = estimate("k", 0.0, 0.1, True)
+    assert judged(k, estimate()) is Status.AT_BOUND
+    assert judged(k, estimate(), natural=frozenset({"k"})) is Status.CONVERGED
 
 
 @pytest.mark.parametrize(
@@ -196,16 +205,13 @@ def test_natural_bounds_and_instrument_bounds_do_not_count():
     ],
 )
 def test_a_default_bound_is_a_remark_beside_a_thickness_that_is_known(parameters, status):
-    given = {"converged": True, "misfit": False, "rivals": (), "natural": frozenset()}
-    assert judge(parameters={p.name: p for p in parameters}, **given) is status
+    assert judged(*parameters) is status
 
 
 def test_without_a_thickness_every_free_parameter_must_be_unseen():
-    right = dict(EVERYTHING_WRONG) | {"converged": True, "misfit": False, "rivals": ()}
-    one = {"n": estimate("n", 1.5, math.inf), "k": estimate("k", 0.1, 0.01)}
-    none = {"n": estimate("n", 1.5, math.inf), "k": estimate("k", 0.1, math.inf)}
-    assert judge(**(right | {"parameters": one})) is Status.CONVERGED
-    assert judge(**(right | {"parameters": none})) is Status.NOT_IDENTIFIABLE
+    n = estimate("n", 1.5, math.inf)
+    assert judged(n, estimate("k", 0.1, 0.01)) is Status.CONVERGED
+    assert judged(n, estimate("k", 0.1, math.inf)) is Status.NOT_IDENTIFIABLE
 
 
 LEAD = estimate(value=300.0, stderr=1.0)

@@ -139,10 +139,4 @@ def test_k_fixed_at_zero_costs_what_no_k_costs():
     assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
 
 
-def test_wavelengths_outside_a_table_are_refused():
-    high = pl.material("Si").wavelength_range[1]
-    with pytest.raises(ValueError, match=r"Si .*is known from .* not at"):
-        tabulated(scene(substrate="Si", wavelength=np.array([500.0, high + 50])))
-
-
 # the back face

@@ -62,11 +62,6 @@ def test_default_wavelengths_stay_where_every_material_has_data(tmp_path):
     assert (grid[0], grid[-1], len(grid)) == (502, 600, 50)
 
 
-def test_outside_a_table():
-    with pytest.raises(ValueError, match=r"HfO2 .* from 250 to 900 nm, not at 200"):
-        simulate_signal(pl.Scene(pl.Layer("HfO2", 100.0), 1.5), np.array([200.0, 400.0]))
-
-
 def test_float64_whatever_the_caller_has():
     with jax.enable_x64(False):
         made = simulate_signal(pl.Scene(FILM, 3.9), NM.astype(np.float32))

@@ -110,31 +110,12 @@ def test_a_part_for_each_spectrum(together, spectra):
 
 
 OXIDE = pl.Scene(pl.Layer("SiO2", pl.Free(10, 400)), "Si")
-ARRAYS = ("wavelength", "values", "sigma")
 
 
 def oxide(thickness: float = 100.0) -> pl.Spectrum:
     values = np.asarray(pl.reflectance(WAVELENGTH, thickness, "SiO2", "Si"))
     noise = np.random.default_rng(2).normal(0, 0.002, 60)
     return pl.Spectrum(WAVELENGTH, values + noise, "R", sigma=np.full(60, 0.002), path=f"{thickness:g}nm.csv")
-
-
-def test_a_file_in_two_is_the_whole_file():
-    """Every other wavelength apart, with a σ that both know.
-
-    The minimum may move by a little of its error: each half counts the correlation of its own residuals.
-    """
-    whole = oxide()
-    halves = [
-        replace(whole, **{name: getattr(whole, name)[first::2] for name in ARRAYS}, path=f"{first}.csv")
-        for first in (0, 1)
-    ]
-    one, two = pl.fit(whole, OXIDE), pl.fit(halves, OXIDE)
-    assert abs(two["thickness"].value - one["thickness"].value) < 0.02 * one["thickness"].stderr_noise
-    assert two["thickness"].stderr_noise == pytest.approx(one["thickness"].stderr_noise, rel=1e-4)
-    assert two.chi2_reduced == pytest.approx(one.chi2_reduced, rel=1e-4)
-    assert two.rms == pytest.approx(one.rms, rel=1e-4)
-    assert two.status == one.status
 
 
 def test_a_list_of_one_is_the_spectrum_with_a_name():

@@ -113,13 +113,6 @@ def test_a_given_sigma_for_each_element_is_absolute(fit):
     assert given["thickness"].stderr == pytest.approx(fit["thickness"].stderr, rel=0.3)
 
 
-def test_ellipsometry_has_no_scale_and_needs_an_angle():
-    with pytest.raises(UsageError, match="ellipsometry has no scale and no offset"):
-        pl.fit(measured(), replace(scene(), instrument=pl.Instrument(scale="free")))
-    with pytest.raises(UsageError, match="ellipsometry needs its angle of incidence"):
-        pl.fit(measured(), replace(scene(), light=pl.Light(signal="mueller")))
-
-
 def test_simulation_of_chosen_elements():
     exact = replace(scene(), layers=(pl.Layer(INDEX, THICKNESS),))
     spectrum = pl.simulate(exact, NM, elements=["m34", "m12"])

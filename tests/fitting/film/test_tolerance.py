@@ -57,8 +57,3 @@ def test_a_fit_beyond_its_tolerance_is_done_again(monkeypatch):
     assert "fitted again with every effect" in found.warnings[0]
     (thickness,) = found.free
     assert thickness.value == pytest.approx(237.0, abs=4 * thickness.stderr)
-
-
-def test_a_tolerance_below_zero_is_refused():
-    with pytest.raises(ValueError, match="tolerance must be positive"):
-        pl.fit(spectrum(scene(0.0)), scene(0.0), tolerance=-1.0)
