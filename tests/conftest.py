@@ -85,11 +85,11 @@ def shared_data() -> Path:
 
 @pytest.fixture
 def write(tmp_path):
-    """Return a function that writes a small file and returns its path."""
+    """Return a function that writes text or bytes to a small file and returns its path."""
 
-    def write(text, name="film.csv"):
+    def write(content, name="film.csv"):
         path = tmp_path / name
-        path.write_text(text)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return path
 
     return write

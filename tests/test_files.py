@@ -6,10 +6,17 @@ import stat
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
+import pellicle as pl
+from pellicle.data.colours import write_colours
+from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.errors import DataError, UsageError
 from pellicle.files import _TEMPORARY, _machine, new_folder, replacing, write_text
+from pellicle.reporting.figures import draw_spectrum
+from pellicle.reporting.materials import figure
+from pellicle.reporting.matplotlib_figure import save_figure
 
 
 def test_text_arrives_whole_and_readable_as_other_files_are(tmp_path):
@@ -31,6 +38,27 @@ def test_an_existing_file_is_kept(tmp_path):
     assert target.read_text() == "mine"
     write_text(target, "new", overwrite=True)
     assert target.read_text() == "new"
+
+
+SCENE = pl.Scene(pl.Layer(1.5, 9.0), "Si", light=pl.Light([500.0, 600.0]))
+SAMPLES = pl.BrdfSamples(*np.ones((4, 1)), np.ones((1, 1)), ("value",))
+WRITERS = {
+    "figure.png": lambda path: save_figure(draw_spectrum(pl.simulate(SCENE)), path),
+    "material.png": lambda path: figure("Au", path),
+    "film.csv": lambda path: pl.write_spectrum(path, pl.simulate(SCENE)),
+    "colours.csv": lambda path: write_colours(path, [pl.simulate(SCENE, space="srgb")]),
+    "paint.csv": lambda path: write_brdf_samples(path, SAMPLES),
+    "film.toml": lambda path: pl.write_recipe(SCENE, path),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_every_writer_keeps_an_existing_file(tmp_path, name):
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(UsageError, match=f"{name}: exists"):
+        WRITERS[name](tmp_path / name)
+    assert (tmp_path / name).read_text() == "mine"
+    assert os.listdir(tmp_path) == [name]
 
 
 def test_a_file_that_appears_meanwhile_is_kept(tmp_path):

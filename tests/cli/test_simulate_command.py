@@ -66,12 +66,6 @@ def test_noise_and_seed(pellicle, recipe, tmp_path):
     assert 0.015 < np.std(loud[:, 1] - clean[:, 1]) < 0.025
 
 
-def test_an_existing_file_is_kept(pellicle, recipe, tmp_path):
-    (tmp_path / "film.csv").write_text("mine")
-    pellicle("simulate", recipe, "--out", tmp_path / "film.csv").refused(2, "not overwritten")
-    assert (tmp_path / "film.csv").read_text() == "mine"
-
-
 def test_default_wavelengths_are_said(pellicle, recipe, tmp_path):
     recipe.write_text(RECIPE.replace("wavelengths = { start = 400, stop = 796, step = 4 }\n", ""))
     ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")

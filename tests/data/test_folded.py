@@ -13,17 +13,6 @@ DELTA = np.array([170.0, 90.0, 5.0])
 ANALYSER = np.array([45.0, 30.0, 60.0])
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(header, *columns):
-        path = tmp_path / "film.csv"
-        rows = "".join(",".join(f"{cell:.15g}" for cell in row) + "\n" for row in zip(*columns, strict=True))
-        path.write_text(f"{header}\n{rows}")
-        return path
-
-    return write
-
-
 def seen(analyser):
     """α and β by the forward formula, from N and C."""
     psi, delta = 2 * np.deg2rad(PSI), np.deg2rad(DELTA)
@@ -31,8 +20,8 @@ def seen(analyser):
 
 
 @pytest.mark.parametrize("header", ["wl,alpha,beta,analyser", "nm,α,β,Analyzer (deg)"])
-def test_alpha_and_beta_with_their_analyser(write, header):
-    spectrum = read_spectrum(write(header, NM, *seen(ANALYSER), ANALYSER))
+def test_alpha_and_beta_with_their_analyser(write_columns, header):
+    spectrum = read_spectrum(write_columns(header, NM, *seen(ANALYSER), ANALYSER))
     assert spectrum.signal == "psi-delta"
     assert spectrum.folded
     np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
@@ -40,24 +29,26 @@ def test_alpha_and_beta_with_their_analyser(write, header):
     assert spectrum.sigma is None
 
 
-def test_one_analyser_for_all(write):
-    path = write("wl,aoi,alpha,beta", NM, np.full(3, 70.0), *seen(30.0))
+def test_one_analyser_for_all(write_columns):
+    path = write_columns("wl,aoi,alpha,beta", NM, np.full(3, 70.0), *seen(30.0))
     spectrum = read_spectrum(path, analyser=30.0)
     np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
     np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
     assert spectrum.angle.tolist() == [70.0] * 3
 
 
-def test_noise_may_take_the_contrast_above_one(write):
+def test_noise_may_take_the_contrast_above_one(write_columns):
     """At Δ = 180 it does so every other time; α, and with it Ψ, is kept."""
-    spectrum = read_spectrum(write("wl,alpha,beta", NM, [0.6, 0.6, 1.0], [-0.81, -0.8, -0.01]), analyser=45)
+    spectrum = read_spectrum(
+        write_columns("wl,alpha,beta", NM, [0.6, 0.6, 1.0], [-0.81, -0.8, -0.01]), analyser=45
+    )
     np.testing.assert_allclose(spectrum.values, np.rad2deg(np.arctan([2.0, 2.0, np.inf])), rtol=1e-12)
     np.testing.assert_allclose(spectrum.delta, 180.0, atol=1e-5)
     assert any("at 2 points whose contrast is above 1" in note for note in spectrum.notes)
 
 
-def test_a_folded_delta(write):
-    path = write("wl,psi,delta", NM, PSI, DELTA)
+def test_a_folded_delta(write_columns):
+    path = write_columns("wl,psi,delta", NM, PSI, DELTA)
     assert not read_spectrum(path).folded
     spectrum = read_spectrum(path, folded=True)
     assert spectrum.folded
@@ -83,8 +74,8 @@ def test_a_folded_delta(write):
         ("wl,R", (0.5,), {"analyser": 45}, UsageError, "`analyser` is for ellipsometry"),
     ],
 )
-def test_what_makes_no_sense(write, header, columns, words, error, said):
-    path = write(header, [500.0, 600.0], *([value, value] for value in columns))
+def test_what_makes_no_sense(write_columns, header, columns, words, error, said):
+    path = write_columns(header, [500.0, 600.0], *([value, value] for value in columns))
     with pytest.raises(error, match=said) as caught:
         read_spectrum(path, **words)
     assert "\n" not in str(caught.value)

@@ -21,15 +21,8 @@ COLUMNS = np.stack([PSI, DELTA], axis=2).reshape(6, 6).T
 
 
 @pytest.fixture
-def write(tmp_path):
-    def write(header: str, *columns: np.ndarray | float):
-        path = tmp_path / "ratios.csv"
-        table = np.column_stack([np.broadcast_to(column, NM.shape) for column in (NM, *columns)])
-        rows = [",".join(f"{x:.9g}" for x in row) for row in table]
-        path.write_text("\n".join([header, *rows, ""]))
-        return path
-
-    return write
+def write(write_columns):
+    return lambda header, *columns: write_columns(header, NM, *columns)
 
 
 def test_each_ratio_has_psi_and_delta(write):

@@ -151,14 +151,6 @@ def test_files_that_hold_no_samples(write, tmp_path, refused):
     refused(tmp_path / "x.png", DataError, "is an image", "as a CSV")
 
 
-def test_files_are_never_written_over(write):
-    path = write("mine")
-    samples = BrdfSamples(*np.ones((4, 1)), np.ones((1, 1)), ("value",))
-    with pytest.raises(UsageError, match="exists and is not overwritten"):
-        write_brdf_samples(path, samples)
-    assert path.read_text() == "mine"
-
-
 def test_records_of_the_wrong_shape_are_refused():
     with pytest.raises(ValueError, match=r"`values`: expected the shape \(1, 3\), got \(1, 1\)"):
         BrdfSamples(*np.ones((4, 1)), np.ones((1, 1)), ("R", "G", "B"))

@@ -14,15 +14,8 @@ M12, M33, M34 = np.linspace(-0.9, 0.8, 6), np.linspace(0.3, -0.4, 6), np.linspac
 
 
 @pytest.fixture
-def write(tmp_path):
-    def write(header: str, *columns: np.ndarray | float):
-        path = tmp_path / "matrix.csv"
-        table = np.column_stack([np.broadcast_to(column, NM.shape) for column in (NM, *columns)])
-        rows = [",".join(f"{x:.9g}" for x in row) for row in table]
-        path.write_text("\n".join([header, *rows, ""]))
-        return path
-
-    return write
+def write(write_columns):
+    return lambda header, *columns: write_columns(header, NM, *columns)
 
 
 @pytest.mark.parametrize("names", ["m12,m33,m34", "M12,M33,M34", "mm12,mm33,mm34", "m_12,M_33,m_{34}"])

@@ -12,16 +12,6 @@ WAVELENGTH = [400.0, 450.5, 500.0, 600.0, 700.0, 800.0]
 VALUES = [0.1, 0.25, 0.3, 0.35, 0.2, 0.15]
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(text, name="film.csv", encoding="utf-8"):
-        path = tmp_path / name
-        path.write_bytes(text.encode(encoding))
-        return path
-
-    return write
-
-
 def rows(separator=",", scale=1.0):
     return "".join(f"{w}{separator}{v * scale}\n" for w, v in zip(WAVELENGTH, VALUES, strict=True))
 

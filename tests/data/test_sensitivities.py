@@ -10,16 +10,6 @@ NM = [500.0, 600.0, 700.0]
 BANDS = np.array([[0.1, 0.8, 0.4], [0.9, 0.3, 0.0], [0.2, 0.0, 0.05]])
 
 
-@pytest.fixture
-def written(tmp_path):
-    def write(text):
-        path = tmp_path / "camera.csv"
-        path.write_text(text)
-        return path
-
-    return write
-
-
 def rows(nm, *columns, mark=","):
     return "".join(mark.join(f"{x:.10g}" for x in row) + "\n" for row in zip(nm, *columns, strict=True))
 
@@ -35,14 +25,14 @@ def rows(nm, *columns, mark=","):
         rows(NM, *BANDS.T),
     ],
 )
-def test_sensitivities_of_any_layout(written, text):
-    nm, seen = read_sensitivities(written(text))
+def test_sensitivities_of_any_layout(write, text):
+    nm, seen = read_sensitivities(write(text))
     np.testing.assert_allclose(nm, NM)
     np.testing.assert_allclose(seen, BANDS)
 
 
-def test_a_lamp_in_energies_rises_in_wavelength(written):
-    nm, power = read_lamp(written("energy_eV,power\n2.0,3.0\n2.5,1.0\n"))
+def test_a_lamp_in_energies_rises_in_wavelength(write):
+    nm, power = read_lamp(write("energy_eV,power\n2.0,3.0\n2.5,1.0\n"))
     np.testing.assert_allclose(nm, [1239.841984 / 2.5, 1239.841984 / 2], rtol=1e-9)
     assert power.tolist() == [1.0, 3.0]
 
@@ -63,5 +53,5 @@ def test_a_lamp_in_energies_rises_in_wavelength(written):
         (read_lamp, "\x89PNG\r\n", ("without any row",)),
     ],
 )
-def test_damage_is_refused(written, refusal, read, text, reasons):
-    refusal(read, written(text), DataError, *reasons)
+def test_damage_is_refused(write, refusal, read, text, reasons):
+    refusal(read, write(text), DataError, *reasons)

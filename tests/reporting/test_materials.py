@@ -1,8 +1,5 @@
 """The catalogue as text and as a figure."""
 
-import subprocess
-import sys
-
 import pytest
 
 from pellicle.errors import UsageError
@@ -68,33 +65,3 @@ def test_a_figure_that_cannot_be_written_leaves_nothing(tmp_path, name):
     with pytest.raises(UsageError, match="`path`"):
         figure("Au", tmp_path / name)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_figure_overwrites_nothing(tmp_path):
-    kept = tmp_path / "nk.png"
-    kept.write_text("mine")
-    with pytest.raises(UsageError, match="not overwritten"):
-        figure("Au", kept)
-    assert kept.read_text() == "mine"
-
-
-def test_a_failed_figure_leaves_nothing(tmp_path, monkeypatch):
-    from matplotlib.figure import Figure
-
-    def full(self, draft, **_):
-        raise OSError("no space left")
-
-    monkeypatch.setattr(Figure, "savefig", full)
-    with pytest.raises(UsageError, match="space"):
-        figure("Au", tmp_path / "nk.png")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_text_needs_no_plotting_library():
-    program = (
-        "import sys; from pellicle.reporting.materials import table, describe; table(); describe('HfO2');"
-        "print('matplotlib' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

@@ -7,18 +7,6 @@ from pellicle.errors import DataError, UsageError
 
 
 @pytest.fixture
-def write(tmp_path):
-    """Write text or bytes to a file, and return its path."""
-
-    def write(content, name="export.dat"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return write
-
-
-@pytest.fixture
 def refused(write):
     """Check that a text is refused by one sentence with these words, and return it."""
 
