@@ -26,11 +26,12 @@ HERE = Path(__file__).parent
 RUN = """
 import runpy, jax
 jax.config.update("jax_enable_x64", True)
-from pellicle.sampling import chain, sample
+import pellicle
+from pellicle.sampling import chain
 chain.LONG_ENOUGH = 1e9  # to the last step
 chain._PATIENCE = 0.0
 example = runpy.run_path({example!r})
-sample.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r})
+pellicle.sample(example["bands"](), example["film"](), steps=10**6, chain={path!r})
 """
 
 

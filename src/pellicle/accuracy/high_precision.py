@@ -29,23 +29,18 @@ DIGITS = 50
 def unsuitable(case: Case) -> str | None:
     """The reason why a case cannot be computed; None where it can."""
     scene, instrument = case.scene, case.scene.instrument
-    if instrument.bandwidth is not None:
-        return "this light has a bandwidth"
-    if any(thickness_spread(scene, layer) is not None for g in groups(scene)[0] for layer in g.layers):
-        return "this layer's thickness is uneven"
-    if instrument.has_cone:
-        return "this light comes in a cone"
-    if case.plan.row("anisotropy").count >= GENERAL:
-        return "an optic axis is tilted"
-    if case.plan.on("gradient"):
-        return "this layer's index varies with depth"
-    if case.plan.on("roughness"):
-        return "this scene has a rough face"
-    if case.ellipsometric and case.plan.on("back-face"):
-        return "this ellipsometer sees a plate's other face"
-    if case.plan.on("coherence"):
-        return "these fringes are narrower than the sampling"
-    return None
+    uneven = (thickness_spread(scene, layer) for g in groups(scene)[0] for layer in g.layers)
+    reasons = {
+        "this light has a bandwidth": instrument.bandwidth is not None,
+        "this layer's thickness is uneven": any(spread is not None for spread in uneven),
+        "this light comes in a cone": instrument.has_cone,
+        "an optic axis is tilted": case.plan.row("anisotropy").count >= GENERAL,
+        "this layer's index varies with depth": case.plan.on("gradient"),
+        "this scene has a rough face": case.plan.on("roughness"),
+        "this ellipsometer sees a plate's other face": case.ellipsometric and case.plan.on("back-face"),
+        "these fringes are narrower than the sampling": case.plan.on("coherence"),
+    }
+    return next((why for why, applies in reasons.items() if applies), None)
 
 
 def signal(case: Case, values: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,10 +18,9 @@ from pellicle.fitting.joint import fit as fit_jointly
 from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
-from pellicle.sampling.ensemble import STEPS
+from pellicle.sampling.ensemble import STEPS, sampled
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sample import OF_A_FILM, measured
-from pellicle.sampling.sample import sample as sample_posterior
+from pellicle.sampling.sample import OF_A_FILM, measured, subject_of
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene, refuse
 
@@ -111,21 +111,13 @@ def sample(
     **Raises:** as `pellicle.fit` does; UsageError for too few walkers, or more than fit into memory;
     DataError for the chain of another problem.
     """
+    began = time.perf_counter()
     check_measurement(data)
     check_scene(scene, several=True)
     if not isinstance(scene, Surface):
         refuse("a Scene", residual=residual)
-    return sample_posterior(
-        data,
-        scene,
-        walkers=walkers,
-        steps=steps,
-        seed=seed,
-        chain=chain,
-        tolerance=tolerance,
-        residual=residual,
-        progress=progress,
-    )
+    subject = subject_of(data, scene, tolerance, residual, progress)
+    return sampled(subject, walkers, steps, seed, chain, progress, began)
 
 
 def compare(

@@ -18,37 +18,38 @@ from pellicle.optics import pair
 from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, namespace, real, times_i
 
 
-def _check(mixture: Any) -> None:
-    for part in (mixture.host, mixture.inclusion):
-        require_isotropic(part, "a mixture is made of")
-    found = bounds_of(mixture.fraction)
-    if found is not None and not 0 <= found[0] <= found[1] <= 1:
-        wrong = found[0] if not 0 <= found[0] <= 1 else found[1]
-        raise ValueError(f"fraction must lie in 0 to 1, got {wrong:g}")
-
-
-@final
-class Linear(AbstractDispersion):
-    """ε = f ε_i + (1 − f) ε_h: boundaries along the field, the upper Wiener bound."""
+class AbstractMixture(AbstractDispersion):
+    """Mixture of two isotropic media. Subclasses are final."""
 
     host: AbstractDispersion
     inclusion: AbstractDispersion
     fraction: Any
-    __check_init__ = _check
+
+    def __check_init__(self):
+        for part in (self.host, self.inclusion):
+            require_isotropic(part, "a mixture is made of")
+        found = bounds_of(self.fraction)
+        if found is not None and not 0 <= found[0] <= found[1] <= 1:
+            wrong = found[0] if not 0 <= found[0] <= 1 else found[1]
+            raise ValueError(f"fraction must lie in 0 to 1, got {wrong:g}")
+
+    def _permittivities(self, wavelength: Any) -> tuple[Number, Number]:
+        h, i = self.host.index(wavelength), self.inclusion.index(wavelength)
+        return h * h, i * i
+
+
+@final
+class Linear(AbstractMixture):
+    """ε = f ε_i + (1 − f) ε_h: boundaries along the field, the upper Wiener bound."""
 
     def index(self, wavelength):
-        h, i = _permittivities(self, wavelength)
+        h, i = self._permittivities(wavelength)
         return _root(h + (i - h) * self.fraction)
 
 
 @final
-class Looyenga(AbstractDispersion):
+class Looyenga(AbstractMixture):
     """ε^(1/3) = f ε_i^(1/3) + (1 − f) ε_h^(1/3): irregular grains, neither of which is the matrix."""
-
-    host: AbstractDispersion
-    inclusion: AbstractDispersion
-    fraction: Any
-    __check_init__ = _check
 
     def index(self, wavelength):
         h = _two_thirds(self.host.index(wavelength))
@@ -58,25 +59,20 @@ class Looyenga(AbstractDispersion):
 
 
 @final
-class MaxwellGarnett(AbstractDispersion):
+class MaxwellGarnett(AbstractMixture):
     """(ε − ε_h)/(ε + 2ε_h) = f (ε_i − ε_h)/(ε_i + 2ε_h): separate spheres in a matrix, the `host`.
 
     Not symmetric: with `fraction` above about 0.5 the roles should change.
     """
 
-    host: AbstractDispersion
-    inclusion: AbstractDispersion
-    fraction: Any
-    __check_init__ = _check
-
     def index(self, wavelength):
-        h, i = _permittivities(self, wavelength)
+        h, i = self._permittivities(wavelength)
         pull = (i - h) * self.fraction
         return _root(h * (i + 2 * h + 2 * pull) / (i + 2 * h - pull))
 
 
 @final
-class Bruggeman(AbstractDispersion):
+class Bruggeman(AbstractMixture):
     """f (ε_i − ε)/(ε_i + 2ε) + (1 − f)(ε_h − ε)/(ε_h + 2ε) = 0: spheres of both, on an equal footing.
 
     With w = ε/(n_h n_i) and q = n_i/n_h this is 2w² − 4βw − 1 = 0, β = [(3f − 1) q + (2 − 3f)/q]/4.
@@ -85,11 +81,6 @@ class Bruggeman(AbstractDispersion):
     only where |Im β| ≤ √((1 − 3f)(2 − 3f))/2 < 1/√2 (for f > 2/3 the same with the roles changed).
     So no root is picked at run time and the gradient is smooth in f, n and k.
     """
-
-    host: AbstractDispersion
-    inclusion: AbstractDispersion
-    fraction: Any
-    __check_init__ = _check
 
     def index(self, wavelength):
         h, i = self.host.index(wavelength), self.inclusion.index(wavelength)
@@ -105,11 +96,6 @@ MIXTURES: dict[str, Any] = {
     "linear": Linear,
 }
 """Mixing rules by name."""
-
-
-def _permittivities(mixture: Any, wavelength: Any) -> tuple[Number, Number]:
-    h, i = mixture.host.index(wavelength), mixture.inclusion.index(wavelength)
-    return h * h, i * i
 
 
 def _root(epsilon: Number) -> Number:

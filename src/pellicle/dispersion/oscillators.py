@@ -159,13 +159,8 @@ class TaucLorentz(AbstractOscillator):
         first = C * a_ln / E0 * arctan_over_root(-alpha2, Eg, centre + gap)
         # π − atan[(α + 2Eg)/C] + atan[(α − 2Eg)/C] holds no α
         second = -a_atan / E0 * xp.arctan2(Eg * C, gap - centre)
-        third = (
-            4
-            * E0
-            * Eg
-            * (square - gamma2)
-            * arctan_over_root(alpha2, 2 * C, 2 * (width + 2 * (gap - centre)))
-        )
+        third = 4 * E0 * Eg * (square - gamma2)
+        third *= arctan_over_root(alpha2, 2 * C, 2 * (width + 2 * (gap - centre)))
         # both logarithms of |E − Eg| under the factor (E − Eg)² that they have together
         edge = (E + Eg) ** 2 * xp.log(E + Eg) - (E - Eg) ** 2 * log_abs(E - Eg)
         at_gap = xp.log((centre - gap) ** 2 + gap * width)

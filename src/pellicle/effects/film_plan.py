@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import jax
 
@@ -29,34 +28,16 @@ from pellicle.scene.free import is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, absorbs
 
-
-@dataclass(frozen=True)
-class Effect:
-    """Name of an effect, and the function that makes its row of a plan from a scene."""
-
-    name: str
-    judge: Callable[[Any], Row]
-
-
 EFFECTS = (
-    Effect("absorption", presence.absorption),
-    Effect("anisotropy", anisotropy.anisotropy),
-    Effect("stack", presence.stack),
-    Effect("gradient", gradient.gradient),
-    Effect("roughness", presence.roughness),
-    Effect("tunnelling", presence.tunnelling),
-    Effect("oblique", presence.oblique),
-    Effect("polarisation", presence.polarisation),
-    Effect("transmission", presence.transmission),
-    Effect("back-face", presence.back_face),
-    Effect("coherence", averaging.coherence),
-    Effect("orders", averaging.orders),
-    Effect("angle-spread", averaging.angle_spread),
-    Effect("dispersion", presence.dispersion),
-    Effect("opaque", presence.opaque),
-    Effect("precision", presence.precision),
+    *(presence.absorption, anisotropy.anisotropy, presence.stack, gradient.gradient, presence.roughness),
+    *(presence.tunnelling, presence.oblique, presence.polarisation, presence.transmission),
+    *(presence.back_face, averaging.coherence, averaging.orders, averaging.angle_spread),
+    *(presence.dispersion, presence.opaque, presence.precision),
 )
-"""Every effect of a film, in the order of a plan."""
+"""One function for each effect of a film, which makes its row from a scene, in the order of a plan.
+
+Its name is that of the effect, with hyphens.
+"""
 
 
 def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
@@ -66,7 +47,7 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     an average have a bound above 0 (see `effects.averaging`).
     """
     known = {row.effect: row for row in given}
-    rows = tuple(known.get(effect.name) or effect.judge(scene) for effect in EFFECTS)
+    rows = tuple(known.get(judge.__name__.replace("_", "-")) or judge(scene) for judge in EFFECTS)
     light = scene.light
     reference = exact(of_reference(scene)) if light.kind.has_reference else None
     return Plan(rows, light.signal, light.polarisation, transmission=light.transmission, reference=reference)

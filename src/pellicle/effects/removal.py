@@ -295,18 +295,12 @@ def in_single_precision(scene: Any) -> Any:
     return jax.tree_util.tree_map(single, scene, is_leaf=is_free)
 
 
+_BY_FUNCTION = (
+    *(_angle_spread, _coherence, _back_face, _opaque, _anisotropy, _oblique, _roughness, _gradient),
+    *(_polarisation, _absorption, _dispersion),
+)
 _REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
-    "angle-spread": _angle_spread,
-    "coherence": _coherence,
-    "back-face": _back_face,
-    "opaque": _opaque,
-    "anisotropy": _anisotropy,
-    "oblique": _oblique,
-    "roughness": _roughness,
-    "gradient": _gradient,
-    "polarisation": _polarisation,
-    "absorption": _absorption,
-    "dispersion": _dispersion,
+    **{removal.__name__[1:].replace("_", "-"): removal for removal in _BY_FUNCTION},
     "precision": lambda scene, _: in_single_precision(scene),
 }
 

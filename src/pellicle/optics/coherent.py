@@ -129,28 +129,14 @@ def responses(
     if mixes_polarisations(ambient, *layers, substrate):
         raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
     if any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
-        responses = []
+        each = []
         for one in polarisations:
             above, *between, below = (seen_by(n, one) for n in (ambient, *layers, substrate))
-            responses += _responses(above, between, below, phases, angle, one, propagating, roughness)
-        return tuple(responses)
-    return _responses(ambient, layers, substrate, phases, angle, polarisations, propagating, roughness)
-
-
-def _responses(
-    ambient: Any,
-    layers: Sequence[Any],
-    substrate: Any,
-    phases: Sequence[Any],
-    angle: Any,
-    polarisations: str,
-    propagating: bool,
-    roughness: Sequence[Any] | None,
-) -> tuple[Response, ...]:
-    if is_graded(layers):
+            own = {"propagating": propagating, "roughness": roughness}
+            each += responses(above, between, below, phases, angle, one, **own)
+        return tuple(each)
+    if roughness is not None or is_graded(layers) or len(layers) > FEW:
         return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)
-    if len(layers) == 1 and roughness is None:
+    if len(layers) == 1:
         return film(ambient, layers[0], substrate, phases[0], angle, polarisations, propagating)
-    if len(layers) <= FEW and roughness is None:
-        return few_layers(ambient, layers, substrate, phases, angle, polarisations, propagating)
-    return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)
+    return few_layers(ambient, layers, substrate, phases, angle, polarisations, propagating)

@@ -159,7 +159,16 @@ def sampled(
     progress: Progress,
     began: float,
 ) -> Posterior:
-    """The posterior, in float64, from a chain that is kept in the file `chain`. Raises as `sample` does."""
+    """Sample a posterior, in float64.
+
+    Walkers start in every minimum in proportion to its share and move by differential evolution, its snooker
+    update, and jumps between minima. The chain ends when it is 50 autocorrelation times long and passes the
+    other checks, or after `steps`. With a `chain` file it is kept there as it grows, and a run that was cut
+    short goes on where it stopped.
+
+    **Raises:** UsageError for too few walkers (two for each parameter at least) or more than the machine's
+    memory holds; DataError for a chain of another problem.
+    """
     file = ChainFile(chain, subject.fingerprint, subject.names)
     with jax.enable_x64(True):
         count = subject.walkers(walkers, steps)

@@ -203,16 +203,9 @@ class Posterior(PlotMixin):
         shares = [(mode, float(np.mean(home == mode))) for mode in np.unique(home)]
         places = [Mode(float(np.median(values[home == mode])), mass) for mode, mass in shares]
         q025, q50, q975 = np.quantile(values, [0.025, 0.5, 0.975])
-        return Marginal(
-            name,
-            self.fit.parameters[name].unit,
-            float(values.mean()),
-            float(values.std(ddof=1)),
-            float(q025),
-            float(q50),
-            float(q975),
-            tuple(sorted(places, key=lambda mode: -mode.mass)),
-        )
+        mean, sd, low, middle, high = map(float, (values.mean(), values.std(ddof=1), q025, q50, q975))
+        ranked = tuple(sorted(places, key=lambda mode: -mode.mass))
+        return Marginal(name, self.fit.parameters[name].unit, mean, sd, low, middle, high, ranked)
 
     def __getitem__(self, name: str) -> Marginal:
         return self.parameters[name]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
@@ -23,38 +21,30 @@ from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_targets import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
-from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.density import fingerprint, log_density, systematics
-from pellicle.sampling.ensemble import STEPS, Subject, installed, sampled
+from pellicle.sampling.ensemble import Subject, installed
 from pellicle.sampling.modes import modes, sandwich_stretch
-from pellicle.sampling.result import Posterior, predictions
+from pellicle.sampling.result import predictions
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
 Kind = TypeVar("Kind")
 
 
-def sample(
+def subject_of(
     data: Measurement,
     scene: Scene | Surface | Sequence[Scene | Surface],
-    *,
-    walkers: int | None = None,
-    steps: int = STEPS,
-    seed: int = 0,
-    chain: str | os.PathLike[str] | None = None,
-    tolerance: float = 0.0,
-    residual: str | None = None,
-    progress: Progress = quiet,
-) -> Posterior:
-    """Fit as `pellicle.fit` does, then sample the posterior between the bounds, in float64.
+    tolerance: float,
+    residual: str | None,
+    progress: Progress,
+) -> Subject:
+    """Fit as `pellicle.fit` does, and return the posterior between the bounds, in float64.
 
     Priors are those of the `Free` parameters, uniform between the bounds by default; scale and offset, and
-    the systematic effects of the scene's `uncertainty`, are integrated out. Walkers start in every minimum in
-    proportion to its share and move by differential evolution, its snooker update, and jumps between minima.
-    The chain ends when it is 50 autocorrelation times long and passes the other checks, or after `steps`.
-    With a `chain` file it is kept there as it grows, and a run that was cut short goes on where it stopped.
+    the systematic effects of the scene's `uncertainty`, are integrated out.
 
     BRDF samples are taken to have normal errors in the unit of the `residual` (ρ, or its cube root): of the
     given σ, or of the rms of the best fit's residuals. Without a σ the draws are then stretched around their
@@ -63,10 +53,8 @@ def sample(
     direction, and all directions are as likely. The posterior assumes that there is a layer, also where the
     fit finds no evidence of one.
 
-    **Raises:** as `fit` does, and UsageError for too few walkers (two for each parameter at least) or
-    more than the machine's memory holds; DataError for a chain of another problem.
+    **Raises:** as `fit` does, and UsageError without the sampler's packages.
     """
-    began = time.perf_counter()
     installed()
     if isinstance(scene, Surface):
         fitted = _of_surface(data, scene, tolerance, residual, progress)
@@ -75,8 +63,7 @@ def sample(
     else:
         fitted = _of_film(data, scene, tolerance, progress)
     with jax.enable_x64(True):
-        subject = _subject(fitted)
-    return sampled(subject, walkers, steps, seed, chain, progress, began)
+        return _subject(fitted)
 
 
 class _Fitted(NamedTuple):

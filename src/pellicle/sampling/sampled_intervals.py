@@ -47,21 +47,13 @@ def _quantiles(draws: np.ndarray) -> Interval:
     return lower, upper
 
 
-_MISSING = next(iter(missing()), None)
-SAMPLED_INTERVALS = (
-    Method("emcee, 25 steps", "most of the chain", partial(_sampled, 25), missing=_MISSING),
-    Method("emcee, 100 steps", "half of the chain", partial(_sampled, 100), missing=_MISSING),
-    Method(
-        "emcee, until it is long enough",
-        "nothing: pellicle sample",
-        partial(_sampled, _STEPS),
-        missing=_MISSING,
-    ),
-    Method(
-        "emcee, stretch, 500 steps",
-        "other minima: from the best fit",
-        partial(_stretch, 500),
-        missing=_MISSING,
-    ),
+SAMPLED_INTERVALS = tuple(
+    Method(name, leaves_out, apply, missing=next(iter(missing()), None))
+    for name, leaves_out, apply in (
+        ("emcee, 25 steps", "most of the chain", partial(_sampled, 25)),
+        ("emcee, 100 steps", "half of the chain", partial(_sampled, 100)),
+        ("emcee, until it is long enough", "nothing: pellicle sample", partial(_sampled, _STEPS)),
+        ("emcee, stretch, 500 steps", "other minima: from the best fit", partial(_stretch, 500)),
+    )
 )
 """Every method of computing intervals from samples, in the order of their cost."""

@@ -192,13 +192,8 @@ SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk", ".mat", ".yml", ".yaml"}
 """Suffixes of files of optical constants: a name with one of them is a path."""
 
 READERS: tuple[Callable[[MaterialText], MaterialFile | None], ...] = (
-    refractiveindex_info.read_yaml,
-    refractiveindex_info.read_table,
-    spectraray,
-    sopra_records,
-    sopra_grid,
-    imd,
-    woollam,
+    *(refractiveindex_info.read_yaml, refractiveindex_info.read_table, spectraray),
+    *(sopra_records, sopra_grid, imd, woollam),
 )
 
 

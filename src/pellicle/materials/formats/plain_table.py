@@ -29,36 +29,20 @@ SHORTEST_ASSUMED = 30.0
 
 _REMEDY = "write the table as wavelength_nm,n,k with that header"
 _CHOICES = "`wavelength_um,n,k`, `wavelength_nm,n,k`, `energy_eV,n,k` or `energy_eV,eps1,eps2`"
+
+
+def _names_of_permittivity(number: str, short: str, long: str, letter: str) -> tuple[str, ...]:
+    symbols = ("eps", "e", "ε", "ϵ", "epsilon")
+    parts = f"{short}(eps)", f"{long}(eps)", f"{short}(epsilon)", f"{short}(ε)"
+    return (*(f"{symbol}{number}" for symbol in symbols), *parts, f"ε{letter}", f"eps{letter}")
+
+
 _NAMES = {
     "wavelength": ("e(ev)", "hv(ev)", "hν(ev)"),
     "n": ("n", "re(n)", "real(n)", "refractiveindex", "indexofrefraction", "index"),
     "k": ("k", "κ", "kappa", "im(n)", "imag(n)", "extinctioncoefficient", "extinction"),
-    "eps1": (
-        "eps1",
-        "e1",
-        "ε1",
-        "ϵ1",
-        "epsilon1",
-        "re(eps)",
-        "real(eps)",
-        "re(epsilon)",
-        "re(ε)",
-        "εr",
-        "epsr",
-    ),
-    "eps2": (
-        "eps2",
-        "e2",
-        "ε2",
-        "ϵ2",
-        "epsilon2",
-        "im(eps)",
-        "imag(eps)",
-        "im(epsilon)",
-        "im(ε)",
-        "εi",
-        "epsi",
-    ),
+    "eps1": _names_of_permittivity("1", "re", "real", "r"),
+    "eps2": _names_of_permittivity("2", "im", "imag", "i"),
 }
 """Names of columns, in lower case without blanks and underscores."""
 
