@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from pellicle.accuracy import colour_methods
+from pellicle.accuracy.case import random_draws
 from pellicle.accuracy.colour_methods import COLOUR_METHODS
 from pellicle.accuracy.registry import Comparison, Result
-from pellicle.accuracy.surface import BRDF_METHODS, SurfaceCost, films_of, random_draws
+from pellicle.accuracy.surface import BRDF_METHODS, DRAWS, SurfaceCost, films_of
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.rendering.renderer_methods import RENDERER_METHODS
@@ -98,10 +99,10 @@ def test_what_makes_no_sense_says_why(films):
     free = films._replace(numbers={**films.numbers, "n": np.linspace(2.0, 2.9, 8)})
     assert BY_NAME["table of the film"].apply(free) == "its indices are free: it is for one film"
     assert "too few angles" in BY_NAME["uniform-64 at 32 angles"].apply(films)
-    assert "defined at three wavelengths only" in films_of(PAINT, random_draws(PAINT))
+    assert "defined at three wavelengths only" in films_of(PAINT, random_draws(PAINT, DRAWS))
     each = surface_view(Surface("blinn-phong-film", {}), default_directions(), 8)
     free = dataclasses.replace(each, numbers={**each.numbers, "n": [Free(1.4, 1.5)] * 3})
-    assert "unknown between them" in films_of(free, random_draws(free))
+    assert "unknown between them" in films_of(free, random_draws(free, DRAWS))
 
 
 def test_values_of_three_wavelengths_lie_on_a_line():

@@ -111,7 +111,7 @@ def test_each_effect_and_its_reason(effect, on, why, thing):
 
 def test_the_table_covers_every_effect_both_ways():
     """But for what only a tolerance decides (test_film_plan.py)."""
-    both = {(e.name, on) for e in EFFECTS for on in (True, False)}
+    both = {(judge.__name__.replace("_", "-"), on) for judge in EFFECTS for on in (True, False)}
     assert {(effect, on) for effect, on, *_ in TABLE} == both - {("opaque", True), ("precision", False)}
 
 

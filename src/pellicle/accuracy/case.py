@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ import numpy as np
 
 from pellicle.effects.film_plan import full_plan
 from pellicle.effects.removal import FilmRemoval
+from pellicle.errors import UsageError
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.forward_model.plan import Plan
@@ -57,11 +59,22 @@ def case(scene: Scene, wavelength: np.ndarray, tolerance: float = 1e-3, seed: in
     bare = replace(scene.instrument, scale=1.0, offset=0.0)
     scene = with_wavelength(eqx.tree_at(lambda s: s.instrument, scene, bare), np.asarray(wavelength, float))
     count = int(np.clip(POINTS // len(wavelength), LEAST_DRAWS, MOST_DRAWS))
+    return Case(scene, full_plan(scene), random_draws(scene, count, seed), tolerance)
+
+
+def random_draws(scene: Any, count: int, seed: int = 0) -> np.ndarray:
+    """Values of the free numbers, (draws, numbers), uniform between the bounds, the start values first."""
     free = [leaf for _, leaf in free_leaves(scene)]
-    low, high = np.array([f.lower for f in free]), np.array([f.upper for f in free])
+    low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
     draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
     draws[0] = start_values(scene)
-    return Case(scene, full_plan(scene), draws, tolerance)
+    return draws
+
+
+def check_tolerance(tolerance: float | None) -> None:
+    """Raise UsageError for a tolerance that is not above zero."""
+    if tolerance is not None and not 0 < tolerance < math.inf:
+        raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
 
 
 def disperses(case: Case) -> bool:

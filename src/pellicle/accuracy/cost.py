@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import case
+from pellicle.accuracy.case import case, check_tolerance
 from pellicle.accuracy.film_methods import compare_methods
 from pellicle.accuracy.registry import (
     Comparison,
@@ -30,7 +30,6 @@ from pellicle.accuracy.registry import (
     measure_on_data,
     residual,
 )
-from pellicle.errors import UsageError
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import solve
@@ -288,8 +287,7 @@ def cost(
     """
     default = TOLERANCE_IN_DEGREES if scene.light.kind.degrees else TOLERANCE
     tolerance = (default if noise is None else noise) if tolerance is None else tolerance
-    if not 0 < tolerance < np.inf:
-        raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
+    check_tolerance(tolerance)
     with jax.enable_x64(True):
         one = case(scene, wavelength, tolerance)
         methods = compare_methods(one, reference, progress)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.accuracy.case import Program
+from pellicle.accuracy.case import Program, check_tolerance
 from pellicle.accuracy.colour_methods import (
     COLOUR_METHODS,
     COLOUR_TOLERANCE,
@@ -56,8 +55,7 @@ def colour_cost(
     **Raises:** UsageError for a film that the methods do not compute, for a tolerance that is not above zero,
     and without colour-science.
     """
-    if tolerance is not None and not 0 < tolerance < math.inf:
-        raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
+    check_tolerance(tolerance)
     own: Any = getattr(scene.light.angle, "start", scene.light.angle)
     angles = np.unique(np.atleast_1d(np.asarray(own if angle is None else angle, float)))
     with jax.enable_x64(True):

@@ -11,19 +11,18 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.accuracy.case import Program, compiled_function
+from pellicle.accuracy.case import Program, check_tolerance, compiled_function, random_draws
 from pellicle.accuracy.colour_methods import COLOUR_METHODS, COLOUR_TOLERANCE, Films, compare_colours
 from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.brdf.directions import angle_to_half
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.effects import surface_plan
 from pellicle.effects.surface_plan import FLOOR, SurfaceRemoval, exact
-from pellicle.errors import UsageError
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
-from pellicle.scene.free import free_leaves, insert, start_values
+from pellicle.scene.free import insert
 from pellicle.scene.surface import SurfaceView
 
 DRAWS = 64
@@ -63,24 +62,14 @@ def cost(
 
     **Raises:** UsageError for a tolerance that is not above zero, and without colour-science.
     """
-    if tolerance is not None and not 0 < tolerance < math.inf:
-        raise UsageError(f"the tolerance must be above zero, got {tolerance:g}: what error is small enough?")
+    check_tolerance(tolerance)
     with jax.enable_x64(True):
-        draws = random_draws(view)
+        draws = random_draws(view, DRAWS)
         films = films_of(view, draws)
         if isinstance(films, str):
             return SurfaceCost(None, _values(view, draws, tolerance or VALUE_TOLERANCE, progress), films)
         compared = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress, colours)
         return SurfaceCost(compared, _values(view, draws, VALUE_TOLERANCE, progress))
-
-
-def random_draws(view: SurfaceView, count: int = DRAWS, seed: int = 0) -> np.ndarray:
-    """Values of the free numbers, (draws, numbers), uniform between the bounds, the start values first."""
-    free = [leaf for _, leaf in free_leaves(view)]
-    low, high = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
-    draws = np.random.default_rng(seed).uniform(low, high, (count, len(free)))
-    draws[0] = start_values(view)
-    return draws
 
 
 FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")

@@ -223,13 +223,9 @@ def light(reading: FileOptions, azimuth: Any = None) -> Light:
 
     `azimuth` of the sample in degrees is that of a recipe: films that have one cannot be described by flags.
     """
-    from pellicle.recipes.film import incidence, light_signal
-    from pellicle.scene.film import Light
+    from pellicle.recipes import film
 
-    signal = light_signal(reading.signal, reading.transmitted)
-    through = bool(reading.transmission and reading.signal)
-    polarisation = reading.polarisation or "unpolarised"
-    return Light(None, incidence(reading.angle), signal, polarisation, azimuth, through)
+    return film.light(reading, reading.transmitted, azimuth)
 
 
 @dataclass(frozen=True)

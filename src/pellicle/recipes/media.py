@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
@@ -33,24 +33,30 @@ from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 
 UNIAXIAL, BIAXIAL = ("ordinary", "extraordinary"), ("x", "y", "z")
 _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
+_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
+_NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
+
+
+def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
+    """A table of these keys and no other, in a schema."""
+    needed = {"required": [*required]} if required else {}
+    return {"properties": properties, **needed, "additionalProperties": False}
+
+
+def _choose(schema: dict[str, Any], tables: Iterable[dict[str, Any]]) -> None:
+    """Replace the keys of a schema by several tables, one of which must fit."""
+    schema.pop("additionalProperties", None)
+    schema["anyOf"] = [*tables]
 
 
 def _anisotropic_schema(schema: dict[str, Any]) -> None:
     """List the keys of both kinds, for editors."""
-    number = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
     medium = {"type": ["string", "number", "object"]}
-    schema.pop("additionalProperties", None)
-    schema["anyOf"] = [
-        {
-            "properties": {
-                **dict.fromkeys(keys, medium),
-                "axis": {"type": "array", "items": number, "minItems": 2, "maxItems": len(keys)},
-            },
-            "required": [*keys],
-            "additionalProperties": False,
-        }
-        for keys in (UNIAXIAL, BIAXIAL)
-    ]
+    tables = []
+    for keys in (UNIAXIAL, BIAXIAL):
+        axis = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": len(keys)}
+        tables.append(_table_schema({**dict.fromkeys(keys, medium), "axis": axis}, *keys))
+    _choose(schema, tables)
 
 
 class AnisotropicTable(BaseModel):
@@ -101,24 +107,14 @@ def anisotropic_medium(
 
 def _profile_schema(schema: dict[str, Any]) -> None:
     """Add to the schema which numbers each profile has, for editors."""
-    number = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
-    kinds: dict[str, Any] = {"values": {"type": "array", "minItems": 2, "items": number}}
+    kinds: dict[str, Any] = {"values": {"type": "array", "minItems": 2, "items": _NUMBER}}
     kinds["knots"] = {"type": "array", "minItems": 2, "items": {"type": "number"}}
-    own = schema.pop("properties")
-    schema.pop("additionalProperties", None)
-    schema["anyOf"] = [
-        {
-            "properties": {
-                **own,
-                "profile": {"const": name},
-                **{field.name: kinds.get(field.name, number) for field in fields(kind)},
-            },
-            # linear is the default, and goes unsaid
-            "required": ["graded"] if name == "linear" else ["graded", "profile"],
-            "additionalProperties": False,
-        }
-        for name, kind in PROFILES.items()
-    ]
+    own, tables = schema.pop("properties"), []
+    for name, kind in PROFILES.items():
+        numbers = {field.name: kinds.get(field.name, _NUMBER) for field in fields(kind)}
+        required = ["graded"] if name == "linear" else ["graded", "profile"]  # linear is the default
+        tables.append(_table_schema({**own, "profile": {"const": name}, **numbers}, *required))
+    _choose(schema, tables)
     schema.pop("required", None)
 
 
@@ -211,9 +207,6 @@ class FreeTable(BaseModel):
 
 Number = float | FreeTable
 
-_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
-_NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
-
 
 def _model_schema(schema: dict[str, Any]) -> None:
     """Add to the schema which parameters each model has, for editors."""
@@ -223,19 +216,14 @@ def _model_schema(schema: dict[str, Any]) -> None:
         properties = {"model": {"const": name}, **dict.fromkeys(specs, number)}
         if name in SPLINES:
             properties["knots"] = {"type": "array", "items": {"type": "number"}}
-        choices.append({"properties": properties, "additionalProperties": False})
+        choices.append(_table_schema(properties))
     kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, specs in TERMS.items()]
-    term = [{"properties": keys, "required": ["kind"], "additionalProperties": False} for keys in kinds]
+    term = [_table_schema(keys, "kind") for keys in kinds]
     terms = {"type": "array", "minItems": 1, "items": {"anyOf": term}}
     choices.append(
-        {
-            "properties": {"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms},
-            "required": ["terms"],
-            "additionalProperties": False,
-        }
+        _table_schema({"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms}, "terms")
     )
-    schema.pop("additionalProperties", None)
-    schema["anyOf"] = choices
+    _choose(schema, choices)
 
 
 class MediumTable(BaseModel):

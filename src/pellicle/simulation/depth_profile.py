@@ -331,17 +331,9 @@ def _sections(
         )
         depth, medium = _depths(layers, faces, slices, edges[i], edges[i + 1])
 
-        rows = [
-            _at_depths(
-                tabulated(with_wavelength(scene, chosen[j : j + 1])),
-                depth,
-                depths,
-                plan=plan.static_key,
-                letters=letters,
-                position=i,
-            )
-            for j in range(len(chosen))
-        ]
+        how = {"plan": plan.static_key, "letters": letters, "position": i}
+        each = (tabulated(with_wavelength(scene, chosen[j : j + 1])) for j in range(len(chosen)))
+        rows = [_at_depths(one, depth, depths, **how) for one in each]
         intensity, absorbed = (np.array(x) for x in zip(*rows, strict=True))
         sections.append(Section(layers, edges[i], edges[i + 1], medium, depth, intensity, absorbed))
     return tuple(sections)
