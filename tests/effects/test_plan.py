@@ -18,6 +18,7 @@ from pellicle.scene.free import free_leaves, insert
 
 from ..films import scene
 
+NAMES = [judge.__name__.replace("_", "-") for judge in EFFECTS]
 FREE_K = pl.Free(0, 1, start=0.0)
 FREE_ANGLE = pl.Free(0, 60, start=0.0)
 
@@ -111,15 +112,15 @@ def test_each_effect_and_its_reason(effect, on, why, thing):
 
 def test_the_table_covers_every_effect_both_ways():
     """But for what only a tolerance decides (test_film_plan.py)."""
-    both = {(judge.__name__.replace("_", "-"), on) for judge in EFFECTS for on in (True, False)}
+    both = {(name, on) for name in NAMES for on in (True, False)}
     assert {(effect, on) for effect, on, *_ in TABLE} == both - {("opaque", True), ("precision", False)}
 
 
 def test_a_plan_lists_every_effect_in_order():
     plan = pl.plan(scene())
-    assert [row.effect for row in plan.rows] == [effect.name for effect in EFFECTS]
+    assert [row.effect for row in plan.rows] == NAMES
     lines = str(plan).splitlines()
-    assert len(lines) == len(EFFECTS)
+    assert len(lines) == len(NAMES)
     assert lines[0].split()[:2] == ["absorption", "off"]
     with pytest.raises(KeyError, match="magic"):
         plan.row("magic")

@@ -80,10 +80,8 @@ class Anisotropic(AbstractDispersion):
 
     def with_angles(self, convert: Callable[[Any], Any]) -> Anisotropic:
         """Return a copy whose angles of the axis are `convert(angle)`."""
-        if self.is_uniaxial:
-            return Anisotropic(self.x, self.z, axis=(convert(self.theta), convert(self.phi)))
-        axis = [convert(angle) for angle in (self.theta, self.phi, self.psi)]
-        return Anisotropic(x=self.x, y=self.y, z=self.z, axis=axis)
+        own = self.arguments
+        return Anisotropic(**own | {"axis": tuple(map(convert, own["axis"]))})
 
     def turned(self, azimuth: Any) -> Anisotropic:
         """Return the medium in a sample turned about its normal by `azimuth` degrees, from x towards y.
@@ -103,6 +101,12 @@ class Anisotropic(AbstractDispersion):
         """Names of the fields in results."""
         own = {"x": "ordinary", "z": "extraordinary"} if self.y is None else {"x": "x", "y": "y", "z": "z"}
         return own | {"theta": "axis_theta", "phi": "axis_phi", "psi": "axis_psi"}
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments with which the constructor makes this medium, in a sample that is not turned."""
+        media = {name: getattr(self, field) for field, name in self.names.items() if field in "xyz"}
+        return media | {"axis": (self.theta, self.phi, self.psi)[: 2 if self.is_uniaxial else 3]}
 
     @property
     def is_uniaxial(self) -> bool:

@@ -29,7 +29,7 @@ from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes import media_words
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, fixed_model, free_model
-from pellicle.recipes.media import BIAXIAL, UNIAXIAL, FreeTable, Medium, Number, medium, number
+from pellicle.recipes.media import FreeTable, Medium, Number, medium, number
 from pellicle.recipes.media_words import free_numbers
 from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, ReferenceTable, SceneTable
 from pellicle.scene.film import Reference
@@ -89,7 +89,9 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
     if isinstance(dispersion, Constant):
         return _constant(dispersion, name)
     if isinstance(dispersion, Anisotropic):
-        return _anisotropic(dispersion, name, folder)
+        own = dispersion.arguments
+        axis = [written_number(angle, f"{name}: axis") for angle in own.pop("axis")]
+        return {key: written_medium(x, name, folder) for key, x in own.items()} | {"axis": axis}
     if isinstance(dispersion, Graded):
         media = [written_medium(each, name, folder) for each in (dispersion.first, dispersion.second)]
         profile = {"profile": _NAME[type(dispersion.profile)], **_numbers(dispersion.profile, name)}
@@ -154,14 +156,6 @@ def _constant(dispersion: Constant, name: str) -> Any:
         return {"model": "constant", **{key: written_number(x, f"{name}: {key}") for key, x in both.items()}}
     n, k = written_number(n, f"{name}: n"), 0.0 if k is None else written_number(k, f"{name}: k")
     return f"{n!r}+{k!r}j" if k else n
-
-
-def _anisotropic(dispersion: Anisotropic, name: str, folder: Path) -> dict[str, Any]:
-    one = dispersion.is_uniaxial
-    keys = zip("xz" if one else "xyz", UNIAXIAL if one else BIAXIAL, strict=True)
-    media = {key: written_medium(getattr(dispersion, field), name, folder) for field, key in keys}
-    angles = [dispersion.theta, dispersion.phi, *([] if one else [dispersion.psi])]
-    return {**media, "axis": [written_number(angle, f"{name}: axis") for angle in angles]}
 
 
 def _oscillators(dispersion: Oscillators, name: str) -> dict[str, Any]:

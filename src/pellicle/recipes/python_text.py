@@ -65,7 +65,7 @@ def python_text(thing: Any) -> str:
         about |= {key: x for key in ("prior", "limits") if (x := getattr(thing, key)) is not None}
         return _call("pl.Free", [thing.lower, thing.upper], about)
     if isinstance(thing, Anisotropic):
-        return _anisotropic(thing)
+        return _call("pl.Anisotropic", [], thing.arguments)
     if isinstance(thing, Uncertainty) and thing == Uncertainty.none():
         return "pl.Uncertainty.none()"
     if isinstance(thing, Drift):
@@ -129,14 +129,6 @@ def _constant(medium: Constant) -> str:
         return _call("pl.dispersion.Constant", both, {})
     n, k = float(medium.n), 0.0 if medium.k is None else float(medium.k)
     return repr(complex(n, k)).strip("()") if k else repr(n)
-
-
-def _anisotropic(medium: Anisotropic) -> str:
-    if medium.is_uniaxial:
-        both = {"ordinary": medium.x, "extraordinary": medium.z}
-        return _call("pl.Anisotropic", [], {**both, "axis": (medium.theta, medium.phi)})
-    axes = {"x": medium.x, "y": medium.y, "z": medium.z}
-    return _call("pl.Anisotropic", [], {**axes, "axis": (medium.theta, medium.phi, medium.psi)})
 
 
 def _module(module: Any) -> str:
