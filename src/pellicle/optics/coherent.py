@@ -128,15 +128,18 @@ def responses(
     """
     if mixes_polarisations(ambient, *layers, substrate):
         raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
-    if any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
-        each = []
-        for one in polarisations:
-            above, *between, below = (seen_by(n, one) for n in (ambient, *layers, substrate))
-            own = {"propagating": propagating, "roughness": roughness}
-            each += responses(above, between, below, phases, angle, one, **own)
-        return tuple(each)
-    if roughness is not None or is_graded(layers) or len(layers) > FEW:
-        return stack(ambient, layers, substrate, phases, angle, polarisations, roughness)
-    if len(layers) == 1:
-        return film(ambient, layers[0], substrate, phases[0], angle, polarisations, propagating)
-    return few_layers(ambient, layers, substrate, phases, angle, polarisations, propagating)
+
+    def of(ambient: Number, layers: Sequence[Any], substrate: Number, letters: str) -> tuple[Response, ...]:
+        if roughness is not None or is_graded(layers) or len(layers) > FEW:
+            return stack(ambient, layers, substrate, phases, angle, letters, roughness)
+        if len(layers) == 1:
+            return film(ambient, layers[0], substrate, phases[0], angle, letters, propagating)
+        return few_layers(ambient, layers, substrate, phases, angle, letters, propagating)
+
+    if not any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
+        return of(ambient, layers, substrate, polarisations)
+    each = []
+    for letter in polarisations:
+        above, *between, below = (seen_by(n, letter) for n in (ambient, *layers, substrate))
+        each += of(above, between, below, letter)
+    return tuple(each)
