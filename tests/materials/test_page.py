@@ -30,7 +30,7 @@ def test_points_are_sorted_and_repeated_ones_averaged():
 def test_negative_k_is_noise_or_left_out():
     found = table([400, 500, 600, 700], [1.5, 1.5, 1.5, 1.5], [0.1, -1e-6, 0.1, -0.05])
     assert found.dispersion.k.tolist() == [0.1, 0.0, 0.1]
-    assert found.high == 600
+    assert found.wavelength_range[1] == 600
 
 
 def test_n_and_k_from_different_sources_are_known_where_both_are():

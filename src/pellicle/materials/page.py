@@ -28,14 +28,6 @@ _LINK = re.compile(r'<a\s+href\s*=\s*[\\"]*([^">]*)"?\s*>(.*?)</a>', re.DOTALL |
 _TAG = re.compile(r"</?(?:a|b|i|u|em|strong|sub|sup|br|p|span|div|li|ul|ol)\b[^<>]*>", re.IGNORECASE)
 
 
-class Quantity(NamedTuple):
-    """A dispersion with the range (nm) of its source."""
-
-    dispersion: AbstractDispersion
-    low: float
-    high: float
-
-
 class Contents(NamedTuple):
     """Contents of a page: a dispersion, its range (nm), and whether it has k."""
 
@@ -49,7 +41,7 @@ def to_nm(micrometres: Any) -> Any:
     return np.round(np.asarray(micrometres, dtype=float) * 1e3, 9)
 
 
-def table(nm: Any, n: Any, k: Any = None) -> Quantity:
+def table(nm: Any, n: Any, k: Any = None) -> Contents:
     """A published table made fit for interpolation.
 
     Points are sorted, those at the same wavelength averaged. A k slightly below zero is set to zero;
@@ -68,22 +60,23 @@ def table(nm: Any, n: Any, k: Any = None) -> Quantity:
         columns.pop()
     for array in (distinct, *columns):
         array.flags.writeable = False
-    return Quantity(Table(distinct, *columns), float(distinct[0]), float(distinct[-1]))
+    return Contents(Table(distinct, *columns), (float(distinct[0]), float(distinct[-1])), k is not None)
 
 
-def extinction(nm: Any, k: Any) -> Quantity:
+def extinction(nm: Any, k: Any) -> Contents:
     """A table of k alone, beside an n that is never used."""
     return table(nm, np.zeros(len(nm)), k)
 
 
-def combine(n: Quantity, k: Quantity | None) -> Contents:
+def combine(n: Contents, k: Contents | None) -> Contents:
     """n from one source and k from another, where both are known."""
     if k is None:
-        return Contents(n.dispersion, (n.low, n.high), False)
-    low, high = max(n.low, k.low), min(n.high, k.high)
+        return n
+    (first, last), (lowest, highest) = n.wavelength_range, k.wavelength_range
+    low, high = max(first, lowest), min(last, highest)
     if low >= high:
         raise DataError(
-            f"n is known from {n.low:g} to {n.high:g} nm and k from {k.low:g} to {k.high:g} nm, "
+            f"n is known from {first:g} to {last:g} nm and k from {lowest:g} to {highest:g} nm, "
             "which do not overlap: choose another page"
         )
     absorbs = isinstance(k.dispersion, Table) and k.dispersion.k is not None
@@ -91,10 +84,10 @@ def combine(n: Quantity, k: Quantity | None) -> Contents:
     return Contents(both, (low, high), True)
 
 
-def formula(number: int, coefficients: Any, micrometres: tuple[float, float]) -> Quantity:
+def formula(number: int, coefficients: Any, micrometres: tuple[float, float]) -> Contents:
     """A formula of the database and its range in µm."""
     low, high = to_nm(micrometres)
-    return Quantity(Formula(number, tuple(float(c) for c in coefficients)), float(low), float(high))
+    return Contents(Formula(number, tuple(map(float, coefficients))), (float(low), float(high)), False)
 
 
 def load_yaml(text: str) -> dict[str, Any]:
@@ -119,8 +112,7 @@ def contents(page: dict[str, Any]) -> Contents:
             low, high = (float(word) for word in str(block["wavelength_range"]).split())
             n = formula(FORMULAS[kind], str(block["coefficients"]).split(), (low, high))
         elif kind == "tabulated nk":
-            n = table(*_numbers(block))
-            return Contents(n.dispersion, (n.low, n.high), True)
+            return table(*_numbers(block))
         elif kind == "tabulated n":
             n = table(*_numbers(block))
         elif kind == "tabulated k":
@@ -135,8 +127,7 @@ def contents(page: dict[str, Any]) -> Contents:
 def csv_contents(text: str) -> Contents:
     """The dispersion in a vendored table: `wavelength_nm,n,k` under a header, comments marked by #."""
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-    made = table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
-    return Contents(made.dispersion, (made.low, made.high), True)
+    return table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
 
 
 def _link(match: re.Match[str]) -> str:
@@ -197,7 +188,7 @@ def _columns(model: Any) -> tuple[np.ndarray, np.ndarray]:
     return to_nm(_published(micrometres)), _published(values)
 
 
-def _n(model: Any) -> Quantity:
+def _n(model: Any) -> Contents:
     if type(model).__name__ == "Tabulated":
         return table(*_columns(model))
     number, coefficients = _coefficients(model)
@@ -217,8 +208,7 @@ def entry_contents(entry: Any) -> Contents:
         nm, n = _columns(entry.n)
         nm_k, k = _columns(entry.k)
         if np.array_equal(nm, nm_k):
-            made = table(nm, n, k)
-            return Contents(made.dispersion, (made.low, made.high), True)
+            return table(nm, n, k)
     return combine(_n(entry.n), extinction(*_columns(entry.k)))
 
 

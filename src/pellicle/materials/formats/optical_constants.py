@@ -190,16 +190,8 @@ def material_file(constants: OpticalConstants, kind: str, title: str = "", assum
         _refuse(constants, first, constants.first, n <= 0, "of an index n above 0", _ROW)
     else:
         _refuse(constants, first, n, n <= 0, "above 0", _ROW)
-    made = table(nm, n, k)
-    return MaterialFile(
-        made.dispersion,
-        (made.low, made.high),
-        k is not None,
-        kind,
-        f"{axis} in {constants.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows",
-        assumed,
-        title,
-    )
+    columns = f"{axis} in {constants.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows"
+    return MaterialFile(*table(nm, n, k), kind, columns, assumed, title)
 
 
 def _refuse(

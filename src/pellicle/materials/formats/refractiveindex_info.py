@@ -64,15 +64,8 @@ def read_yaml(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: gives no finite index over its range of {low:g} to {high:g} nm; download it again"
         )
     kinds = ", ".join(str(block["type"]) for block in page["DATA"])
-    return MaterialFile(
-        source.dispersion,
-        source.wavelength_range,
-        source.has_extinction,
-        "refractiveindex.info page",
-        f"wavelength in um; {kinds}",
-        citation=citation,
-        comments=comments,
-    )
+    understood = ("refractiveindex.info page", f"wavelength in um; {kinds}")
+    return MaterialFile(*source, *understood, citation=citation, comments=comments)
 
 
 def read_table(text: MaterialText) -> MaterialFile | None:
@@ -107,7 +100,7 @@ def read_table(text: MaterialText) -> MaterialFile | None:
     except DataError as error:
         raise DataError(f"{text.path}: {error}") from None
     columns = f"wl in um, n; {len(n.axis)} rows, then wl in um, k; {len(k.axis)} rows"
-    return MaterialFile(made.dispersion, made.wavelength_range, True, _CSV, columns)
+    return MaterialFile(*made, _CSV, columns)
 
 
 def _header(text: str) -> str | None:
