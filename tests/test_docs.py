@@ -18,6 +18,7 @@ import jsonschema
 import pytest
 
 from pellicle.cli import app, main
+from pellicle.reporting import sphere_figures
 
 ROOT = Path(__file__).parents[1]
 _PATHS = [
@@ -217,7 +218,14 @@ def outputs():
 
 @pytest.fixture
 def run_command(monkeypatch, capsys):
-    """Return a function that runs one command, checks its exit code and returns its stdout."""
+    """Return a function that runs one command, checks its exit code and returns its stdout.
+
+    Spheres are drawn with 64 pixels across, not 260 or 420: rendering them takes most of the time.
+    """
+    for name in ("render", "ball", "bubble"):
+        drawn = getattr(sphere_figures, name)
+        small = lambda *arguments, drawn=drawn: drawn(*arguments[:-1], 64)  # noqa: E731
+        monkeypatch.setattr(sphere_figures, name, small)
 
     def run(command):
         monkeypatch.setattr(sys, "argv", shlex.split(command))
@@ -244,6 +252,8 @@ def run_page(clone, run_command, outputs):
             is_read_later = out and any(out in later.split() for later in shown[i + 1 :])
             if (slow or not is_slow(command)) and (is_read_later or command not in outputs):
                 outputs[command] = run_command(command)
+            elif out:  # the folder of its result is there for the next commands
+                Path(out).parent.mkdir(exist_ok=True)
 
     return run
 

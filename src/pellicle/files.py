@@ -43,16 +43,11 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
     full disk.
     """
     target = Path(path)
-    _refuse_existing(target, overwrite)
+    check_new(target, overwrite=overwrite)
     _remove_strays(target.parent, target.stem)
     prefix = f".{target.stem}.{_machine()}-{os.getpid()}-"
     try:
         handle, name = tempfile.mkstemp(prefix=prefix, suffix=target.suffix, dir=target.parent)
-    except FileNotFoundError:
-        raise UsageError(
-            f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another"
-            " `path`"
-        ) from None
     except OSError as error:
         raise not_written(target, error) from None
     os.close(handle)
@@ -62,12 +57,28 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
         temporary.chmod(0o666 & ~_umask())  # mkstemp's 0600 would keep colleagues out
-        _refuse_existing(target, overwrite)
+        check_new(target, overwrite=overwrite)
         os.replace(temporary, target)
     except OSError as error:
         raise not_written(target, error) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_new(target: Path, *, overwrite: bool = False) -> None:
+    """Raise UsageError where a file is a folder, exists without `overwrite`, or has no folder to be in.
+
+    For writers that take long before they write.
+    """
+    if target.is_dir():
+        raise UsageError(f"{target}: is a folder, not a file; choose another `path`")
+    if target.exists() and not overwrite:
+        raise UsageError(f"{target}: exists and is not overwritten; choose another `path` or remove it")
+    if not target.parent.is_dir():
+        raise UsageError(
+            f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another"
+            " `path`"
+        )
 
 
 def check_space(path: Path, size: int) -> None:
@@ -156,13 +167,6 @@ def _machine() -> str:
 def _is_ours(folder: Path) -> bool:
     marker = folder / MARKER
     return marker.is_file() and _MARK in marker.read_text(encoding="utf-8", errors="replace")
-
-
-def _refuse_existing(target: Path, overwrite: bool) -> None:
-    if target.is_dir():
-        raise UsageError(f"{target}: is a folder, not a file; choose another `path`")
-    if target.exists() and not overwrite:
-        raise UsageError(f"{target}: exists and is not overwritten; choose another `path` or remove it")
 
 
 def _umask() -> int:

@@ -1,6 +1,7 @@
 """Maps by worker processes of a dask cluster: equal to maps of one process, whatever happens to them."""
 
 import dataclasses
+import os
 
 import dask.array
 import numpy as np
@@ -15,9 +16,12 @@ from pellicle.mapping.run import run_map
 
 @pytest.fixture(scope="module")
 def workers():
-    """Address of a scheduler with two worker processes on this machine."""
+    """Address of a scheduler with two worker processes here; this process keeps its environment."""
+    before = dict(os.environ)
     with local_cluster(2) as client:
         yield client.scheduler.address
+    changed = {x for x in {*before, *os.environ} if before.get(x) != os.environ.get(x)}
+    assert not changed - {"PYTEST_CURRENT_TEST"}
 
 
 @pytest.mark.slow  # starts workers and kills one; test_killed_runs.py kills a run without workers

@@ -5,6 +5,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
+from pellicle.reporting import sphere_figures
 from pellicle.reporting.rendering_display import display, exposure
 from pellicle.reporting.sphere_figures import balls, bubbles
 from pellicle.simulation.environment import Rendering
@@ -28,12 +29,15 @@ def test_the_background_shows_through_what_the_sphere_leaves():
     assert limb == pytest.approx(0.25 * inside + 0.75 * 0.2)
 
 
-def test_figures_are_written(tmp_path):
+def test_figures_are_written(tmp_path, monkeypatch):
     film = pl.Scene(pl.Layer(1.33, 100.0), 1.0)
     balls(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", (50.0, 100.0), size=9)
     bubbles(film, tmp_path / "bubbles.png", (300.0, 100.0), size=9)
     assert all((tmp_path / name).read_bytes().startswith(PNG) for name in ("balls.png", "bubbles.png"))
+    monkeypatch.setattr(sphere_figures, "bubble", lambda *_: pytest.fail("drawn before it is refused"))
     with pytest.raises(UsageError, match="exists"):
         bubbles(film, tmp_path / "bubbles.png", (300.0,), size=9)
+    with pytest.raises(UsageError, match="there is no folder"):
+        bubbles(film, tmp_path / "nowhere" / "bubbles.png", (300.0,), size=9)
     with pytest.raises(UsageError, match=r"\.png"):
         balls(film, tmp_path / "balls.jpg", (300.0,), size=9)

@@ -15,13 +15,10 @@ from multiprocessing import get_context, parent_process
 from typing import TypeVar
 
 from pellicle.cli.session import start
+from pellicle.programs.threads import single_threaded
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
-_THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
-compiled program: workers share their programs with all other runs."""
 
 _PAUSE = 0.05
 """Seconds after which a lost Ctrl-C is sent again."""
@@ -97,17 +94,11 @@ def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers:
 @contextmanager
 def _quiet_and_single_threaded() -> Iterator[None]:
     """Processes started in the block ignore Ctrl-C until they have a task, and use one thread each."""
-    before = {name: os.environ.get(name) for name in _THREADS}
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ |= dict.fromkeys(_THREADS, "1")
     try:
-        yield
+        with single_threaded():
+            yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
         signal.signal(signal.SIGINT, handler)
 
 

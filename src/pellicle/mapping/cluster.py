@@ -32,11 +32,10 @@ from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.block_fit import Fitted, Job, fit_block
 from pellicle.mapping.blocks import Where
+from pellicle.programs.threads import single_threaded
 
 log = logging.getLogger(__name__)
 
-_THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Numbers of threads. XLA takes its own from NPROC, which does not enter the key of a compiled program."""
 _SETTINGS = (
     "jax_enable_x64",
     "jax_compilation_cache_dir",
@@ -57,13 +56,11 @@ _WINDOW = 2
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Client]:
     """Start worker processes on this machine, spawned, with one thread each; they end with the block."""
-    settings = {
-        "distributed.worker.multiprocessing-method": "spawn",  # a forked process inherits JAX's locks
-        **{f"distributed.nanny.pre-spawn-environ.{name}": 1 for name in _THREADS},
-    }
+    # a forked process inherits JAX's locks
+    settings = {"distributed.worker.multiprocessing-method": "spawn"}
     logger = logging.getLogger("distributed")
     level = logger.level
-    with config.set(settings):
+    with config.set(settings), single_threaded():
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,

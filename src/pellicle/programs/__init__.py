@@ -1,1 +1,1 @@
-"""Compiled programs that outlive the process, as machine code in files that nobody else can write."""
+"""Compiled programs that outlive the process, in files that nobody else can write; threads of workers."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.files import replacing
+from pellicle.files import check_new, replacing
 from pellicle.reporting.drawable import Band, Line, Panel, Section
 
 if TYPE_CHECKING:
@@ -81,10 +81,14 @@ def save_figure(
 
 
 def figure_path(path: str | os.PathLike[str]) -> Path:
-    """The path of a figure that is to be written. Raises UsageError for another file type."""
+    """The path of a figure that is to be written.
+
+    **Raises:** UsageError for another file type, and where no new file can be written there.
+    """
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise UsageError(f"`path` {target}: expected a name ending in {', '.join(FORMATS)}")
+    check_new(target)
     return target
 
 

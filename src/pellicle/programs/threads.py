@@ -1,0 +1,28 @@
+"""One thread for each worker process, by the environment that it inherits."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
+compiled program: workers share their programs with all other runs."""
+_OF_DASK = ("MALLOC_TRIM_THRESHOLD_",)
+"""Variables that dask sets for its workers in this process, and leaves there."""
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """Processes started in the block use one thread each; the environment is then as before."""
+    before = {name: os.environ.get(name) for name in (*THREADS, *_OF_DASK)}
+    os.environ |= dict.fromkeys(THREADS, "1")
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
