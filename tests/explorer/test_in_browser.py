@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from tests.browser import wait_for
 
 pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
 pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
@@ -174,12 +175,14 @@ def test_it_opens_at_every_width_without_error_or_foreign_request(opened, width,
 
 def test_the_plot_follows_the_width_of_the_window(opened):
     page = opened()
+
+    def sizes(place):
+        box = page.locator(place).first.bounding_box()
+        return [box["width"], box["height"]]
+
     for width in (1000, 420, 1300):
         page.set_viewport_size({"width": width, "height": 800})
-        page.wait_for_timeout(400)
-        box, drawing = (page.locator(place).first.bounding_box() for place in (".plot", ".plot .main-svg"))
-        assert drawing["width"] == pytest.approx(box["width"], abs=3)
-        assert drawing["height"] == pytest.approx(box["height"], abs=3)
+        wait_for(page, lambda: sizes(".plot .main-svg") == pytest.approx(sizes(".plot"), abs=3))
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
@@ -210,7 +213,7 @@ def test_a_drag_moves_everything_and_a_double_click_resets(opened):
     page.mouse.move(box["x"] + 0.36 * box["width"], middle)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.75 * box["width"], middle, steps=10)
-    page.wait_for_timeout(500)
+    wait_for(page, lambda: not np.allclose(curve(page), before["curve"]))
     assert page.url == before["address"]  # the address follows the release
     page.mouse.up()
     settle(page)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from tests.browser import wait_for
 
 pytest.importorskip("anywidget", reason="anywidget is absent: pip install 'pellicle[explore]'")
 
@@ -149,21 +150,23 @@ def test_the_widget_follows_its_slider_and_its_model(cell):
     background = "getComputedStyle(document.querySelector('.pellicle-explorer')).backgroundColor"
     assert cell.evaluate(background) == "rgb(18, 23, 28)"  # dark as the notebook, in a light browser
     cell.get_by_role("slider", name="thickness in nm").press("PageUp")
-    cell.wait_for_timeout(500)
-    moved = cell.evaluate("saved.at(-1).values.thickness")
-    assert moved > 250
-    assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, moved, 1.46, 3.9), atol=2e-7)
+
+    def follows(thickness):
+        return np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, thickness, 1.46, 3.9), atol=2e-7)
+
+    thickness = "saved.at(-1)?.values.thickness ?? 250"
+    wait_for(cell, lambda: cell.evaluate(thickness) > 250 and follows(cell.evaluate(thickness)))
     cell.evaluate("model.fromPython({ values: { ...model.get('values'), thickness: 321 } })")
-    cell.wait_for_timeout(500)
-    assert np.allclose(cell.evaluate(curve), pl.reflectance(WAVELENGTH, 321.0, 1.46, 3.9), atol=2e-7)
+    wait_for(cell, lambda: follows(321.0))
     assert cell.get_by_role("spinbutton", name="thickness (nm)").input_value() == "321"
     cell.evaluate("model.fromPython({ angles: [40, 50] })")
     drawn = "document.querySelector('.plot').data.map((t) => t.meta).join() === 'R 40°,R 50°'"
     cell.wait_for_function(drawn, timeout=60_000)  # compiles a program
     cell.wait_for_selector(".pellicle-explorer:not(.compiling)")
-    cell.wait_for_timeout(500)  # the model is saved after the drawing
+    # the model is saved after the drawing
+    wait_for(cell, lambda: cell.evaluate("saved.at(-1)").get("angles") == [40, 50])
     saved = cell.evaluate("saved.at(-1)")
-    assert (saved["angles"], saved["values"]["thickness"]) == ([40, 50], 321)
+    assert saved["values"]["thickness"] == 321
     assert "angle" not in saved["values"]
     assert cell.get_by_role("button", name="Copy link").count() == 0
     cell.evaluate("close()")

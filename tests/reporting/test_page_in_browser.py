@@ -12,8 +12,10 @@ from pellicle.fitting.result import Profile
 from pellicle.reporting.folders import write_fit, write_index
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.page.fit_page import fit_page
+from tests.browser import wait_for
 
 IMAGE = b"\x89PNG\r\n"
+HOVER = ":is(.hoverlayer .hovertext, .hoverlayer .legend)"
 
 
 @pytest.fixture
@@ -103,9 +105,9 @@ def test_a_click_on_a_rival_in_the_misfit_shows_its_curve(opened, curved):
     )
     page.mouse.move(x - 5, y)
     page.mouse.move(x, y)
-    page.wait_for_timeout(300)
+    page.locator(f"#misfit {HOVER}").first.wait_for()
     page.mouse.click(x, y)
-    page.wait_for_timeout(300)
+    wait_for(page, lambda: drawn(page, "rival: thickness 242.87 nm"))
     [curve, _] = drawn(page, "rival: thickness 242.87 nm")
     assert np.allclose(curve, curved.curve.model + 0.01, rtol=1e-5)
 
@@ -123,14 +125,11 @@ def test_a_drag_zooms_and_a_double_click_shows_all(opened, curved):
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], middle, steps=5)
     page.mouse.up()
-    page.wait_for_timeout(400)
-    assert span() == pytest.approx(0.2 * before, rel=0.05)
+    wait_for(page, lambda: span() == pytest.approx(0.2 * before, rel=0.05))
     page.mouse.move(box["x"] + 0.5 * box["width"], middle, steps=3)
-    page.wait_for_timeout(300)
-    assert page.locator("#data-0 .hoverlayer .hovertext, #data-0 .hoverlayer .legend").count() > 0
+    page.locator(f"#data-0 {HOVER}").first.wait_for()
     page.mouse.dblclick(box["x"] + 0.5 * box["width"], middle)
-    page.wait_for_timeout(600)
-    assert span() == pytest.approx(before, rel=0.01)
+    wait_for(page, lambda: span() == pytest.approx(before, rel=0.01))
 
 
 def test_the_keyboard_reads_points_and_zooms(opened, curved):
@@ -141,11 +140,14 @@ def test_the_keyboard_reads_points_and_zooms(opened, curved):
         plot.press("ArrowRight")
     said = page.locator("#data-0-reading").inner_text()
     assert said.startswith("wavelength (nm) 420.00, reflectance ")
-    before = page.evaluate("document.getElementById('data-0')._fullLayout.xaxis.range")
+
+    def limits():
+        return page.evaluate("document.getElementById('data-0')._fullLayout.xaxis.range")
+
+    before = limits()
     plot.press("+")
-    page.wait_for_timeout(300)
-    after = page.evaluate("document.getElementById('data-0')._fullLayout.xaxis.range")
-    assert np.ptp(after) == pytest.approx(np.ptp(before) / 2)
+    wait_for(page, lambda: np.ptp(limits()) == pytest.approx(np.ptp(before) / 2))
+    after = limits()
     assert after[0] < 420 < after[1]
 
 
@@ -165,8 +167,7 @@ def test_colours_follow_the_mode_while_the_page_is_open(opened, curved):
     colour = "document.getElementById('data-0').data.find((t) => t.name === 'fit').line.color"
     light = page.evaluate(colour)
     page.emulate_media(color_scheme="dark")
-    page.wait_for_timeout(500)
-    assert page.evaluate(colour) != light
+    wait_for(page, lambda: page.evaluate(colour) != light)
 
 
 def test_nothing_in_a_file_name_or_message_runs(opened, curved):
