@@ -81,6 +81,22 @@ layer = [{{ material = "SiO2", thickness = 100 }}]
 """
 
 
+@pytest.mark.parametrize(("unit", "scale"), [("", 1), (" (%)", 100)])
+def test_a_reflectance_relative_to_a_stack_of_known_layers(pellicle, tmp_path, unit, scale):
+    """At 500 nm it is above 2: the oxide of the reference is antireflecting there."""
+    nm = np.linspace(450.0, 850.0, 100)
+    film, wafer = (pl.simulate(pl.Scene(pl.Layer("SiO2", d), "Si"), nm).values for d in (450.0, 100.0))
+    rows = [f"{x},{y}" for x, y in zip(nm, scale * film / wafer, strict=True)]
+    (tmp_path / "film.csv").write_text("\n".join([f"nm,R{unit}", *rows]), encoding="utf-8")
+    path = tmp_path / "film.toml"
+    path.write_text(COUNTS.format(reference=""), encoding="utf-8")
+    [record] = pellicle("fit", "--recipe", path, "--json", "--out", tmp_path / "out").objects
+    assert record["parameters"]["thickness"]["value"] == pytest.approx(450.0, abs=0.1)
+    [again] = pellicle("fit", "--recipe", tmp_path / "out" / "recipe.toml", "--json").objects
+    assert again["parameters"] == record["parameters"]
+    assert "relative to the reference" in pellicle("fit", "--recipe", path, "--verbose").err
+
+
 def test_counts_of_a_film_and_of_a_stack_of_known_layers(pellicle, tmp_path):
     nm = np.linspace(450.0, 850.0, 100)
     lamp = 4e4 * np.exp(-(((nm - 650) / 150) ** 2)) + 2000

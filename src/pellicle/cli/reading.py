@@ -33,23 +33,26 @@ def of_kind(kind: str) -> set[str]:
 
 def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Spectrum]:
     """Read the spectra of a file that are meant; where the scale of the `scene` is free any level is
-    acceptable, and its reference is that of counts.
+    acceptable, and its reference is that of counts or of relative reflectances.
 
     Raises DataError or UsageError.
     """
+    from pellicle.data.read_counts import has_counts
     from pellicle.data.read_spectrum import read_spectra
     from pellicle.scene.instrument import Drift
 
-    stack = None if scene is None else scene.reference
+    stack = scene.reference if scene is not None and options.signal == "R" else None
     of_counts = options.reference is not None or options.reference_material is not None
-    if of_counts or (stack is not None and options.signal == "R"):
+    if of_counts or (stack is not None and has_counts(path, options.columns)):
         return [_from_counts(path, options, stack)]
     free_scale = scene is not None and isinstance(scene.instrument.scale, Drift)
     if options.dark is not None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     stated = {name: x for name, x in options.given().items() if name in SpectrumOptions.declared()}
     stated["noise"] = sigma(options.noise)
-    return read_spectra(path, calibrated=False if free_scale else None, **stated)
+    if stack is None:
+        return read_spectra(path, calibrated=False if free_scale else None, **stated)
+    return [_from_ratio(x, options, stack) for x in read_spectra(path, calibrated=False, **stated)]
 
 
 def sigma(noise: float | str | None) -> float | None:
@@ -90,13 +93,22 @@ def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Sp
         dark = read_counts(options.dark, **table)
     else:
         dark = read_counts_beside(path, "dark counts", **table)
-    known = _reference_reflectance(sample.wavelength, options, stack)
+    known = _reference_reflectance(sample, options, stack)
     return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise))
 
 
-def _reference_reflectance(
-    wavelength: np.ndarray, options: FileOptions, stack: Reference | None
-) -> np.ndarray:
+def _from_ratio(ratio: Spectrum, options: FileOptions, stack: Reference) -> Spectrum:
+    """Reflectance from one that is relative to the reflectance of a `stack`."""
+    from pellicle.data.read_counts import reflectance_from_ratio
+
+    if ratio.angle is not None or not isinstance(options.angle, float | int | None):
+        raise UsageError(
+            f"{ratio.path}: reflectances relative to [reference] need one known angle of incidence"
+        )
+    return reflectance_from_ratio(ratio, _reference_reflectance(ratio, options, stack))
+
+
+def _reference_reflectance(sample: Spectrum, options: FileOptions, stack: Reference | None) -> np.ndarray:
     from pellicle.recipes.media_words import medium
     from pellicle.scene.film import Light, Reference, Scene
     from pellicle.scene.layers import Layer
@@ -109,10 +121,10 @@ def _reference_reflectance(
             "the reference is described twice, by [reference] of the recipe and by --reference-material:"
             " leave one out"
         )
-    light = Light(None, options.angle or 0.0, "R", options.polarisation or "unpolarised")
-    return simulate_spectrum(
-        Scene(stack.layers or Layer(1.0, 0.0), stack.substrate, light=light), wavelength
-    ).values
+    polarisation = options.polarisation or sample.polarisation
+    light = Light(None, options.angle or 0.0, "R", polarisation)
+    known = Scene(stack.layers or Layer(1.0, 0.0), stack.substrate, light=light)
+    return simulate_spectrum(known, sample.wavelength).values
 
 
 def is_of_colours(path: str, reading: FileOptions) -> bool:

@@ -1,4 +1,4 @@
-"""Reflectance from raw counts of a sample, a reference of known reflectance, and the dark."""
+"""Reflectance from raw counts, or from a ratio of reflectances, by a reference of known reflectance."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns
 from pellicle.data.tabular.column_selection import (
+    COUNTS,
     SpectrumColumns,
     counts_columns,
     counts_columns_beside,
+    named_columns,
 )
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -58,6 +60,12 @@ def read_counts_beside(
     table = _only_table(path)
     chosen = counts_columns_beside(table, columns, part)
     return None if chosen is None else _read(table, chosen, wavelength_unit)
+
+
+def has_counts(path: str | os.PathLike[str], columns: str | Sequence[str] | None = None) -> bool:
+    """True where a file names a column of counts, or of an intensity in arbitrary units."""
+    named = (named_columns(table, columns) or () for table in read_tables(path))
+    return any(column.role in (*COUNTS, "counts", "intensity") for table in named for column in table)
 
 
 def _only_table(path: str | os.PathLike[str]) -> Table:
@@ -104,18 +112,55 @@ def reflectance_from_counts(
     **Raises:** DataError where the reference does not cover the sample or has no counts above the dark, or
     where the result is not a reflectance; UsageError for a noise that is not above zero.
     """
+    known = _known(reference_reflectance, sample)
+    check_noise(noise)
+    sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
+    sweeps = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
+    values = _ratio(sample, reference, dark) * known
+    note = f"counts divided by those of the reference {reference.path}"
+    return _reflectance(sample, values, sigma, sweeps, "counts", note)
+
+
+def reflectance_from_ratio(ratio: Spectrum, reference_reflectance: np.ndarray) -> Spectrum:
+    """Calibrate a reflectance relative to that of a reference: the reflectance (R / R_ref) R_ref.
+
+    **Arguments:**
+
+    - `ratio`: R / R_ref as "R", uncalibrated, with its standard deviation.
+    - `reference_reflectance`: fraction, one number per wavelength of `ratio`.
+
+    **Returns:** a `Spectrum` of "R".
+
+    **Raises:** DataError where the result is not a reflectance.
+    """
+    known = _known(reference_reflectance, ratio)
+    sigma = None if ratio.sigma is None else ratio.sigma * known
+    sweeps = [reflectance_from_ratio(sweep, known) for sweep in ratio.sweeps]
+    note = "relative to the reference, and multiplied by its reflectance"
+    return _reflectance(ratio, ratio.values * known, sigma, sweeps, "ratio", note)
+
+
+def _known(reference_reflectance: np.ndarray, sample: Spectrum) -> np.ndarray:
     known = np.asarray(reference_reflectance, dtype=np.float64)
     if known.shape != sample.wavelength.shape:
         raise ValueError(
             f"`reference_reflectance`: expected one number per wavelength of the sample "
             f"{sample.wavelength.shape}, got {known.shape}"
         )
-    check_noise(noise)
-    values = _ratio(sample, reference, dark) * known
-    sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
-    place, remedy = sample.place("reflectance from counts"), "leave it out with `range`, or measure again"
+    return known
+
+
+def _reflectance(
+    sample: Spectrum,
+    values: np.ndarray,
+    sigma: np.ndarray | None,
+    sweeps: list[Spectrum],
+    source: str,
+    note: str,
+) -> Spectrum:
+    """The calibrated spectrum of a sample. Raises DataError for values that are no reflectance."""
+    place, remedy = sample.place(f"reflectance from {source}"), "leave it out with `range`, or measure again"
     check_power("reflectance", values, sigma, place, too_high=remedy, remedy=remedy)
-    each = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
     return Spectrum(
         wavelength=sample.wavelength,
         values=values,
@@ -126,9 +171,10 @@ def reflectance_from_counts(
         azimuth=sample.azimuth,
         path=sample.path,
         sha256=sample.sha256,
-        notes=(*sample.notes, f"counts divided by those of the reference {reference.path}"),
+        notes=(*sample.notes, note),
         lines=sample.lines,
-        sweeps=tuple(each),
+        sweeps=tuple(sweeps),
+        name=sample.name,
         declared=sample.declared,
     )
 

@@ -185,7 +185,7 @@ class SceneTable(_Table):
 
 
 class ReferenceTable(_Table):
-    """`[reference]`: the known sample with which a contrast or counts are measured."""
+    """`[reference]`: the known sample of a contrast, of counts or of relative reflectances."""
 
     substrate: Medium | PlateTable
     layer: list[LayerTable] = []
