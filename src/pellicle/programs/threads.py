@@ -9,7 +9,7 @@ from contextlib import contextmanager
 THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
 compiled program: workers share their programs with all other runs."""
-_OF_DASK = ("MALLOC_TRIM_THRESHOLD_",)
+_OF_DASK = ("MALLOC_TRIM_THRESHOLD_", "PYTHONHASHSEED", "__DASK_PARENT_PID")
 """Variables that dask sets for its workers in this process, and leaves there."""
 
 
