@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from pellicle.data.tabular.column_names import FOREIGN, NAMES, RATIO_COLUMNS
 from pellicle.data.tabular.text import Line
@@ -130,6 +131,8 @@ class Column:
     unknown_unit: str | None = None
 
 
+# every file of a batch has the same names, and several formats are tried on its lines
+@lru_cache(4096)
 def recognise(name: str, position: int = 0) -> Column:
     """Return the column that `name` describes; role "other" for an unknown name."""
     plain = name.strip().strip("\"'").strip().lower()
