@@ -1,7 +1,5 @@
 """Airy's formula of one film in complex NumPy, which shares nothing with the package."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings and fixtures of all tests: float64, runtime type checks, a compilation cache."""
 
-from __future__ import annotations
-
 import dataclasses
 import gc
 import importlib.util

@@ -1,7 +1,5 @@
 """A layer on something like silicon, and the signal of a scene by its exact plan."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

@@ -1,7 +1,5 @@
 """Parts of the benchmarks that a wrong number would not reveal: the film of the others, the flag --device."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

@@ -4,8 +4,6 @@ Every `pellicle` command on a page is run here, in the page's order. Commands of
 `ELSEWHERE`, and commands that are too slow for every test run in `SLOW`, each with the reason.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

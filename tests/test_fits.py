@@ -1,7 +1,5 @@
 """Kept fits are complete, their README quotes their results, and they are reproducible."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

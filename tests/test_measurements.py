@@ -1,7 +1,5 @@
 """The measurements that come with the repository: made as they say, and their fits find the truth."""
 
-from __future__ import annotations
-
 import csv
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Notebooks and their scripts agree, contain no outputs, and are pages of the documentation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import jupytext

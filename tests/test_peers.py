@@ -1,7 +1,5 @@
 """Comparison with other packages: reference values, errors and table. None of the packages is needed."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

@@ -1,7 +1,5 @@
 """Measured spectra that are kept beside the repository: thicknesses that others have found too."""
 
-from __future__ import annotations
-
 import json
 import sys
 

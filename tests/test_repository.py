@@ -1,7 +1,5 @@
 """The citation file is complete, and CONTRIBUTING describes the folders and modules that there are."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Measurements in the repository, fitted and compared with a fit by the tmm package and SciPy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 `make docs` checks links and anchors; the engine does not report what is checked here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

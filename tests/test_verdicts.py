@@ -1,7 +1,5 @@
 """Benchmark of verdicts: its independent model, its cases and its scores."""
 
-from __future__ import annotations
-
 import importlib
 import math
 import runpy

@@ -1,7 +1,5 @@
 """Small cases: few wavelengths, few draws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

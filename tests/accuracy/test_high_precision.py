@@ -1,7 +1,5 @@
 """The mpmath reference against the tmm package, and the cases that it refuses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

@@ -1,7 +1,5 @@
 """Intervals on simulated data sets: coverage and width are counted, and a method is recommended."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Methods that simplify birefringent and graded media, against films that are computed directly."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Each method of simulation leaves out its own effect and nothing else, against independent numbers."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

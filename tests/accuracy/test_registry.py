@@ -1,7 +1,5 @@
 """Comparison of methods: results, Pareto front and recommendation, with methods that compile fast."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solvers on simulated data sets: failures and errors are counted, and the best one is recommended."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The comparison of a surface: which ways there are, and what they are off by."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import jax

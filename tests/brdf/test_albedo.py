@@ -1,7 +1,5 @@
 """Albedos of lobes of any width, against adaptive quadrature of formulas written out here."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import jax

@@ -1,7 +1,5 @@
 """A film's lobe under a clear coat, against the equations in NumPy; its energy, and its limits."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Directions: Snell's law, the law of reflection by vectors, and slopes where roots vanish."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

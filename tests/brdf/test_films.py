@@ -1,7 +1,5 @@
 """Microfacets and Blinn-Phong under a film, against tmm and quadrature; the models by name."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,7 +1,5 @@
 """The model of Granier and Heidrich against its equations by vectors, mpmath and quadrature."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import mpmath

@@ -1,7 +1,5 @@
 """Lobes against quadrature and closed forms, their limits, and slopes at their edges."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

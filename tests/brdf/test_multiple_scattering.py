@@ -1,7 +1,5 @@
 """Light reflected more than once between facets: white furnaces, reciprocity, colours by tmm."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Few wavelengths in place of a sensor's table, against sums over the table of reflectances by tmm."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

@@ -1,7 +1,5 @@
 """The command line in this process: quick, with its two streams and its exit code."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`pellicle fit` of BRDF samples: the recipe of a surface, its errors in words, JSON, report and files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

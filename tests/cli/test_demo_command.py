@@ -1,7 +1,5 @@
 """`pellicle demo`: a newcomer's first minute."""
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Arguments in messages of the library become flags on the command line."""
 
-from __future__ import annotations
-
 import json
 import logging
 

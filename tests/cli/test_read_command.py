@@ -1,7 +1,5 @@
 """`pellicle read`: what is understood of files, and their conversion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pellicle.data.read_spectrum import read_spectrum

@@ -1,7 +1,5 @@
 """`pellicle read` of a cube of spectra."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """`pellicle sample` and `pellicle fit --posterior`: files, JSON, exit codes, chains taken up again."""
 
-from __future__ import annotations
-
 import json
 import math
 from datetime import UTC, datetime, timedelta

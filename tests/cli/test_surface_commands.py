@@ -1,7 +1,5 @@
 """`pellicle simulate`, `plan` and `cost` of surfaces."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`--verbose` tells on stderr what was understood and why; without it the library is silent."""
 
-from __future__ import annotations
-
 import logging
 import re
 

@@ -1,7 +1,5 @@
 """Colour of a film by every method, against the Airy formula in steps of 1 nm."""
 
-from __future__ import annotations
-
 import doctest
 from functools import partial
 

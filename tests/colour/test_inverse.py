@@ -1,7 +1,5 @@
 """Thicknesses from simulated 8-bit colours, whose noise the inverse knows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

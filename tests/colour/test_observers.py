@@ -1,7 +1,5 @@
 """Observers, colour spaces and differences against colour-science."""
 
-from __future__ import annotations
-
 import colour
 import jax
 import numpy as np

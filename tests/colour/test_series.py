@@ -1,7 +1,5 @@
 """Colours of published series, computed by tmm and colour-science or named, against their thicknesses."""
 
-from __future__ import annotations
-
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The table of a film's colours against the Airy formula in complex NumPy, in steps of 1 nm."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,7 +1,5 @@
 """Large files are read as a block, with the numbers, lines and messages of the reader of lines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a file declares above its rows: axis, quantity and unit, and several spectra beside each other."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files that are no measurement are named, with what to do; files that are one are not."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 

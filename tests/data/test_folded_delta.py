@@ -1,7 +1,5 @@
 """A folded Δ is recognised by its kinks at 0 and 180, and nothing else is taken for one."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import jax

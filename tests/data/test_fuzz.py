@@ -1,7 +1,5 @@
 """A short run of the damaged and random files that `make fuzz` gives to every reader."""
 
-from __future__ import annotations
-
 import pytest
 
 

@@ -1,7 +1,5 @@
 """Reading, checking and writing of generalised Ψ and Δ."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Noise as users write it, and as standard deviations of samples."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Reading and writing of normalised Mueller elements."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

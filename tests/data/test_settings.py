@@ -1,7 +1,5 @@
 """Azimuths of the sample in files: settings of one measurement, beside angles of incidence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Spectra written as CSV are read back unchanged; NetCDF and NeXus hold the same numbers."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mixtures: their own equations, limits, bounds, gradients at the ends, and fits of a porosity."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

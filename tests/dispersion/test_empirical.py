@@ -1,7 +1,5 @@
 """Dispersion models: values, precision, what lies outside a table, and gradients."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,7 +1,5 @@
 """Oscillators: published numbers, Kramers-Kronig by quadrature, gradients at the hard points."""
 
-from __future__ import annotations
-
 import itertools
 
 import jax

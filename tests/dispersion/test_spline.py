@@ -1,7 +1,5 @@
 """Splines: against SciPy's, within their coefficients, Kramers-Kronig by quadrature."""
 
-from __future__ import annotations
-
 import itertools
 
 import jax

@@ -1,7 +1,5 @@
 """What a tolerance leaves out: within the bound it states, never with a gradient, and for less work."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

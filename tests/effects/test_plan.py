@@ -1,7 +1,5 @@
 """Plans: each effect on and off with its reason, judged from bounds and never from values."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax

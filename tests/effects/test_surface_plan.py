@@ -1,7 +1,5 @@
 """What a surface calls for, and what a tolerance leaves out: within its bound, with no gradient lost."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Synthetic measurements for fits; all of 128 points, so that the tests share compiled programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Verdicts on isotropic and birefringent descriptions of one film, from fits written down by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The unit cube of a search: even, logarithmic, and a disc of tilts, folded or not."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

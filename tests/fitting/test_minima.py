@@ -1,7 +1,5 @@
 """Local minima of a problem: polished until the best has settled, told apart, and sorted."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

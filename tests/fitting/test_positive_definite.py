@@ -1,7 +1,5 @@
 """Small least-squares problems with signs, against SciPy's bounded least squares."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Both kinds of view, spectra and BRDF samples, fulfil the protocol on which fits rest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Covariance where residuals stand for the noise of their points: the sandwich estimator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import norm, t

@@ -1,7 +1,5 @@
 """Scenes with birefringent media: closed forms against published formulas, plans and refusals."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

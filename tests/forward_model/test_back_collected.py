@@ -1,7 +1,5 @@
 """Back faces of plates of which only a part of the light is collected, order by order."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax

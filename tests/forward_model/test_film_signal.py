@@ -1,7 +1,5 @@
 """Models compiled from plans: they compute what the scene calls for, and nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax

@@ -1,7 +1,5 @@
 """Simulated generalised Ψ and Δ, and samples turned about their normal."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

@@ -1,7 +1,5 @@
 """The instrument's windows in a model: bandwidth and uneven thickness against brute averages."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

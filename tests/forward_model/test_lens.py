@@ -1,7 +1,5 @@
 """Films whose optic axis is tilted in a cone of light, against sums over 640 rays in fixed axes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

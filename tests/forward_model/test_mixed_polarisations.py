@@ -1,7 +1,5 @@
 """Birefringent films with tilted axes on incoherent plates, against averages over the phase in the plate."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

@@ -1,7 +1,5 @@
 """Ellipsometry through plates: the orders of light between a plate's faces add as Mueller matrices."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

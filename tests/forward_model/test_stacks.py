@@ -1,7 +1,5 @@
 """Stacks in full: plates anywhere, uneven layers, rough and graded interfaces, against independent codes."""
 
-from __future__ import annotations
-
 import math
 
 import jax

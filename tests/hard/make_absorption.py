@@ -6,8 +6,6 @@ Optical Filters, chapter 2). Beside each number stands its condition: by how muc
 where every input changes by its own size. Run as `python tests/hard/make_absorption.py`.
 """
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 from pathlib import Path

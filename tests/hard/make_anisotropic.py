@@ -6,8 +6,6 @@ medium is changed by 1e-50, so that no waves are equal. Derivatives are central 
 `python tests/hard/make_anisotropic.py`; it takes a minute.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

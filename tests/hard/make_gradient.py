@@ -6,8 +6,6 @@ must agree to 1e-15 before a number is written. Derivatives are differences of t
 `python tests/hard/make_gradient.py`; it takes some minutes.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

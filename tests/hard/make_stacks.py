@@ -5,8 +5,6 @@ number stands its condition: by how much it changes, to first order, where every
 size. Run as `python tests/hard/make_stacks.py`; it takes some minutes.
 """
 
-from __future__ import annotations
-
 import json
 from itertools import chain
 from pathlib import Path

@@ -3,8 +3,6 @@
 Run as `python tests/hard/make_table.py`.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

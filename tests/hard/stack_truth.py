@@ -6,8 +6,6 @@ recursion over reflections (P. Rouard, 1937; for one film the sum of G. B. Airy,
 the substrate, n of the ambient, the angle and the wavelength.
 """
 
-from __future__ import annotations
-
 from mpmath import mp, mpc, mpf
 
 mp.dps = 160

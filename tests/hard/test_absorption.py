@@ -8,8 +8,6 @@ floor is that of a signal of size 1: the derivative of a layer's matrix contains
 to k₀d roundings of 1 (130 of them in the layer of 0.1 mm, whose |f| is known to 2).
 """
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

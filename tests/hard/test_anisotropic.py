@@ -4,8 +4,6 @@ Each is computed in the closed form of uniaxial media and as a tensor of any kin
 measured against |derivative| + the largest derivative of the outputs in that parameter + 1e-3.
 """
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -4,8 +4,6 @@ The Jones matrices and their derivatives are those of the table, to 50 digits; m
 In several films nothing turns p into s, so that tan Ψ is 0 and Δ has no meaning.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Graded layers and their derivatives against 14 digits (gradient.json, by make_gradient.py)."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -3,8 +3,6 @@
 An error of a derivative is measured against |derivative| + 1e-3, for many derivatives are 0.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache

@@ -1,7 +1,5 @@
 """R, T and their slopes for media with principal axes along the laboratory's, against 50 digits."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import jax

@@ -7,8 +7,6 @@ does (a layer that is a millimetre thick has no derivative left, but rounds all 
 faint reflection have 1/|r| of that: r is a difference between roots of size 1.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 from functools import cache, partial

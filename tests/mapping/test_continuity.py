@@ -1,7 +1,5 @@
 """Orders by neighbours on constructed maps, against the thicknesses from which they were made."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Rates of change of thickness maps with an axis of time, against known rates and NumPy's polynomial fit."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lamp curves of simulated cubes against the curves by which they were multiplied."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np

@@ -5,8 +5,6 @@ exponential of D by its eigenvectors. The lens turns a ray and its fields as vec
 sample is its mirror image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

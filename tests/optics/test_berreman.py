@@ -1,7 +1,5 @@
 """The 4×4 method against eigenvectors of Berreman's matrix, the 2×2 method, and laws of physics."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The entry for coherent layers: which formula it takes, and that both agree."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

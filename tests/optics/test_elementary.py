@@ -1,7 +1,5 @@
 """Sine and cosine by polynomials, and their squares, against 30 digits."""
 
-from __future__ import annotations
-
 import jax
 import mpmath
 import numpy as np

@@ -1,7 +1,5 @@
 """Ψ and Δ against an independent transfer matrix, in the convention of instruments."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

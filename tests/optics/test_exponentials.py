@@ -1,7 +1,5 @@
 """exp and expm1 against the library's in more digits."""
 
-from __future__ import annotations
-
 import jax.numpy as jnp
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Elements of the characteristic matrix, and the closed form of a film, for every number type."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import mpmath

@@ -1,7 +1,5 @@
 """Graded layers against closed forms: Airy functions (ε linear in depth), Bessel functions (exponential)."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import mpmath as mp

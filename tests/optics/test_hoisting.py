@@ -1,7 +1,5 @@
 """Hoisted coefficients keep their values, and are stored once instead of recomputed at each point."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """One boundary: Fresnel's coefficients, energy, and the branch of the root."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

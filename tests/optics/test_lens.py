@@ -1,7 +1,5 @@
 """Rays of a lens and their number on birefringent films, against vectors and the 4×4 method in fixed axes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """The layer as a series in its round-trip phase: against the closed form and against brute averaging."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Pair against numpy's complex numbers, and the roots, sines and cosines that formulas are made of."""
 
-from __future__ import annotations
-
 import operator
 
 import jax

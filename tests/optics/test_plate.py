@@ -1,7 +1,5 @@
 """A thick plate: intensities, not amplitudes, add between its faces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Functions that act at each wavelength: their derivatives, and that slopes are computed once."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

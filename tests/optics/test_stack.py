@@ -1,7 +1,5 @@
 """Several coherent layers against the tmm package, the closed form of a film, and 200 digits."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,7 +1,5 @@
 """Programs kept between processes: which files are loaded, which are not."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

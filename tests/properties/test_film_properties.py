@@ -1,7 +1,5 @@
 """What holds for every film: energy, limits, reciprocity, and that nothing is ever not finite."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import jax

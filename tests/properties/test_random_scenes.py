@@ -1,7 +1,5 @@
 """A few of the random stacks that `make properties` draws by the million."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

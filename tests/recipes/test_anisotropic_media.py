@@ -1,7 +1,5 @@
 """Birefringent media in recipes: keys, angles, messages."""
 
-from __future__ import annotations
-
 import pytest
 
 from pellicle.dispersion.anisotropic import Anisotropic

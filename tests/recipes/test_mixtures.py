@@ -1,7 +1,5 @@
 """Mixtures, sums of oscillators and splines as recipes write them, and words of every model."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

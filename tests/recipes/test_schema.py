@@ -1,7 +1,5 @@
 """The kept JSON schema of recipes: the one that the models give, and true of the repository's recipes."""
 
-from __future__ import annotations
-
 import json
 import runpy
 import tomllib

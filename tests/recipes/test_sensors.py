@@ -1,7 +1,5 @@
 """Sensors of surfaces by name and file, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

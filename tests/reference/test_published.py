@@ -1,7 +1,5 @@
 """Numbers that textbooks and papers give."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

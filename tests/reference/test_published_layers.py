@@ -1,7 +1,5 @@
 """Published numbers of birefringent and graded layers, which docs/published.md lists."""
 
-from __future__ import annotations
-
 import pytest
 
 

@@ -4,8 +4,6 @@ Hues are those of CIELAB as colour-science's own names place them: yellow about 
 blue 270°. Spectra are of the textbook formula in complex NumPy, colours by colour-science.
 """
 
-from __future__ import annotations
-
 import colour
 import jax
 import numpy as np

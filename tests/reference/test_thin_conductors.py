@@ -1,7 +1,5 @@
 """What Gerardin, Holzschuch and Martinetto 2019 (thin conductors and semi-conductors) say of real films."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Random films against the `tmm` package (S. J. Byrnes, arXiv:1603.02720), an independent code."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

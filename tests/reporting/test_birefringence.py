@@ -1,7 +1,5 @@
 """Tables, text and figures of a birefringent layer, from a fit written down by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Figure of a BRDF fit: every sample is drawn at its half angle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Results show themselves in Python: report, figure, folder and HTML of every kind of result."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Films whose posterior is known on a grid; all of 5 or of 128 points, so that programs are shared."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Chains on disk: resumed after a kill as if nothing had happened, and refused where they do not belong."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

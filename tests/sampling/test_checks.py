@@ -1,7 +1,5 @@
 """Chains whose autocorrelation, mixing and coverage of minima are known by construction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

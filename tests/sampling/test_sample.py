@@ -1,7 +1,5 @@
 """The sampled posterior against the same posterior on a grid, simulated by the tmm package."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

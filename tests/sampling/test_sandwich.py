@@ -1,7 +1,5 @@
 """Draws stretched to the covariance of the sandwich estimator, in two minima and beside a bound."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pellicle.fitting.covariance import Errors

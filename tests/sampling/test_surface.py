@@ -1,7 +1,5 @@
 """Posteriors of a surface: against the errors of a fit, of another problem, and of a tilt."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Systematic effects in a posterior: against explicit covariances, and against the errors of a fit."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

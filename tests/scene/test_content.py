@@ -1,7 +1,5 @@
 """Results that are kept by the content of scenes and arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Scenes: free parameters and their bounds, words for numbers, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Profiles and graded media: faces, bounds, the mean over depth, and what is refused."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Numbers of a surface: free ones for each channel, defaults, and what is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

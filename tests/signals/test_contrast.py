@@ -1,7 +1,5 @@
 """Optical contrast against a reference of its own: values by the package tmm, fits, files and recipes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

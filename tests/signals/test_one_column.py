@@ -1,7 +1,5 @@
 """A signal of one column that a class alone defines: nothing else knows its word."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, ClassVar
 

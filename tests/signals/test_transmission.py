@@ -1,7 +1,5 @@
 """Ψ and Δ of transmitted light: values by the package tmm, fits in Python and by the command, files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

@@ -1,7 +1,5 @@
 """BRDF samples whose channels are integrals over bands, against sums in steps of 1 nm in NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

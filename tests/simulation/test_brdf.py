@@ -1,7 +1,5 @@
 """Simulated samples of a BRDF: their directions, values and noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ Orders between the faces of plates are in `test_plates` and `test_back_collected
 is what depolarisation leaves.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import tmm

@@ -1,7 +1,5 @@
 """Absorptance of layers and field in depth, against the `tmm` package and by conservation of energy."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Depth profiles of scenes with plates, against the `tmm` package and by conservation of energy."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The library's front door: traced through every argument, precision, and what it refuses."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import partial

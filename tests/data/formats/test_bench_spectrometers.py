@@ -1,7 +1,5 @@
 """Text files of PerkinElmer, JASCO and Bruker, and exports that are plain tables, as Hitachi's."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

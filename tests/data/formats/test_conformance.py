@@ -1,7 +1,5 @@
 """What every reader of text exports must do with the samples in `samples/READER/`."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Text files of Avantes, Ocean Optics and StellarNet."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plain tables as people and spreadsheets write them: read right, or refused with what to do."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Cary, UVProbe and other tables with several scans side by side, and tables below each other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small surfaces and sets of BRDF samples; sizes and free numbers that share compiled programs."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """A known surface, directions in which a goniometer takes samples of it, and searches that start near it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two surfaces compared on the same samples, against criteria computed by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Errors under noise in proportion to the signal, which nobody gives or which is given as a share."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

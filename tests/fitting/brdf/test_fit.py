@@ -1,7 +1,5 @@
 """Whole fits: a surface that is known, surfaces without a layer, and samples that cannot be fitted."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import jax

@@ -1,7 +1,5 @@
 """Evidence for a layer: the rule, and each reason that alone denies it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

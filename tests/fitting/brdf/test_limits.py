@@ -1,7 +1,5 @@
 """Limits beside bounds against SciPy: each number fixed, the others fitted again to the same samples."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Priors, robust losses, tolerances and joint fits of BRDF samples. The search is replaced by one start."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import jax

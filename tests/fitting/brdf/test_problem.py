@@ -1,7 +1,5 @@
 """A surface and samples of it as a problem: parameters, coordinates, and the baselines without a layer."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rounds of the search: what is drawn anew, what is kept, and when it stops. Programs are replaced."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

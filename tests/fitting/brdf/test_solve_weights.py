@@ -1,7 +1,5 @@
 """Weights of lobes against SciPy's nonnegative least squares of each lobe alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import nnls

@@ -1,7 +1,5 @@
 """Warnings on what the directions of samples cannot determine, and on numbers that mean little."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

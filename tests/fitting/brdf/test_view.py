@@ -1,7 +1,5 @@
 """What is compared of a BRDF, by name, with its inverse and its slope."""
 
-from __future__ import annotations
-
 import jax.numpy as jnp
 import numpy as np
 import pytest

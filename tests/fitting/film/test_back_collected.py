@@ -1,7 +1,5 @@
 """Fits of the share of the light from a back face that reaches the detector."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

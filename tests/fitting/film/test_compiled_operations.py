@@ -7,8 +7,6 @@ counted here, each as often as the loop that contains it has elements, and `SCAL
 join or sum.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Measured depolarisation in a fit, against averages of films by the package tmm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

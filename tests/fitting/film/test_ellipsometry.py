@@ -1,7 +1,5 @@
 """Thicknesses from Ψ and Δ."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax

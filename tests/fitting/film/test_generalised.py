@@ -1,7 +1,5 @@
 """Fits of generalised Ψ and Δ: an isotropic film by the package tmm, and a tilted one at several azimuths."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

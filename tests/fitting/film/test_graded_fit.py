@@ -1,7 +1,5 @@
 """Fit of a graded film: its parameters, profile.csv and the panel of its figure."""
 
-from __future__ import annotations
-
 import csv
 from types import SimpleNamespace
 from unittest.mock import Mock

@@ -1,7 +1,5 @@
 """Several spectra of one sample, fitted together."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

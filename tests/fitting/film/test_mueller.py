@@ -1,7 +1,5 @@
 """Fits of normalised Mueller elements, against data by the package tmm."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Ellipsometry of a film on a plate whose back face sends unpolarised light along."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two layers from one spectrum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

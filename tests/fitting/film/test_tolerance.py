@@ -1,7 +1,5 @@
 """Fits that leave out what a tolerance allows, and what they do when that was too much."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
