@@ -138,9 +138,9 @@ def _remove_strays(folder: Path, stem: str | None = None) -> None:
     """Remove temporary files, of one `stem` or all, whose process has ended."""
     with suppress(OSError):  # a folder that cannot be read is reported where it is written
         for file in os.scandir(folder):
-            found = _TEMPORARY.fullmatch(file.name)
-            if found and stem in (None, found["stem"]):
-                here, process = found["machine"] == _machine(), int(found["process"])
+            match = _TEMPORARY.fullmatch(file.name)
+            if match and stem in (None, match["stem"]):
+                here, process = match["machine"] == _machine(), int(match["process"])
                 if (here and _has_ended(process)) or file.stat().st_mtime < time.time() - _LONGEST:
                     os.unlink(file)
 

@@ -142,8 +142,8 @@ def colour_maps(scene: Scene, thickness: np.ndarray, angle: np.ndarray) -> list[
             times[name].append(program.seconds())
     try:
         return [
-            ColourMap(name, found, differences(eye, exact, found), min(times[name]))
-            for name, found in ((name, program.run()) for name, program in running.items())
+            ColourMap(name, colours, differences(eye, exact, colours), min(times[name]))
+            for name, colours in ((name, program.run()) for name, program in running.items())
         ]
     except ImportError as missing:
         raise UsageError(str(missing)) from None

@@ -212,7 +212,7 @@ def _amplitudes(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, An
 
 def _faces(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any, Any]:
     """R and T from above, R and T from below."""
-    found = []
+    faces = []
     for above, layers, below in (
         (group.above, group.layers, group.below),
         (group.below, group.layers[::-1], group.above),
@@ -220,8 +220,8 @@ def _faces(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any, An
         top, bottom = _admittance(point, above, letter), _admittance(point, below, letter)
         E, H = _fields(point, layers, bottom, letter)
         start = top * E + H
-        found += [
+        faces += [
             abs((top * E - H) / start) ** 2,
             4 * abs(top) ** 2 * mp.re(bottom) / abs(start) ** 2 / mp.re(top),
         ]
-    return tuple(found)
+    return tuple(faces)

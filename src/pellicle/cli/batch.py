@@ -106,9 +106,9 @@ class Batch:
                 f"{self.kept} of {len(groups)} files were not fitted again: an earlier run has their results,"
                 " of the same data, scene, settings and version; --refit fits them, too"
             )
-        found = self._compare() if self.inputs.repeats and worst != INTERRUPTED else None
+        compared = self._compare() if self.inputs.repeats and worst != INTERRUPTED else None
         if self.out is not None and len(groups) > 1 and self.records:
-            worst = max(worst, self._index(folders, found))
+            worst = max(worst, self._index(folders, compared))
         return worst
 
     def _summarise(self, files: int) -> int:
@@ -147,16 +147,16 @@ class Batch:
         from pellicle.reporting.repeats import failure, report, to_json, write_repeats
 
         try:
-            found = repeats(self.fits)
+            compared = repeats(self.fits)
         except UsageError as error:
             say(f"pellicle: {error}")
             if self.json:
                 print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
             return None
-        show(one_line(to_json(found)) if self.json else report(found), self.out is not None)
+        show(one_line(to_json(compared)) if self.json else report(compared), self.out is not None)
         if self.out is not None:
-            write_repeats(self.out, found)
-        return found
+            write_repeats(self.out, compared)
+        return compared
 
     def _codes(self, groups: list[list[Input]], folders: list[Path | None]) -> Iterator[int]:
         """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""
@@ -202,8 +202,8 @@ class Batch:
             if folder is not None:
                 settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
-                if not self.refit and (found := earlier(folder, identity)):
-                    return self._repeat(found, folder)
+                if not self.refit and (kept := earlier(folder, identity)):
+                    return self._repeat(kept, folder)
             with Progress(place) as progress:
                 fit, posterior = self._result(data, scene, folder, progress)
         except ValueError as error:
@@ -223,13 +223,13 @@ class Batch:
             code = TOO_SHORT
         return code if folder is None else max(code, self._write(folder, files, fit, posterior, identity))
 
-    def _repeat(self, found: Earlier, folder: Path) -> int:
+    def _repeat(self, kept: Earlier, folder: Path) -> int:
         """Print the result of an earlier run, and return its exit code."""
         self.kept += 1
-        self.records.append(found.record)
-        self._print(found.record, found.report)
+        self.records.append(kept.record)
+        self._print(kept.record, kept.report)
         say(f"{folder}: from an earlier run")
-        return CONVERGED if found.record["status"] == "converged" else UNCLEAR
+        return CONVERGED if kept.record["status"] == "converged" else UNCLEAR
 
     def _print(self, record: dict[str, Any], report: str) -> None:
         from pellicle.reporting.json_record import one_line
@@ -299,10 +299,10 @@ def measurement(
 
     data, scenes = [], []
     for file in files:
-        found = file.read()
-        for values in found:
+        spectra = file.read()
+        for values in spectra:
             say(*(f"{file.path}: {note}" for note in values.notes if notes))
-            shared = len(files) + len(found) > 2 and not file.own_scale
+            shared = len(files) + len(spectra) > 2 and not file.own_scale
             scene = file.scene
             if shared and isinstance(values, Spectrum) and isinstance(scene, Scene):
                 scene = without_scale(scene, values)

@@ -130,10 +130,10 @@ def _objects(
     if view == "methods":
         from pellicle.reporting.sphere_figures import draw_methods
 
-        for found in draw_methods(scene, out, nm, title):
+        for method in draw_methods(scene, out, nm, title):
             say(
-                f"{found.name}: ΔE2000 {found.delta_e.mean():.2g} in the mean, {found.delta_e.max():.2g} at"
-                f" most, {found.seconds * 1e9:.0f} ns a colour"
+                f"{method.name}: ΔE2000 {method.delta_e.mean():.2g} in the mean,"
+                f" {method.delta_e.max():.2g} at most, {method.seconds * 1e9:.0f} ns a colour"
             )
     elif view == "bubble":
         from pellicle.reporting.sphere_figures import bubbles

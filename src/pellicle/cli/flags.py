@@ -82,10 +82,10 @@ def flags_of(record: type[Options], *names: str) -> Callable[[type[Kind]], type[
         declared = {name: record.declared()[name] for name in names or record.declared()}
         made = [(name, _flag_type(*about), field(default=None)) for name, about in declared.items()]
         space = {"record": record, "__doc__": cls.__doc__, "__module__": cls.__module__}
-        found: Any = make_dataclass(
+        flags: Any = make_dataclass(
             cls.__name__, made, bases=(cls,), namespace=space, frozen=True, kw_only=True
         )
-        return found
+        return flags
 
     return decorate
 

@@ -274,13 +274,13 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
     read_file = partial(read, path, reading, scene)
     if reading.spectrum == ALL:
         try:
-            found = read_file()
+            spectra = read_file()
         except ValueError:
-            found = []  # reported when it is fitted
-        if len(found) > 1:
+            spectra = []  # reported when it is fitted
+        if len(spectra) > 1:
             return [
                 Input(f"{path} [{one.name}]", partial(list, [one]), scene, own_scale, path, one.name)
-                for one in found
+                for one in spectra
             ]
     return [Input(path, read_file, scene, own_scale, path)]
 

@@ -54,10 +54,10 @@ def read(
         raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
     if options.reference or options.reference_material:
         start()  # the reflectance of the reference is computed
-    worst, found = GOOD, []
+    worst, measurements = GOOD, []
     for path in data:
         try:
-            found += _measurements(path, options, cubes or CubeOnlyFlags())
+            measurements += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
             worst = BAD_DATA
             _report_error(path, as_flags(str(error)), json)
@@ -65,12 +65,12 @@ def read(
     if out is not None:
         from pellicle.data.cube import Cube
 
-        if any(isinstance(one, Cube) for one in found):
+        if any(isinstance(one, Cube) for one in measurements):
             raise UsageError("--out writes spectra, and a cube stays in its file: leave it out")
-    for measurement in found:
+    for measurement in measurements:
         _show(measurement, json)
     if out is not None:
-        _write(Path(out), found, formats)
+        _write(Path(out), measurements, formats)
     return worst
 
 
@@ -121,15 +121,15 @@ def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
     import numpy as np
 
     every = replace(options, spectrum=options.spectrum or "all")
-    found = read_file(path, every)
+    spectra = read_file(path, every)
     if options.angle is None:
-        return found
+        return spectra
     if isinstance(options.angle, list):
         raise UsageError(f"{path}: --angle lists several: of spectra give one, or a column angle_deg")
-    stated = [one.source for one in found if one.angle is not None and np.any(one.angle != options.angle)]
+    stated = [one.source for one in spectra if one.angle is not None and np.any(one.angle != options.angle)]
     if stated:
         raise UsageError(f"{stated[0]}: states its own angles; leave --angle out")
-    return [replace(one, angle=np.full(len(one), float(options.angle))) for one in found]
+    return [replace(one, angle=np.full(len(one), float(options.angle))) for one in spectra]
 
 
 def _report_error(path: str, message: str, as_json: bool) -> None:
@@ -150,14 +150,14 @@ def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
     print(text, flush=True)
 
 
-def _write(folder: Path, found: list[Any], formats: list[str]) -> None:
+def _write(folder: Path, measurements: list[Any], formats: list[str]) -> None:
     from pellicle.data.colours import Colours, write_colours
     from pellicle.data.write_spectrum import write_spectrum
     from pellicle.reporting.figures import draw_spectrum as draw
     from pellicle.reporting.folders import distinct_stems
     from pellicle.reporting.matplotlib_figure import save_figure
 
-    if formats != ["csv"] and any(isinstance(one, Colours) for one in found):
+    if formats != ["csv"] and any(isinstance(one, Colours) for one in measurements):
         raise UsageError(f"--to {','.join(formats)}: colours are written as csv; leave it out")
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -165,8 +165,8 @@ def _write(folder: Path, found: list[Any], formats: list[str]) -> None:
         raise UsageError(
             f"--out {folder}: cannot be made ({error.strerror}); choose another folder"
         ) from None
-    labels = [f"{one.path} [{one.name}]" if one.name else one.path for one in found]
-    for one, stem in zip(found, distinct_stems(labels), strict=True):
+    labels = [f"{one.path} [{one.name}]" if one.name else one.path for one in measurements]
+    for one, stem in zip(measurements, distinct_stems(labels), strict=True):
         if isinstance(one, Colours):
             written = [write_colours(folder / f"{stem}.csv", [one])]
         else:

@@ -58,7 +58,7 @@ def candidates(
             f"{table.path}: holds samples of a BRDF, not a spectrum; fit them with a `recipe` of the surface "
             "(Python: pl.read_brdf_samples)"
         )
-    own, found = table.layout.name, []
+    own, spectra = table.layout.name, []
     word, wanted = _ellipsometric(named, signal, elements)
     if word is not None:
         if word == SIGNAL:
@@ -66,16 +66,16 @@ def candidates(
         else:
             select = generalised_columns if word == Generalised.word else mueller_columns
             chosen = select(table, named, elements)
-        found.append(Candidate(table, chosen, own or word, word, None))
+        spectra.append(Candidate(table, chosen, own or word, word, None))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
-            return found
+            return spectra
     powers = signal_columns(table, columns, signal, polarisation)
     for power in powers:
         column = power.signal
-        alone = len(powers) + len(found) == 1
+        alone = len(powers) + len(spectra) == 1
         label = own if alone else " ".join(part for part in (own, column.name) if part)
-        found.append(Candidate(table, power, label or column.name, column.role, column.polarisation))
-    return found
+        spectra.append(Candidate(table, power, label or column.name, column.role, column.polarisation))
+    return spectra
 
 
 def _ellipsometric(
@@ -105,45 +105,45 @@ def file_candidates(
 
     Raises as `candidates` does where no table has them.
     """
-    found: list[Candidate] = []
+    spectra: list[Candidate] = []
     refusals: list[DataError | UsageError] = []
     for table in tables:
         try:
-            found += candidates(table, columns, signal, polarisation, elements)
+            spectra += candidates(table, columns, signal, polarisation, elements)
         except (DataError, UsageError) as refusal:
             if len(tables) == 1 or (signal is None and polarisation is None and elements is None):
                 raise
             refusals.append(refusal)
-    if not found:
+    if not spectra:
         raise refusals[0]
-    if signal is None and elements is None and any(one.signal == SIGNAL for one in found):
-        return [one for one in found if one.signal not in _OF_ANISOTROPIC]
-    return found
+    if signal is None and elements is None and any(one.signal == SIGNAL for one in spectra):
+        return [one for one in spectra if one.signal not in _OF_ANISOTROPIC]
+    return spectra
 
 
-def chosen(found: Sequence[Candidate], spectrum: str | None, *, together: bool) -> list[Candidate]:
+def chosen(spectra: Sequence[Candidate], spectrum: str | None, *, together: bool) -> list[Candidate]:
     """Return the spectrum of this name, or all; without a name the only one.
 
     `together` also returns Ψ and Δ with the reflectances and transmittances beside them, which are of one
     film. Raises UsageError where the choice is open, with the arguments that settle it.
     """
-    path = found[0].table.path
+    path = spectra[0].table.path
     if spectrum == ALL:
-        return list(found)
+        return list(spectra)
     if spectrum is not None:
         wanted = spectrum.strip().lower()
-        named = [one for one in found if one.name.lower() == wanted]
+        named = [one for one in spectra if one.name.lower() == wanted]
         if len(named) == 1:
             return named
         reason = f"has no spectrum {spectrum!r}" if not named else f"has {len(named)} spectra {spectrum!r}"
-        raise UsageError(f"{path}: {reason}; it has {_listed(found)}")
-    if len(found) == 1:
-        return list(found)
-    signals = {one.signal for one in found}
-    kinds = [one.signal for one in found if one.signal in _ELLIPSOMETRY]
+        raise UsageError(f"{path}: {reason}; it has {_listed(spectra)}")
+    if len(spectra) == 1:
+        return list(spectra)
+    signals = {one.signal for one in spectra}
+    kinds = [one.signal for one in spectra if one.signal in _ELLIPSOMETRY]
     if len(kinds) == 1:
         if together:
-            return list(found)
+            return list(spectra)
         powers = sorted(signals - set(kinds))
         raise UsageError(
             f"{path}: has {_ELLIPSOMETRY[kinds[0]]} as well as {', '.join(powers)}; choose one with `signal`,"
@@ -154,18 +154,18 @@ def chosen(found: Sequence[Candidate], spectrum: str | None, *, together: bool) 
         raise UsageError(
             f'{path}: has both R and T; choose one with `signal="R"` or `signal="T"`, or take {every}'
         )
-    if len({one.polarisation for one in found}) == len(found) > 1:
-        names = listed([one.columns.signal for one in found if isinstance(one.columns, SpectrumColumns)])
+    if len({one.polarisation for one in spectra}) == len(spectra) > 1:
+        names = listed([one.columns.signal for one in spectra if isinstance(one.columns, SpectrumColumns)])
         raise UsageError(
             f'{path}: has {names}; choose one with `polarisation="s"`, `polarisation="p"` or '
             f'`polarisation="unpolarised"`, or take {every}'
         )
     raise UsageError(
-        f"{path}: has {len(found)} spectra: {_listed(found)}; choose one, as in "
-        f'`spectrum="{found[0].name}"`, or take {every}'
+        f"{path}: has {len(spectra)} spectra: {_listed(spectra)}; choose one, as in "
+        f'`spectrum="{spectra[0].name}"`, or take {every}'
     )
 
 
-def _listed(found: Sequence[Candidate]) -> str:
-    more = f" and {len(found) - _MOST_LISTED} more" if len(found) > _MOST_LISTED else ""
-    return ", ".join(repr(one.name) for one in found[:_MOST_LISTED]) + more
+def _listed(spectra: Sequence[Candidate]) -> str:
+    more = f" and {len(spectra) - _MOST_LISTED} more" if len(spectra) > _MOST_LISTED else ""
+    return ", ".join(repr(one.name) for one in spectra[:_MOST_LISTED]) + more

@@ -109,8 +109,8 @@ class Option:
         """Return the value; raise ValueError, a sentence that lacks the option's name, for a wrong one."""
         for one in value if isinstance(value, list | tuple) else [value]:
             if isinstance(one, str):
-                found, known = (one in self.words, self.words) if self.find is None else self.find(one)
-                if known and not found:
+                valid, known = (one in self.words, self.words) if self.find is None else self.find(one)
+                if known and not valid:
                     raise ValueError(f"must be one of {', '.join(known)}, not {one!r}")
             elif isinstance(one, float | int):
                 inside = self.least < one < self.most if self.exclusive else self.least <= one <= self.most
@@ -168,12 +168,12 @@ class Options:
 
 @cache
 def _declared(record: type[Options]) -> dict[str, tuple[Any, Option]]:
-    found = {}
+    declared = {}
     for base in reversed(record.__mro__):
         if "__dataclass_fields__" in vars(base):  # of a table of pydantic, the records that it extends
             for name, hint in get_type_hints(base, include_extras=True).items():
-                found[name] = hint.__origin__, next(x for x in hint.__metadata__ if isinstance(x, Option))
-    return found
+                declared[name] = hint.__origin__, next(x for x in hint.__metadata__ if isinstance(x, Option))
+    return declared
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,27 +49,27 @@ def generalised_columns(
         )
     if ratios is not None:
         Generalised(tuple(ratios))
-    found: dict[str, tuple[Column, Column]] = {}
+    pairs: dict[str, tuple[Column, Column]] = {}
     for name in RATIOS:
         psi, delta = (only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
         if psi and delta:
-            found[name] = psi, delta
+            pairs[name] = psi, delta
         elif psi or delta:
             raise DataError(
                 f"{table.path}: has {listed([c for c in (psi, delta) if c])} alone, and each ratio needs psi"
                 " and delta; add the other, or skip it with _ in `columns`"
             )
-    if absent := [name for name in ratios or () if name not in found]:
+    if absent := [name for name in ratios or () if name not in pairs]:
         raise UsageError(
-            f"{table.path}: has no ratio {', '.join(absent)}; it has {', '.join(found) or 'none'}"
+            f"{table.path}: has no ratio {', '.join(absent)}; it has {', '.join(pairs) or 'none'}"
         )
-    if not found:
+    if not pairs:
         raise DataError(
             f"{table.path}: no generalised psi and delta (psi_ane and delta_ane, or of aps or asp) are among "
             f"{listed(columns)}; name the columns in order, as in {_EXAMPLE}"
         )
-    chosen = tuple(name for name in found if ratios is None or name in ratios)
-    values = tuple(column for name in chosen for column in found[name])
+    chosen = tuple(name for name in pairs if ratios is None or name in ratios)
+    values = tuple(column for name in chosen for column in pairs[name])
     for column in values:
         if column.unknown_unit:
             raise DataError(
@@ -91,14 +91,14 @@ def generalised_columns(
 def _error_columns(table: Table, columns: Sequence[Column], values: Sequence[Column]) -> tuple[Column, ...]:
     """A standard deviation of each value, one `sigma` for every Ψ, or none."""
     own = [only(table, columns, f"sigma_{column.role}") for column in values]
-    found = tuple(column for column in own if column is not None)
-    if found and len(found) < len(values):
+    stated = tuple(column for column in own if column is not None)
+    if stated and len(stated) < len(values):
         raise DataError(
-            f"{table.path}: gives standard deviations of some of the columns only ({listed(found)}); add the"
+            f"{table.path}: gives standard deviations of some of the columns only ({listed(stated)}); add the"
             " others, or skip these with _ in `columns`"
         )
     one = only(table, columns, "sigma")
-    return found or ((one,) if one else ())
+    return stated or ((one,) if one else ())
 
 
 def _sigmas(

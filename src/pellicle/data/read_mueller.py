@@ -92,14 +92,14 @@ def _error_columns(
 ) -> tuple[tuple[Column, ...], list[str]]:
     """A standard deviation of each element, one `sigma` for all, or none, with a sentence."""
     own = [only(table, columns, f"sigma_{column.role}") for column in values]
-    found = tuple(column for column in own if column is not None)
-    if found and len(found) < len(values):
+    stated = tuple(column for column in own if column is not None)
+    if stated and len(stated) < len(values):
         raise DataError(
-            f"{table.path}: gives standard deviations of some of the elements only ({listed(found)}); add the"
-            " others, or skip these with _ in `columns`"
+            f"{table.path}: gives standard deviations of some of the elements only ({listed(stated)}); add"
+            " the others, or skip these with _ in `columns`"
         )
-    if found:
-        return found, [f"{listed(found)} read as their standard deviations"]
+    if stated:
+        return stated, [f"{listed(stated)} read as their standard deviations"]
     both = only(table, columns, "sigma")
     return ((both,), [f"{listed([both])} read as the standard deviation of each"]) if both else ((), [])
 

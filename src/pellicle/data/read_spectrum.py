@@ -94,9 +94,9 @@ def read_spectrum(
     )
     if spectrum == ALL:
         raise UsageError(f"{path}: one spectrum is wanted; read all of a file with pl.read_spectra")
-    found = reading.find(path)
-    [one] = found if len(found) == 1 else chosen(found, spectrum, together=False)
-    return reading.read(one, several=len(found) > 1)
+    candidates = reading.find(path)
+    [one] = candidates if len(candidates) == 1 else chosen(candidates, spectrum, together=False)
+    return reading.read(one, several=len(candidates) > 1)
 
 
 def read_spectra(
@@ -113,9 +113,9 @@ def read_spectra(
     **Raises:** as `read_spectrum`.
     """
     options = _Reading(**reading)
-    found = options.find(path)
-    several = len(found) > 1
-    return [options.read(one, several) for one in chosen(found, spectrum, together=True)]
+    candidates = options.find(path)
+    several = len(candidates) > 1
+    return [options.read(one, several) for one in chosen(candidates, spectrum, together=True)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,20 +138,20 @@ class _Reading(SpectrumOptions):
     def find(self, path: str | os.PathLike[str]) -> list[Candidate]:
         """Find the spectra of a file that these arguments may mean."""
         tables = read_tables(path, self.spot)
-        found = file_candidates(tables, self.columns, self.signal, self.polarisation, self.elements)
+        candidates = file_candidates(tables, self.columns, self.signal, self.polarisation, self.elements)
         stated = ("folded", self.folded), ("analyser", self.analyser is not None)
         asked = [name for name, given in (*stated, ("transmission", self.transmission)) if given]
-        if asked and all(one.signal != SIGNAL for one in found):
+        if asked and all(one.signal != SIGNAL for one in candidates):
             name = asked[0]
             raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
         kinds = {SIGNAL: "psi and delta are in degrees", Mueller.word: "Mueller elements have no unit"}
         kinds[Generalised.word] = kinds[SIGNAL]
-        if all(one.signal in kinds for one in found):
+        if all(one.signal in kinds for one in candidates):
             if self.signal_unit is not None:
-                raise UsageError(f"{path}: {kinds[found[0].signal]}; leave `signal_unit` out")
+                raise UsageError(f"{path}: {kinds[candidates[0].signal]}; leave `signal_unit` out")
             if self.polarisation in ("s", "p"):
                 raise UsageError(f"{path}: ellipsometry compares p with s light; leave `polarisation` out")
-        return found
+        return candidates
 
     def read(self, one: Candidate, several: bool) -> Spectrum:
         """Read one of them; `several` keeps its name."""

@@ -179,13 +179,13 @@ def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
     """Values and standard deviations of the mean."""
     kind, count = sweeps[0].kind, len(sweeps)
     points = np.mean([kind.coordinates(sweep) for sweep in sweeps], axis=0)
-    found: dict[str, Any] = dict(kind.averaged(points))
+    averaged: dict[str, Any] = dict(kind.averaged(points))
     depolarised = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
-    found["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
+    averaged["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
     for name in ("sigma", "delta_sigma", "depolarisation_sigma"):
         own = [getattr(sweep, name) for sweep in sweeps]
         known = all(x is not None for x in own) and not (
-            name == "depolarisation_sigma" and found["depolarisation"] is None
+            name == "depolarisation_sigma" and averaged["depolarisation"] is None
         )
-        found[name] = np.sqrt(np.sum(np.square(own), axis=0)) / count if known else None
-    return found
+        averaged[name] = np.sqrt(np.sum(np.square(own), axis=0)) / count if known else None
+    return averaged

@@ -40,12 +40,12 @@ def settings(
     numbers = setting_numbers(angle, azimuth)
     if numbers is None:
         return [Setting(np.arange(points), None, None)]
-    found = []
+    levels = []
     for number in np.unique(numbers):
         rows = np.flatnonzero(numbers == number)
         own = (None if x is None else float(x[rows[0]]) for x in (angle, azimuth))
-        found.append(Setting(rows, *own))
-    return found
+        levels.append(Setting(rows, *own))
+    return levels
 
 
 def named(setting: Setting, every: list[Setting]) -> str | None:

@@ -52,22 +52,24 @@ def write_spectrum(path: str | os.PathLike[str], spectrum: Spectrum, *, overwrit
 
 def _columns(spectrum: Spectrum) -> list[_Column]:
     """Axis, angle, values and errors of a spectrum, as far as it has them."""
-    found = [_Column("wavelength_nm", spectrum.wavelength, "nm", "wavelength")]
+    columns = [_Column("wavelength_nm", spectrum.wavelength, "nm", "wavelength")]
     if spectrum.angle is not None:
-        found.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
+        columns.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
     if spectrum.azimuth is not None:
-        found.append(_Column("azimuth_deg", spectrum.azimuth, "degree", "sample_azimuth"))
+        columns.append(_Column("azimuth_deg", spectrum.azimuth, "degree", "sample_azimuth"))
     kind, name = spectrum.kind, _signal_header(spectrum)
     shares = [q for q in kind.quantities if q.array == "depolarisation"]
     for group in ([q for q in kind.quantities if q not in shares], shares):
         for q in group:
             stored = q.name if kind.degrees or kind.parts else kind.noun
-            found.append(_Column(name or q.header, q.measured(spectrum), "degree" if q.unit else "", stored))
+            columns.append(
+                _Column(name or q.header, q.measured(spectrum), "degree" if q.unit else "", stored)
+            )
         for q in group:
             if (error := q.error(spectrum)) is not None:
                 header, stored = ("sigma", kind.noun) if name else (f"sigma_{q.header}", q.name)
-                found.append(_Column(header, error, "degree" if q.unit else "", f"{stored}_errors"))
-    return found
+                columns.append(_Column(header, error, "degree" if q.unit else "", f"{stored}_errors"))
+    return columns
 
 
 def _signal_header(spectrum: Spectrum) -> str:

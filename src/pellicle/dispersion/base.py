@@ -57,9 +57,9 @@ def bounds_of(number: Any) -> tuple[float, float] | None:
 def require_nonnegative(model: str, **parameters: Any) -> None:
     """ValueError for a parameter that can be below zero."""
     for name, number in parameters.items():
-        found = bounds_of(number)
-        if found is not None and found[0] < 0:
-            raise ValueError(f"{model}: {name} must not be negative, got {found[0]:g}")
+        bounds = bounds_of(number)
+        if bounds is not None and bounds[0] < 0:
+            raise ValueError(f"{model}: {name} must not be negative, got {bounds[0]:g}")
 
 
 def cast_like(values: Any, wavelength: Any):

@@ -28,9 +28,9 @@ class AbstractMixture(AbstractDispersion):
     def __check_init__(self):
         for part in (self.host, self.inclusion):
             require_isotropic(part, "a mixture is made of")
-        found = bounds_of(self.fraction)
-        if found is not None and not 0 <= found[0] <= found[1] <= 1:
-            wrong = found[0] if not 0 <= found[0] <= 1 else found[1]
+        bounds = bounds_of(self.fraction)
+        if bounds is not None and not 0 <= bounds[0] <= bounds[1] <= 1:
+            wrong = bounds[0] if not 0 <= bounds[0] <= 1 else bounds[1]
             raise ValueError(f"fraction must lie in 0 to 1, got {wrong:g}")
 
     def _permittivities(self, wavelength: Any) -> tuple[Number, Number]:

@@ -93,9 +93,9 @@ class CauchyUrbach(AbstractDispersion):
 
     def __check_init__(self):
         require_nonnegative("cauchy-urbach", k0=self.k0)
-        found = bounds_of(self.Eu)
-        if found is not None and not found[0] > 0:
-            raise ValueError(f"cauchy-urbach: the Urbach energy Eu must be positive, got {found[0]:g} eV")
+        bounds = bounds_of(self.Eu)
+        if bounds is not None and not bounds[0] > 0:
+            raise ValueError(f"cauchy-urbach: the Urbach energy Eu must be positive, got {bounds[0]:g} eV")
 
     def index(self, wavelength):
         u = 1 / (wavelength * wavelength)

@@ -193,9 +193,9 @@ class CodyLorentz(AbstractOscillator):
     def __check_init__(self):
         check("cody-lorentz", gap=self.Eg, centre=self.E0, A=self.A, C=self.C, Eg=self.Eg, Et=self.Et)
         for name in ("Ep", "Eu"):
-            found = bounds_of(getattr(self, name))
-            if found is not None and not found[0] > 0:
-                raise ValueError(f"cody-lorentz: {name} must be positive, got {found[0]:g} eV")
+            bounds = bounds_of(getattr(self, name))
+            if bounds is not None and not bounds[0] > 0:
+                raise ValueError(f"cody-lorentz: {name} must be positive, got {bounds[0]:g} eV")
 
     def epsilon(self, energy):
         onset = self.Eg + self.Et

@@ -33,9 +33,9 @@ class AbstractProfile(eqx.Module):
 
 def _check_fractions(model: str, **fractions: Any) -> None:
     for name, number in fractions.items():
-        found = bounds_of(number)
-        if found is not None and not 0 <= found[0] <= found[1] <= 1:
-            wrong = found[0] if not 0 <= found[0] <= 1 else found[1]
+        bounds = bounds_of(number)
+        if bounds is not None and not 0 <= bounds[0] <= bounds[1] <= 1:
+            wrong = bounds[0] if not 0 <= bounds[0] <= 1 else bounds[1]
             raise ValueError(f"{model}: `{name}` is a volume fraction, 0 to 1, got {wrong:g}")
 
 
@@ -68,11 +68,11 @@ class Exponential(AbstractProfile):
 
     def __check_init__(self):
         _check_fractions("exponential", top=self.top, bottom=self.bottom)
-        found = bounds_of(self.length)
-        if found is not None and (found[0] * found[1] <= 0 or min(map(abs, found)) < SHORTEST):
+        bounds = bounds_of(self.length)
+        if bounds is not None and (bounds[0] * bounds[1] <= 0 or min(map(abs, bounds)) < SHORTEST):
             raise ValueError(
                 f"exponential: `length`, in layer thicknesses, must stay above {SHORTEST:g}, or below"
-                f" {-SHORTEST:g} for a decay upwards, got {found[0]:g} to {found[1]:g}"
+                f" {-SHORTEST:g} for a decay upwards, got {bounds[0]:g} to {bounds[1]:g}"
             )
 
     def fraction(self, depth):
@@ -96,9 +96,9 @@ class Power(AbstractProfile):
 
     def __check_init__(self):
         _check_fractions("power", top=self.top, bottom=self.bottom)
-        found = bounds_of(self.exponent)
-        if found is not None and found[0] <= 0:
-            raise ValueError(f"power: `exponent` must be above 0, got {found[0]:g}")
+        bounds = bounds_of(self.exponent)
+        if bounds is not None and bounds[0] <= 0:
+            raise ValueError(f"power: `exponent` must be above 0, got {bounds[0]:g}")
 
     def fraction(self, depth):
         xp = namespace(depth, self.exponent)
@@ -181,8 +181,8 @@ class Sine(AbstractProfile):
 
     @property
     def variations(self) -> float:
-        found = bounds_of(self.periods)
-        return 1.0 if found is None else max(2 * found[1], 1.0)
+        bounds = bounds_of(self.periods)
+        return 1.0 if bounds is None else max(2 * bounds[1], 1.0)
 
     def fraction(self, depth):
         xp = namespace(depth, self.periods, self.phase)

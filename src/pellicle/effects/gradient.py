@@ -140,7 +140,7 @@ def signals(scene: Scene, count: int) -> np.ndarray:
     tilt += np.deg2rad(upper(scene.instrument.angle_shift))
     angle = np.minimum(np.deg2rad(np.asarray(light.angle, dtype=float)) + tilt, 0.4999 * np.pi)
     a = real(known_index(scene.ambient, at)) * np.sin(angle)
-    found = []
+    values = []
     for group in groups(scene)[0]:
         if any(isinstance(layer.material, Graded) for layer in group.layers):
             layers = [_layer(layer, count, at) for layer in group.layers]
@@ -150,12 +150,12 @@ def signals(scene: Scene, count: int) -> np.ndarray:
                 stack_response(above, layers, below, phases, a, x)
                 for x in ("s" if normal_incidence(scene) else "sp")
             ]
-            found += [power for response in each for power in response.powers]
+            values += [power for response in each for power in response.powers]
             if light.ellipsometric:
                 s, p = each[0].reflected, each[-1].reflected
                 size, cross = np.abs(s) ** 2 + np.abs(p) ** 2, 2 * np.conj(p) * s
-                found += [x / size for x in (np.abs(s) ** 2 - np.abs(p) ** 2, real(cross), imag(cross))]
-    return np.array(found)
+                values += [x / size for x in (np.abs(s) ** 2 - np.abs(p) ** 2, real(cross), imag(cross))]
+    return np.array(values)
 
 
 def _layer(layer: Layer, count: int, at: np.ndarray) -> Any:

@@ -37,10 +37,10 @@ class Compiler:
         """
         with self._changed:
             if key in self._found:
-                found = self._found[key]
-                if isinstance(found, ValueError):
-                    raise found
-                return found
+                program = self._found[key]
+                if isinstance(program, ValueError):
+                    raise program
+                return program
             if self._asked.get(key, SOON + 1) > urgency:
                 self._asked[key] = urgency
                 self._queue.put((urgency, next(self._numbers), key, make))
@@ -66,11 +66,11 @@ class Compiler:
             if key in self._found:
                 continue
             try:
-                found = make()
+                result = make()
             except ValueError as error:
-                found = error
+                result = error
             except Exception as error:  # the thread must live on, and the page must say what is wrong
-                found = ValueError(f"this combination cannot be computed: {error}")
+                result = ValueError(f"this combination cannot be computed: {error}")
             with self._changed:
-                self._found[key] = found
+                self._found[key] = result
                 self._changed.notify_all()

@@ -88,16 +88,16 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
 
     An array of angles of incidence has none.
     """
-    found = _present(scene)
+    present = _present(scene)
     for path in _addable(scene):
-        found.setdefault(path, 0.0)
+        present.setdefault(path, 0.0)
     scaffold = scene
-    for path, value in found.items():
+    for path, value in present.items():
         scaffold = with_value(scaffold, path, _bounds(path, value))
     named = dict(zip(free_paths(scaffold), parameters(scaffold), strict=True))
     controls = []
     for path, number in named.items():
-        value = found[path]
+        value = present[path]
         controls.append(
             Control(
                 name=number.name,
@@ -171,13 +171,13 @@ def _present(scene: Scene) -> dict[tuple[Any, ...], Any]:
     """Numbers that the scene has: free ones, thicknesses, constant indices and optional effects."""
     leaves = jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free)
     shown = {(*at, GetAttrKey(key)) for at in _constants(scene) for key in ("n", "k")}
-    found = {}
+    present = {}
     for path, leaf in leaves:
         key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
         own = path in shown or (path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k")
         if is_free(leaf) or (number and own):
-            found[path] = leaf
-    return found
+            present[path] = leaf
+    return present
 
 
 def _constants(scene: Scene) -> list[tuple[Any, ...]]:

@@ -73,19 +73,19 @@ def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
     """Read a file whose errors and spectra bear its name without the folder."""
     try:
         try:
-            found = read_spectra(path)
+            spectra = read_spectra(path)
         except UsageError as error:
             try:
-                found = read_spectra(path, signal=signal)
+                spectra = read_spectra(path, signal=signal)
             except UsageError:
                 raise error from None
             note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
-            found = [replace(each, notes=(*each.notes, note)) for each in found]
+            spectra = [replace(each, notes=(*each.notes, note)) for each in spectra]
     except (UsageError, DataError) as error:
         kind = type(error)
         raise kind(str(error).replace(str(path), name)) from None
-    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in found]
-    return [replace(each, path=name, notes=own) for each, own in zip(found, notes, strict=True)]
+    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in spectra]
+    return [replace(each, path=name, notes=own) for each, own in zip(spectra, notes, strict=True)]
 
 
 def data_curves(spectra: Sequence[Spectrum], against_angle: bool = False) -> list[Curve]:
@@ -120,13 +120,13 @@ def lines(
         return [(rows, spectrum.angle[rows], "")]
     if spectrum.angle is None or len(every) < 2:
         return [(np.arange(len(spectrum)), spectrum.wavelength, "")]
-    found = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
-    return [(rows, spectrum.wavelength[rows], setting) for rows, setting in found if rows.size]
+    drawn = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
+    return [(rows, spectrum.wavelength[rows], setting) for rows, setting in drawn if rows.size]
 
 
 def data_text(spectra: Sequence[Spectrum]) -> list[str]:
     """Sentences on what was read."""
-    found = []
+    sentences = []
     for spectrum in spectra:
         nm, angles = spectrum.wavelength, measured_angles([spectrum])
         across = f"from {nm.min():g} to {nm.max():g} nm" if np.ptp(nm) > 0 else f"at {nm[0]:g} nm"
@@ -134,8 +134,8 @@ def data_text(spectra: Sequence[Spectrum]) -> list[str]:
         if len(angles) > MOST:
             at = f"{len(angles)} angles from {angles[0]:g} to {angles[-1]:g}"
         about = f"{spectrum.signal}, {len(nm)} points {across}{f', at {at}°' if at else ''}"
-        found += [f"{spectrum.path}: {about}", *spectrum.notes]
+        sentences += [f"{spectrum.path}: {about}", *spectrum.notes]
     count = len(measured_angles(spectra))
     if count > MOST and any(np.ptp(spectrum.wavelength) > 0 for spectrum in spectra):
-        found.append(f"data at {MOST} of {count} angles of incidence are drawn; a fit uses all of them")
-    return list(dict.fromkeys(found))
+        sentences.append(f"data at {MOST} of {count} angles of incidence are drawn; a fit uses all of them")
+    return list(dict.fromkeys(sentences))

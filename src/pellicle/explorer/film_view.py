@@ -211,9 +211,9 @@ class FilmView:
             return angles
         return own if not self.angles.size and getattr(own, "start", own) == angles[0] else float(angles[0])
 
-    def rendering(self, found: np.ndarray, size: int) -> bytes:
-        """Draw a ball with the colours `found` by the program "sphere", as a PNG."""
-        return ball_rendering(found, size)
+    def rendering(self, colours: np.ndarray, size: int) -> bytes:
+        """Draw a ball with the `colours` that the program "sphere" computed, as a PNG."""
+        return ball_rendering(colours, size)
 
     def stated(self, values: Mapping[str, float]) -> Scene:
         """Return the scene with these values, at which its own free numbers start, at no wavelengths."""

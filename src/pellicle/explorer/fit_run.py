@@ -76,29 +76,29 @@ def fitted_names(controls: Collection[Control], asked: Any) -> list[str]:
     return free or [control.name for control in controls if control.path[-1].name == "thickness"]
 
 
-def to_json(found: Fit, controls: Collection[Control]) -> dict[str, Any]:
+def to_json(fit: Fit, controls: Collection[Control]) -> dict[str, Any]:
     """Convert a fit: values and standard errors of controls, verdict, report and fitted curves."""
     values, errors = {}, {}
     for control in controls:
-        estimate = found.parameters.get(control.name)
+        estimate = fit.parameters.get(control.name)
         if estimate is not None and estimate.free:
             values[control.name] = min(max(estimate.value, control.lower), control.upper)
             errors[control.name] = estimate.stderr if math.isfinite(estimate.stderr) else None
     return {
         "values": values,
         "errors": errors,
-        "status": str(found.status),
-        "verdict": found.verdict.replace("`", ""),
-        "warnings": [warning.replace("`", "") for warning in found.warnings],
-        "summary": fit_text.report(found).replace("`", ""),
+        "status": str(fit.status),
+        "verdict": fit.verdict.replace("`", ""),
+        "warnings": [warning.replace("`", "") for warning in fit.warnings],
+        "summary": fit_text.report(fit).replace("`", ""),
     }
 
 
-def fitted_curves(found: Fit, against_angle: bool = False) -> list[Curve]:
+def fitted_curves(fit: Fit, against_angle: bool = False) -> list[Curve]:
     """Return the fitted signal of each spectrum, with its scale and offset, as `data_curves` does data."""
     curves = []
-    every = measured_angles([part.spectrum for part in found.parts])
-    for part in found.parts:
+    every = measured_angles([part.spectrum for part in fit.parts])
+    for part in fit.parts:
         curve = part.curve
         if isinstance(curve, FittedCurve) and np.ndim(curve.model) == 1:
             quantities = [q for q in part.spectrum.kind.quantities if q.array != "depolarisation"]

@@ -136,19 +136,19 @@ def spectrum_program(
     kind = replace(kind, folded=True) if folded else kind
     labels = [quantity.symbol for quantity in kind.quantities]
 
-    def rows(found: Any) -> Any:
-        return gain * kind.drawn(found.reshape(len(wavelength), -1)) + shift
+    def rows(signal: Any) -> Any:
+        return gain * kind.drawn(signal.reshape(len(wavelength), -1)) + shift
 
     compute = _compiled(with_wavelength(scene, wavelength), names, after=rows, count=count)
 
     def curves(values: Numbers, angles: np.ndarray) -> list[Curve]:
-        found = compute(values, angles)
+        signal = compute(values, angles)
         if not count:
-            return [Curve(label, wavelength, y) for label, y in zip(labels, found, strict=True)]
+            return [Curve(label, wavelength, y) for label, y in zip(labels, signal, strict=True)]
         if len(wavelength) == 1:
-            return [Curve(label, angles, found[:, i, 0]) for i, label in enumerate(labels)]
+            return [Curve(label, angles, signal[:, i, 0]) for i, label in enumerate(labels)]
         return [
-            Curve(label, wavelength, found[j, i], named(angle))
+            Curve(label, wavelength, signal[j, i], named(angle))
             for i, label in enumerate(labels)
             for j, angle in enumerate(angles)
         ]

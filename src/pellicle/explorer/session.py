@@ -150,14 +150,14 @@ class Session:
         scene = scene_with(view.scene, view.controls, values, names)
         if "angle" not in names and all(spectrum.angle is not None for spectrum in self.spectra):
             scene = with_value(scene, ANGLE, 0.0)  # angles of the data, whatever the slider has
-        found = self._fit_run.run(self.spectra, scene)
-        if found is None:
+        fit = self._fit_run.run(self.spectra, scene)
+        if fit is None:
             return {"stopped": True}
-        answer = to_json(found, view.controls)
+        answer = to_json(fit, view.controls)
         stated = measured_angles(self.spectra)
         if "angle" not in names and "angle" in values and len(stated) == 1:
             answer["values"]["angle"] = float(stated[0])
-        curves = fitted_curves(found, view.against_angle)
+        curves = fitted_curves(fit, view.against_angle)
         return {**answer, "curves": [curve_to_json(curve) for curve in curves]}
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -186,14 +186,14 @@ class Session:
         for part in (part for part in wanted if part in view.parts):
             began = time.perf_counter()
             try:
-                found = parts[part](view, values, bool(body.get("wait")), size)
+                content = parts[part](view, values, bool(body.get("wait")), size)
             except ValueError as error:
                 warnings.append(_sentence(error))
                 continue
-            if found is None:
+            if content is None:
                 answer["compiling"].append(part)
                 continue
-            answer[part] = found
+            answer[part] = content
             answer["milliseconds"][part] = round(1e3 * (time.perf_counter() - began), 3)
         return {**answer, "warnings": list(dict.fromkeys(warnings))}
 
@@ -248,11 +248,11 @@ class Session:
         return None if xyz is None else colours_to_json(xyz, view.seen_at("colour"), view.light_in_words)
 
     def _sphere(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> str | None:
-        found = self._computed(view, "sphere", values, wait)
+        sphere = self._computed(view, "sphere", values, wait)
         return (
             None
-            if found is None
-            else f"data:image/png;base64,{b64encode(view.rendering(found, size)).decode()}"
+            if sphere is None
+            else f"data:image/png;base64,{b64encode(view.rendering(sphere, size)).decode()}"
         )
 
     def _plan(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:

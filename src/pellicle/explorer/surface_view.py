@@ -81,9 +81,9 @@ class SurfaceExplorerView:
         self._sphere(self.defaults(), 32)
         return lambda values, _: values
 
-    def rendering(self, found: Mapping[str, float], size: int) -> bytes:
+    def rendering(self, numbers: Mapping[str, float], size: int) -> bytes:
         """Draw the sphere with these values as a PNG."""
-        return self._sphere(found, size)
+        return self._sphere(numbers, size)
 
     def plan(self, values: Mapping[str, float]) -> Plan:
         """Return the exact plan of the surface with these values."""

@@ -25,11 +25,11 @@ class Measurements(Protocol):
         """Residuals of each view at the best minimum and what may explain them."""
         ...
 
-    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+    def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """One part of the fit for each view."""
         ...
 
-    def missed(self, parts: tuple[Part, ...], found: Discrepancy, /) -> Sequence[Part]:
+    def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy, /) -> Sequence[Part]:
         """The parts that are not explained."""
         ...
 
@@ -91,14 +91,14 @@ def assemble(
     """
     ranked = data.ranked
     jacobian, covariance = linearised(ranked)
-    found = discrepancy(data.evidence(jacobian), jacobian, ranked.minima.units[0])
-    parts = data.parts(found)
-    missed = tuple(data.missed(parts, found))
+    model_error = discrepancy(data.evidence(jacobian), jacobian, ranked.minima.units[0])
+    parts = data.parts(model_error)
+    missed = tuple(data.missed(parts, model_error))
     conclusion = conclude(
         ranked,
         jacobian,
         covariance,
-        found,
+        model_error,
         misfit=bool(missed),
         binding=binding,
         fixed=data.fixed(),
@@ -106,4 +106,4 @@ def assemble(
         near=near,
         amend=data.amended,
     )
-    return Assembly(ranked, jacobian, covariance, found, parts, missed, conclusion, began)
+    return Assembly(ranked, jacobian, covariance, model_error, parts, missed, conclusion, began)

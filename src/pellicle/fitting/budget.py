@@ -47,11 +47,11 @@ def _lead(parameters: Sequence[Parameter]) -> int:
     return next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
 
 
-def likely_cause(found: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
+def likely_cause(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
     """A sentence on the effect of ordinary size that alone explains most of the residuals, or on the index of
     another material that does; none without either."""
     at = _lead(parameters)
-    rows, lead = found.contributions, parameters[at]
+    rows, lead = discrepancy.contributions, parameters[at]
     usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
     best = max(usual, key=lambda c: c.explains, default=None)
     position = other_material(rows)

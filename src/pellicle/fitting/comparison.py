@@ -99,8 +99,8 @@ class Comparison(ReportMixin):
             if birefringent == [True, False]:
                 sentence += _size_of_birefringence(best.fit)
             elif birefringent == [False, True]:
-                found = _clearest_birefringence(second.fit)
-                unseen = found is not None and found[2] > _UNSEEN_BIREFRINGENCE
+                birefringence = _clearest_birefringence(second.fit)
+                unseen = birefringence is not None and birefringence[2] > _UNSEEN_BIREFRINGENCE
                 sentence += ", and these data would not show it" if unseen else ""
         if best.fit.status is Status.MISFIT:
             return f"{sentence}. But even {best.name} does not explain the data."
@@ -217,18 +217,18 @@ def _tilted(fit: Fit) -> bool:
 def _clearest_birefringence(fit: Fit) -> tuple[float, float, float] | None:
     """Wavelength (nm) at which the fitted birefringence is largest against its error, and both there; None
     where it was not fitted or the layer is biaxial."""
-    found = fit.principal_indices.get(BIREFRINGENCE)
-    if found is None or not np.all(found.n_stderr > 0):
+    indices = fit.principal_indices.get(BIREFRINGENCE)
+    if indices is None or not np.all(indices.n_stderr > 0):
         return None
-    i = int(np.argmax(np.abs(found.n) / found.n_stderr))
-    return float(found.wavelength[i]), float(found.n[i]), float(found.n_stderr[i])
+    i = int(np.argmax(np.abs(indices.n) / indices.n_stderr))
+    return float(indices.wavelength[i]), float(indices.n[i]), float(indices.n_stderr[i])
 
 
 def _size_of_birefringence(fit: Fit) -> str:
     """Words on the fitted birefringence where it is largest against its error."""
-    if (found := _clearest_birefringence(fit)) is None:
+    if (birefringence := _clearest_birefringence(fit)) is None:
         return ""
-    wavelength, n, error = found
+    wavelength, n, error = birefringence
     text = f", {n:.3g} ± {error:.2g} at {wavelength:g} nm"
     if abs(n) > _COMPATIBLE * error:
         return text

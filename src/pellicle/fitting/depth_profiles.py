@@ -76,14 +76,14 @@ def _profile(fit: Fit, scene: Scene, position: int, wavelength: float) -> Fitted
         fraction = jnp.broadcast_to(material.profile.fraction(z), z.shape)
         return jnp.stack([fraction, *(jnp.broadcast_to(f(index)[..., 0], z.shape) for f in (real, _imag))])
 
-    found = np.asarray(curves(jnp.asarray(values[own])))
-    stderr = np.zeros_like(found)
+    indices = np.asarray(curves(jnp.asarray(values[own])))
+    stderr = np.zeros_like(indices)
     if own:
         slope = np.asarray(jax.jacfwd(curves)(jnp.asarray(values[own])))
         variance = np.einsum("cip,pq,ciq->ci", slope, _covariance(fit, [names[i] for i in own]), slope)
         stderr = np.sqrt(np.maximum(variance, 0.0))
     depth = z * float(np.asarray(layer.thickness))
-    return FittedProfile(name(scene, position), wavelength, depth, *found, *stderr)
+    return FittedProfile(name(scene, position), wavelength, depth, *indices, *stderr)
 
 
 def _imag(index: Any) -> Any:

@@ -441,10 +441,10 @@ class _Balance:
         flat = matrix.reshape(-1, known + 1, known + 1), normal.right[:, both].reshape(-1, known + 1)
         free, covariance = Normal(*flat, rows).solved()
         bounds = (x[:, both].reshape(free.shape) for x in (system.lower, system.upper))
-        found = held_within(free, covariance, *bounds).reshape(fits, effects, known + 1)
-        after = power[:, None] + left(found, gram[:, *square], right[:, both])
+        moved = held_within(free, covariance, *bounds).reshape(fits, effects, known + 1)
+        after = power[:, None] + left(moved, gram[:, *square], right[:, both])
         explains = 1 - after / np.maximum(before, 1e-300)[:, None]
-        return explains, found[..., -1], found[..., :-1] - best[:, None]
+        return explains, moved[..., -1], moved[..., :-1] - best[:, None]
 
 
 def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.ndarray]:

@@ -210,15 +210,15 @@ class JointMeasurements(NamedTuple):
         below = jacobian._replace(jacobian=jacobian.jacobian[before:])
         return [*self.films.evidence(jacobian), *self.samples.evidence(below)]
 
-    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+    def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """The parts of the films, then those of the samples."""
-        return (*self.films.parts(found), *self.samples.parts(found))
+        return (*self.films.parts(discrepancy), *self.samples.parts(discrepancy))
 
-    def missed(self, parts: tuple[Part, ...], found: Discrepancy) -> list[Part]:
+    def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy) -> list[Part]:
         """The parts that are not explained."""
         count = len(self.films.targets)
-        of_films = replace(found, remaining=found.remaining[:count])
-        return [*self.films.missed(parts[:count], of_films), *self.samples.missed(parts[count:], found)]
+        of_films = replace(discrepancy, remaining=discrepancy.remaining[:count])
+        return [*self.films.missed(parts[:count], of_films), *self.samples.missed(parts[count:], discrepancy)]
 
     def fixed(self) -> list[Estimate]:
         """Fixed numbers of the scenes and of the surface."""

@@ -41,9 +41,9 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
             units = (starts[rows] - lower) / span
             held = np.repeat(values[rows], units.shape[1])
             result = solve(own, units.reshape(len(held), -1), fixed=(each, held), atol=_SETTLED)
-            found = result.deviance.reshape(len(rows), -1)
-            chosen = np.arange(len(rows)), np.argmin(found, axis=1)
-            deviance[rows] = found[chosen]
+            deviances = result.deviance.reshape(len(rows), -1)
+            chosen = np.arange(len(rows)), np.argmin(deviances, axis=1)
+            deviance[rows] = deviances[chosen]
             points[rows] = lower + result.units.reshape(units.shape)[chosen] * span
         return deviance, points
 

@@ -78,9 +78,9 @@ def inverse(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inverses (fits, columns, columns) of positive definite matrices, and which (fits,) are inaccurate."""
     size = np.sqrt(np.maximum(np.einsum("...ii->...i", matrix), 1e-200))
     outer = size[..., :, None] * size[..., None, :]
-    found = np.linalg.inv(matrix / outer + _RIDGE * np.eye(matrix.shape[-1]))
-    inflation = np.einsum("...ii->...i", found)
-    return found / outer, ~np.all((inflation > 0) & (inflation < _ILL), axis=-1)
+    inverted = np.linalg.inv(matrix / outer + _RIDGE * np.eye(matrix.shape[-1]))
+    inflation = np.einsum("...ii->...i", inverted)
+    return inverted / outer, ~np.all((inflation > 0) & (inflation < _ILL), axis=-1)
 
 
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

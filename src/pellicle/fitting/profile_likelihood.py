@@ -133,9 +133,9 @@ def limits(
                 else one.profiled(tuple(open_[i].tolist()), tuple(natural.tolist()))
             )
             searches.append(_Search(one, way))
-    for search, found in zip(searches, _run(around, searches), strict=True):
+    for search, deviance in zip(searches, _run(around, searches), strict=True):
         at = search.parameter.fit, search.parameter.axis
-        for column, number in zip(result, found, strict=True):
+        for column, number in zip(result, deviance, strict=True):
             column[at] = np.nan if number is None else number
     return result
 

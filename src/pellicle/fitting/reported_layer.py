@@ -49,8 +49,8 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
         indices = [medium(numbers.light.wavelength) for medium in media]
         return form.simulate(numbers, data), stack_rows([x for n in indices for x in (n.real, n.imag)])
 
-    found, push = jax.linearize(both, values)
-    return Linearised(*found, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
+    reported, push = jax.linearize(both, values)
+    return Linearised(*reported, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
 
 
 def layer_errors(at: Any, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:

@@ -322,11 +322,11 @@ def _mean(rows: Sequence[Any]) -> Sequence[Any]:
 def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
     """N, C and S; behind a cone of light also m22 and m44 of the Mueller matrix."""
     n, c, s, intensity, *others = rows
-    found = ellipsometry.normalised(ellipsometry.Stokes(n, c, s, intensity))
+    ratios = ellipsometry.normalised(ellipsometry.Stokes(n, c, s, intensity))
     if not others:
-        return found
+        return ratios
     m22, m44 = others
-    return [*found, *ellipsometry.normalised(ellipsometry.Stokes(n, m22, m44, intensity))[1:]]
+    return [*ratios, *ellipsometry.normalised(ellipsometry.Stokes(n, m22, m44, intensity))[1:]]
 
 
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:

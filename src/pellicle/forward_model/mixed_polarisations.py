@@ -134,16 +134,16 @@ def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit
 
 
 def _last(group: CoherentGroup, angle: Any, dichroic: bool) -> _Lit:
-    found = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
-    rows = mueller_elements(*found.reflected)
+    waves = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
+    rows = mueller_elements(*waves.reflected)
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for row in rows for x in row))
     columns = [jnp.stack([jnp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
-    return _Lit(jnp.stack(columns, axis=-2), _power(found))
+    return _Lit(jnp.stack(columns, axis=-2), _power(waves))
 
 
-def _power(found: Polarised) -> Any:
+def _power(waves: Polarised) -> Any:
     """Return the power that enters a substrate as a row of factors of the four Stokes parameters."""
-    E, H = found.fields
+    E, H = waves.fields
     p = real(E.pp * conj(H.pp)) + real(E.sp * conj(H.sp))
     s = real(E.ps * conj(H.ps)) + real(E.ss * conj(H.ss))
     both = E.pp * conj(H.ps) + E.sp * conj(H.ss) + conj(E.ps) * H.pp + conj(E.ss) * H.sp

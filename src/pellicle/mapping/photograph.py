@@ -96,9 +96,9 @@ def map_photograph(
         middle = np.maximum(np.median(chosen.linear.reshape(-1, 3), axis=0), 1e-3)
         spread = sigma * gamma * middle ** (1 - 1 / gamma)
     inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread)
-    found = inverse(coded if space == "srgb" else exposed, ORDERS)
+    films = inverse(coded if space == "srgb" else exposed, ORDERS)
     about = chosen.where, space, tuple(told), photograph.path, photograph.sha256
-    return ThicknessMap(coded, _fitted(inverse, found, seen), found, chosen.position, *about)
+    return ThicknessMap(coded, _fitted(inverse, films, seen), films, chosen.position, *about)
 
 
 class _Chosen(NamedTuple):
@@ -145,9 +145,9 @@ def _inverse(
     return ColourInverse.build(table, angle, space=coding, sigma=spread, exposure=exposure)
 
 
-def _fitted(inverse: ColourInverse, found: ColourThickness, seen: Sight) -> np.ndarray:
+def _fitted(inverse: ColourInverse, films: ColourThickness, seen: Sight) -> np.ndarray:
     """Coded colours of the most probable thicknesses, at their exposures."""
-    best, exposure = found.thickness[..., 0], found.exposure[..., 0]
+    best, exposure = films.thickness[..., 0], films.exposure[..., 0]
     columns = inverse.channels[:, 0].T
     channels = np.stack([np.interp(best, inverse.thickness, column) for column in columns], axis=-1)
     exposed = channels * exposure[..., None]

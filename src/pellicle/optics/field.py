@@ -178,25 +178,25 @@ def fields(
 
 
 def _field(stack: Media, wavenumber: Any, lower: Any, depth: Any, polarisation: str) -> PolarisedField:
-    found = interface_fields(stack, polarisation)
+    fields = interface_fields(stack, polarisation)
     s = polarisation == "s"
     zero = jnp.zeros_like(stack.substrate.re)
     # logarithms of the scales: from the first interface to the upper face of each layer, and within it
-    within = scale_exponent(stack.squares, stack.phases) - 0.5 * jnp.log(found.size)
+    within = scale_exponent(stack.squares, stack.phases) - 0.5 * jnp.log(fields.size)
     sums = jax.tree.map(lambda x: jnp.cumsum(x, axis=0), within)
     layers = _Layer(
-        found.U,
-        found.V,
+        fields.U,
+        fields.V,
         sums,
         stack.squares,
-        found.weight,
+        fields.weight,
         stack.permittivity,
         jnp.concatenate([zero[None], lower[:-1]]) if lower.shape[0] else lower,
         lower,
     )
     e0 = stack.ambient * stack.ambient
     top = _Layer(
-        *found.top,
+        *fields.top,
         Pair(zero, zero),
         _pair(stack.q_top * stack.q_top, zero),
         _pair(1.0 if s else e0, zero),
@@ -220,7 +220,7 @@ def _field(stack: Media, wavenumber: Any, lower: Any, depth: Any, polarisation: 
         return _Place(*(where(inside, new, old) for new, old in zip(here, place, strict=True))), None
 
     place, _ = jax.lax.scan(choose, choose(place, top)[0], layers)
-    return _components(stack, found.denominator, place, polarisation)
+    return _components(stack, fields.denominator, place, polarisation)
 
 
 def _within(layer: _Layer, height: Any) -> _Place:

@@ -330,6 +330,6 @@ def in_chunks(program: Callable[[Any], Any], rows: Any, size: int, few: int = 0)
         ) -> np.ndarray:
             return np.concatenate([x[here], np.repeat(x[here][-1:], padding, axis=0)])
 
-        found = jax.device_get(program(jax.tree_util.tree_map(chunk, rows)))
-        pieces.append(jax.tree_util.tree_map(lambda x, left=left: np.asarray(x)[:left], found))
+        results = jax.device_get(program(jax.tree_util.tree_map(chunk, rows)))
+        pieces.append(jax.tree_util.tree_map(lambda x, left=left: np.asarray(x)[:left], results))
     return jax.tree_util.tree_map(lambda *each: np.concatenate(each), *pieces)

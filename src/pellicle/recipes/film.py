@@ -88,8 +88,8 @@ class FilmRecipe:
     def with_files(self, table: FileTable) -> dict[str, Any]:
         """The files that a table of `[[data.file]]` names, from the working folder."""
         files = {name for name, (_, option) in table.declared().items() if option.is_file}
-        found = {name: x for name, x in self.with_paths(table).items() if name in files}
-        return found | ({"camera": camera} if (camera := self.with_paths(table.camera)) else {})
+        paths = {name: x for name, x in self.with_paths(table).items() if name in files}
+        return paths | ({"camera": camera} if (camera := self.with_paths(table.camera)) else {})
 
     def with_paths(self, table: Options) -> dict[str, Any]:
         """The options that a table gives, with paths of files from the working folder."""

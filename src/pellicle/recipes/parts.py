@@ -229,10 +229,10 @@ def optional(value: Number | None, name: str) -> float | Free | None:
 
 def _part(kind: type, table: BaseModel, **given: Any) -> Any:
     """A part whose fields are the keys of a table, but for those that are `given`."""
-    found = {field.name: getattr(table, field.name, None) for field in fields(kind)}
+    values = {field.name: getattr(table, field.name, None) for field in fields(kind)}
     read = {
         name: optional(x, name) if isinstance(x, float | FreeTable) else x
-        for name, x in found.items()
+        for name, x in values.items()
         if x is not None and name not in given
     }
     return kind(**read, **given)
@@ -240,13 +240,13 @@ def _part(kind: type, table: BaseModel, **given: Any) -> Any:
 
 def _keys(part: Any, label: str, leave_out: Iterable[str] = ()) -> dict[str, Any]:
     """Keys of the table of a part, but for fields that have their default or that `leave_out` names."""
-    found = {}
+    keys = {}
     for field in fields(part):
         x, default = getattr(part, field.name), None if field.default is MISSING else field.default
         if field.name in leave_out or x is None or (not isinstance(x, Free) and x == default):
             continue
-        found[field.name] = x if isinstance(x, str | int) else written_number(x, f"{label}: {field.name}")
-    return found
+        keys[field.name] = x if isinstance(x, str | int) else written_number(x, f"{label}: {field.name}")
+    return keys
 
 
 def layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
@@ -316,15 +316,15 @@ def instrument(table: InstrumentTable) -> Instrument:
 
 def instrument_keys(instrument: Instrument, uncertainty: Uncertainty) -> dict[str, Any]:
     """The table of an instrument and its uncertainties, the inverse of `instrument`. Raises UsageError."""
-    found = {}
+    keys = {}
     for key, slow in (("scale", SLOW_SCALE), ("offset", SLOW_OFFSET)):
         value = getattr(instrument, key)
         if isinstance(value, Drift):
             if value not in (slow, ONE_NUMBER):
                 raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
-            found[key] = "slow" if value == slow else "free"
+            keys[key] = "slow" if value == slow else "free"
     rest = [field.name for field in fields(Uncertainty) if field.name not in _OF_THE_SCENE]
-    return found | _keys(instrument, "instrument", found) | _uncertainty_keys(uncertainty, rest)
+    return keys | _keys(instrument, "instrument", keys) | _uncertainty_keys(uncertainty, rest)
 
 
 def uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:

@@ -121,20 +121,20 @@ def _file(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _data(scene: Scene) -> dict[str, Any]:
-    light, found = scene.light, {}
+    light, keys = scene.light, {}
     if light.signal != "R":
-        found["signal"] = light.signal
+        keys["signal"] = light.signal
     if isinstance(light.angle, Free) or np.ndim(light.angle) or light.angle != 0:
-        found["angle"] = _one_or_several(light.angle, light, "the angle of incidence")
+        keys["angle"] = _one_or_several(light.angle, light, "the angle of incidence")
     if light.transmission:
-        found["transmission"] = True
+        keys["transmission"] = True
     if light.azimuth is not None:
-        found["azimuth"] = _one_or_several(light.azimuth, light, "the azimuth of the sample")
+        keys["azimuth"] = _one_or_several(light.azimuth, light, "the azimuth of the sample")
     if light.polarisation != "unpolarised":
-        found["polarisation"] = light.polarisation
+        keys["polarisation"] = light.polarisation
     if light.wavelength is not None:
-        found["wavelengths"] = _wavelengths(np.asarray(light.wavelength, float))
-    return found
+        keys["wavelengths"] = _wavelengths(np.asarray(light.wavelength, float))
+    return keys
 
 
 def _one_or_several(angle: Any, light: Light, name: str) -> Any:
@@ -155,19 +155,19 @@ def _wavelengths(nm: np.ndarray) -> Any:
 
 
 def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = {"model": scene.model}
+    keys: dict[str, Any] = {"model": scene.model}
     if scene.wavelengths is not None:
-        found["wavelengths"] = [float(nm) for nm in scene.wavelengths]
+        keys["wavelengths"] = [float(nm) for nm in scene.wavelengths]
     if scene.sensor is not None:
-        found |= _sensor(scene, folder)
+        keys |= _sensor(scene, folder)
     for part in ("film", "base"):
         own = getattr(scene, part)
         if own is not None:
-            found[part] = written_medium(medium_of(own), part, folder)
+            keys[part] = written_medium(medium_of(own), part, folder)
     for key, value in scene.numbers.items():
         several = not isinstance(value, Free) and np.ndim(value) == 1
-        found[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
-    return found
+        keys[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
+    return keys
 
 
 def _sensor(scene: Surface, folder: Path) -> dict[str, str]:

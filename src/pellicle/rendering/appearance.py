@@ -122,23 +122,23 @@ def _in_reflection(scene: Scene) -> Scene:
 
 
 def _notes(scene: Scene, film: Layer) -> tuple[str, ...]:
-    found = []
+    notes = []
     if any(isinstance(x, Plate) for x in scene.layers) or scene.substrate.back is not None:
-        found.append("light that returns from the back face of a plate is part of its colours")
+        notes.append("light that returns from the back face of a plate is part of its colours")
     if film.roughness is not None or scene.substrate.roughness is not None:
-        found.append("interfaces with a roughness in nm are part of its colours")
+        notes.append("interfaces with a roughness in nm are part of its colours")
     if film.thickness_spread is not None or scene.instrument.thickness_spread is not None:
-        found.append("the spread of its thickness is part of its colours")
-    return tuple(found)
+        notes.append("the spread of its thickness is part of its colours")
+    return tuple(notes)
 
 
 def _lacking(scene: Scene, film: Layer) -> tuple[str, ...]:
     coherent = [x for x in scene.layers if isinstance(x, Layer | Interface)]
-    found = []
+    lacking = []
     if len(coherent) > 1:
-        found.append(f"the film has {len(coherent)} layers: formats have one")
+        lacking.append(f"the film has {len(coherent)} layers: formats have one")
     if np.max(np.imag(_index(film.material, CHANNELS))) > 0:
-        found.append("the layer absorbs: formats have none that does")
+        lacking.append("the layer absorbs: formats have none that does")
     if np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3:
-        found.append("it is not in air, as formats assume")
-    return tuple(found)
+        lacking.append("it is not in air, as formats assume")
+    return tuple(lacking)

@@ -50,9 +50,9 @@ def physical(formula: Formula, look: Appearance) -> Solution:
 def error(formula: Formula, look: Appearance, numbers: Numbers, scale: float) -> ColourError:
     """ΔE2000 of a formula's colours from the exact ones."""
     with jax.enable_x64(True):
-        found = _xyz(formula, dict(numbers), scale * look.thickness)
+        simulated = _xyz(formula, dict(numbers), scale * look.thickness)
     brightest = np.max(look.xyz[..., 1])
-    difference = delta_e2000(*(lab_of(xyz, brightest) for xyz in (np.asarray(found), look.xyz)))
+    difference = delta_e2000(*(lab_of(xyz, brightest) for xyz in (np.asarray(simulated), look.xyz)))
     return ColourError(float(np.mean(difference)), float(np.max(difference)))
 
 
@@ -71,9 +71,9 @@ def effective(formula: Formula, look: Appearance) -> Solution:
     starts = np.concatenate([SCALES[:, None], np.tile(inside, (len(SCALES), 1))], axis=1)
     fixed = {key: x for key, x in start.numbers.items() if key not in {k.name for k in keys}}
     with jax.enable_x64(True):
-        found = np.asarray(_solved(formula, starts, (lower, upper, fixed, _truth(look))))
+        solved = np.asarray(_solved(formula, starts, (lower, upper, fixed, _truth(look))))
     solutions = [start]
-    for x in found[np.all(np.isfinite(found), axis=1)]:
+    for x in solved[np.all(np.isfinite(solved), axis=1)]:
         numbers = {key: np.asarray(value) for key, value in _numbers(formula, x[1:]).items()} | fixed
         scale = float(x[0])
         solutions.append(Solution(numbers, scale, error(formula, look, numbers, scale)))
@@ -81,11 +81,11 @@ def effective(formula: Formula, look: Appearance) -> Solution:
 
 
 def _numbers(formula: Formula, values: Any) -> dict[str, Any]:
-    found, at = {}, 0
+    numbers, at = {}, 0
     for key in formula.keys:
-        found[key.name] = values[at : at + key.channels] if key.channels > 1 else values[at]
+        numbers[key.name] = values[at : at + key.channels] if key.channels > 1 else values[at]
         at += key.channels
-    return found
+    return numbers
 
 
 def _truth(look: Appearance) -> dict[str, Any]:

@@ -60,18 +60,18 @@ def read_thickness_map(path: str | os.PathLike[str]) -> np.ndarray:
 def checked(values: Any) -> np.ndarray:
     """Return a map of thicknesses as an array. Raises UsageError for another shape, and for wrong values."""
     try:
-        found = np.asarray(values, float)
+        array = np.asarray(values, float)
     except ValueError:
         raise UsageError("`thickness_map` must have numbers, thicknesses in nm") from None
-    if found.ndim != 2 or found.size == 0:
-        raise UsageError(f"`thickness_map` must have the shape (rows, columns), not {found.shape}")
-    if not np.all(np.isfinite(found)) or np.min(found) < 0:
+    if array.ndim != 2 or array.size == 0:
+        raise UsageError(f"`thickness_map` must have the shape (rows, columns), not {array.shape}")
+    if not np.all(np.isfinite(array)) or np.min(array) < 0:
         raise UsageError("`thickness_map` must have finite thicknesses in nm, none below 0")
-    if np.max(found) < _LEAST:
+    if np.max(array) < _LEAST:
         raise UsageError(
-            f"`thickness_map` is {np.max(found):.3g} nm thick at most: give thicknesses in nm, not in µm"
+            f"`thickness_map` is {np.max(array):.3g} nm thick at most: give thicknesses in nm, not in µm"
         )
-    return found
+    return array
 
 
 def nodes(thickness_map: np.ndarray) -> np.ndarray:

@@ -70,15 +70,15 @@ def with_values(described: Scene | Surface, values: Mapping[str, float]) -> Scen
             else:
                 numbers[free.key] = [*([] if isinstance(own, Free) else own), value]
         return replace(described, numbers=numbers)
-    found = []
+    leaves = []
     for (path, free), parameter in zip(free_leaves(described), parameters(described), strict=True):
         name: Any = path[0]
         if name.name not in _SAMPLE and parameter.name not in values:
-            found.append(free)
+            leaves.append(free)
             continue
         value = _value(values, parameter.name)
-        found.append(Free(min(free.lower, value), max(free.upper, value), start=value))
-    return insert(described, found)
+        leaves.append(Free(min(free.lower, value), max(free.upper, value), start=value))
+    return insert(described, leaves)
 
 
 def _value(values: Mapping[str, float], name: str) -> float:

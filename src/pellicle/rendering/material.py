@@ -64,7 +64,7 @@ class Material:
 
     def record(self) -> dict[str, Any]:
         """The sets of numbers with their errors, as JSON: for metadata, and beside the file."""
-        found: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "schema": SCHEMA,
             "name": self.name,
             "thickness_nm": [float(x) for x in (self.look.thickness[0], self.look.thickness[-1])],
@@ -74,8 +74,8 @@ class Material:
             "pellicle": version("pellicle"),
         }
         if self.solved is None:
-            return found
-        return found | {
+            return entries
+        return entries | {
             "formula": self.solved.formula.name,
             "used": self.solved.used,
             **{name: self._set(solution) for name, solution in self.solved.sets.items()},

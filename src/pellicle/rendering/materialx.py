@@ -224,12 +224,12 @@ def add_material(
 ) -> None:
     """Add a material of a shader with its error, and with both sets of numbers."""
     name = document.createValidChildName(material.name + ending)
-    found = document.addMaterialNode(name, shader)
-    found.setDocString(
+    node = document.addMaterialNode(name, shader)
+    node.setDocString(
         f"{material.drawn.used} numbers: mean ΔE2000 {error.mean:.2g}, largest {error.largest:.2g}, from the"
         " exact colours, 0 to 80 degrees"
     )
-    found.setAttribute("pellicle", json.dumps(material.record(), ensure_ascii=False))
+    node.setAttribute("pellicle", json.dumps(material.record(), ensure_ascii=False))
 
 
 def save(document: Any, path: Path) -> tuple[Path, ...]:

@@ -85,12 +85,12 @@ def _reflectance(film: Any, si: Any, cosine: Any, active: Any) -> Any:
         rgb = film.texture.eval(mi.Point2f(across, down), active)
         return mi.Color3f(rgb[0], rgb[1], rgb[2])
     first, last = film.wavelength
-    found = dr.zeros(mi.UnpolarizedSpectrum)
-    for channel in range(len(found)):
+    value = dr.zeros(mi.UnpolarizedSpectrum)
+    for channel in range(len(value)):
         share = (si.wavelengths[channel] - first) / (last - first)
         at = mi.Point3f(node(share, film.shape[2]), across, down)
-        found[channel] = film.texture.eval(at, active)[0]
-    return found
+        value[channel] = film.texture.eval(at, active)[0]
+    return value
 
 
 def _facets(film: Any) -> Any:

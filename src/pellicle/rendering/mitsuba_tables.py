@@ -125,7 +125,7 @@ def _reflectances(look: Appearance, nm: np.ndarray, cosine: np.ndarray) -> tuple
     """Linear sRGB, clipped at 0, and reflectance at `WAVELENGTHS`, (thicknesses, cosines, ...)."""
     bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
     degrees, count = np.rad2deg(np.arccos(cosine))[::-1], len(bands.wavelength)
-    found = look.spectra(np.concatenate([bands.wavelength, WAVELENGTHS]), nm, degrees)
-    found = np.swapaxes(found[::-1], 0, 1)
-    rgb = found[..., :count] @ bands.weights @ to_srgb.T
-    return np.maximum(rgb, 0.0), found[..., count:]
+    spectra = look.spectra(np.concatenate([bands.wavelength, WAVELENGTHS]), nm, degrees)
+    spectra = np.swapaxes(spectra[::-1], 0, 1)
+    rgb = spectra[..., :count] @ bands.weights @ to_srgb.T
+    return np.maximum(rgb, 0.0), spectra[..., count:]

@@ -29,19 +29,19 @@ def inputs(material: Material) -> dict[str, tuple[str, Any]]:
     """Inputs of the node, by name as type and value."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    found: dict[str, tuple[str, Any]] = {
+    values: dict[str, tuple[str, Any]] = {
         "specular_roughness": ("float", float(np.sqrt(look.roughness))),  # squared to GGX's α
         "thin_film_weight": ("float", float(numbers.get("weight", 1.0))),
         "thin_film_thickness": ("float", 1e-3 * solution.scale * material.thickness),
         "thin_film_ior": ("float", float(numbers["ior"])),
     }
     if look.metallic:
-        return found | {
+        return values | {
             "base_color": ("color3", np.asarray(numbers["base"]).tolist()),
             "base_metalness": ("float", 1.0),
             "specular_color": ("color3", np.asarray(numbers["edge"]).tolist()),
         }
-    return found | {
+    return values | {
         "base_weight": ("float", 0.0),
         "specular_color": ("color3", np.asarray(numbers["tint"]).tolist()),
         "specular_ior": ("float", float(numbers["base"])),

@@ -53,8 +53,8 @@ def target(name: str, package_check: bool = True) -> Target:
     if name not in MODULES:
         known = ", ".join(MODULES)
         raise UsageError(f"no renderer or format {name!r}{did_you_mean(name, MODULES)}; known: {known}")
-    found: Target = import_module(MODULES[name]).TARGET
-    absent = [package for package in found.packages if find_spec(package) is None]
+    chosen: Target = import_module(MODULES[name]).TARGET
+    absent = [package for package in chosen.packages if find_spec(package) is None]
     if package_check and absent:
-        raise UsageError(f"{found.title} needs the package {absent[0]}: {install_command('render')}")
-    return found
+        raise UsageError(f"{chosen.title} needs the package {absent[0]}: {install_command('render')}")
+    return chosen

@@ -77,9 +77,9 @@ def _draw_chart(
     for axes in others:
         assert inverse is not None
         row, order = np.nonzero(inverse.admissible)
-        found = inverse.found.thickness[row, order]
+        nm = inverse.found.thickness[row, order]
         size = 12 + 24 * np.sqrt(inverse.found.probability[row, order])
-        axes.scatter(inverse.source[row], found, size, color=inverse.srgb[row], edgecolors="none")
+        axes.scatter(inverse.source[row], nm, size, color=inverse.srgb[row], edgecolors="none")
         axes.set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
     (others or [strip])[-1].set_xlabel("thickness (nm)")
     return figure
@@ -141,11 +141,11 @@ def invert_chart(
         f"thicknesses of the sRGB colours of {source} at {angle:g} degrees under {illuminant}",
         f"noise {SIGMA:.3g} of each channel, pellicle {version('pellicle')}",
     ]
-    rows, written, found = [], set(), inverse.found
+    rows, written, films = [], set(), inverse.found
     for row, colour in enumerate(np.round(255 * srgb).astype(int).tolist()):
         name = "{:02x}{:02x}{:02x}".format(*colour)
         if name not in written:
-            columns = (found.thickness, found.stderr, found.probability, found.delta_e)
+            columns = (films.thickness, films.stderr, films.probability, films.delta_e)
             for order in np.flatnonzero(inverse.admissible[row]):
                 nm_text, stderr, probability, delta_e = (float(x[row, order]) for x in columns)
                 numbers = [f"{nm_text:.1f}", f"{stderr:.1f}", f"{probability:.4f}", f"{delta_e:.2f}"]

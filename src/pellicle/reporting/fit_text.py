@@ -74,13 +74,15 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
 
 def _birefringence(fit: Fit) -> list[tuple[str, str]]:
     """Rows of the birefringence at both ends and in the middle of the spectrum, where it was fitted."""
-    found = None if fit.layer_test else fit.principal_indices.get(BIREFRINGENCE)
-    if found is None or not np.any(found.n_stderr > 0):
+    indices = None if fit.layer_test else fit.principal_indices.get(BIREFRINGENCE)
+    if indices is None or not np.any(indices.n_stderr > 0):
         return []
-    if np.ptp(found.n) < 1e-9:
-        return [("all wavelengths", f"{found.n[0]:.5f} ± {found.n_stderr[0]:.2g}")]
-    some = np.unique([0, found.wavelength.size // 2, found.wavelength.size - 1])
-    return [(f"{found.wavelength[i]:g} nm", f"{found.n[i]:.5f} ± {found.n_stderr[i]:.2g}") for i in some]
+    if np.ptp(indices.n) < 1e-9:
+        return [("all wavelengths", f"{indices.n[0]:.5f} ± {indices.n_stderr[0]:.2g}")]
+    some = np.unique([0, indices.wavelength.size // 2, indices.wavelength.size - 1])
+    return [
+        (f"{indices.wavelength[i]:g} nm", f"{indices.n[i]:.5f} ± {indices.n_stderr[i]:.2g}") for i in some
+    ]
 
 
 def _verdict(fit: Fit) -> list[str]:
@@ -195,13 +197,13 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
 
 def _sweeps(part: Part, free: int) -> list[tuple[str, str]]:
     """Scatter of the repeated sweeps of one part, and what it makes of the residuals."""
-    found = lack_of_fit(part, free)
-    if found is None:
+    lack = lack_of_fit(part, free)
+    if lack is None:
         return []
     unit = " degrees" if part.spectrum.delta is not None else ""
-    scatter = f"{found.sweeps}, of which a point scatters by {found.repeatability:.2g}{unit}"
+    scatter = f"{lack.sweeps}, of which a point scatters by {lack.repeatability:.2g}{unit}"
     of = f" of {part.name}" if part.name else ""
-    return [(f"sweeps{of}", f"{scatter}; {found.verdict} (probability {found.probability:.2g})")]
+    return [(f"sweeps{of}", f"{scatter}; {lack.verdict} (probability {lack.probability:.2g})")]
 
 
 def _plan(part: Part) -> list[str]:

@@ -115,15 +115,15 @@ def _sweeps(part: Part, fit: Fit) -> dict[str, Any]:
     """The scatter of repeated sweeps, and the lack of fit of their mean."""
     from pellicle.fitting.lack_of_fit import lack_of_fit  # imports JAX, which records of failures do not need
 
-    found = lack_of_fit(part, len(fit.free))
-    if found is None:
+    lack = lack_of_fit(part, len(fit.free))
+    if lack is None:
         return {}
     numbers = {
-        "number": found.sweeps,
-        "sd": number(found.repeatability),
-        "lack_of_fit": number(found.ratio),
-        "degrees_of_freedom": [int(x) for x in found.freedom],
-        "probability": number(found.probability),
+        "number": lack.sweeps,
+        "sd": number(lack.repeatability),
+        "lack_of_fit": number(lack.ratio),
+        "degrees_of_freedom": [int(x) for x in lack.freedom],
+        "probability": number(lack.probability),
     }
     return {"sweeps": numbers}
 

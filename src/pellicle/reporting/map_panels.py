@@ -333,16 +333,16 @@ def block_codes(codes: np.ndarray, side: int) -> np.ndarray:
     """Most frequent status of each block of an image."""
     if side == 1:
         return codes
-    found, most = None, None
+    commonest, most = None, None
     for code in np.unique(codes):
         count = _sums((codes == code).astype(np.int32), side)
-        if found is None or most is None:
-            found, most = np.full(count.shape, code, codes.dtype), count
+        if commonest is None or most is None:
+            commonest, most = np.full(count.shape, code, codes.dtype), count
             continue
-        found[count > most] = code
+        commonest[count > most] = code
         most = np.maximum(most, count)
-    assert found is not None
-    return found
+    assert commonest is not None
+    return commonest
 
 
 def block_means(array: Any, used: np.ndarray, side: int) -> np.ndarray:

@@ -26,83 +26,83 @@ DEEP = 0.2
 """Largest depth of that band, as a share of the distance from the edge to the middle."""
 
 
-def place(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+def place(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     """Describe where pixels are.
 
     **Arguments:**
 
-    - `found`: True for the pixels, at least one, in the shape of the map.
+    - `marked`: True for the pixels, at least one, in the shape of the map.
     - `known`: True for pixels among which they are: those with data.
 
     **Returns:** words such as "along the edge" or "in one patch of 84 pixels around x = 1.2, y = 3.4 mm".
     """
-    found, known = axes.frames(found), axes.frames(known)
-    if axes.series is None or len(found) == 1:
-        return _in_frame(found[0], known[0], axes)
-    each = found.reshape(len(found), -1).sum(axis=1)
-    share = each / np.maximum(known.reshape(len(found), -1).sum(axis=1), 1)
+    marked, known = axes.frames(marked), axes.frames(known)
+    if axes.series is None or len(marked) == 1:
+        return _in_frame(marked[0], known[0], axes)
+    each = marked.reshape(len(marked), -1).sum(axis=1)
+    share = each / np.maximum(known.reshape(len(marked), -1).sum(axis=1), 1)
     whole = _runs(share > 0.5)
     if sum(each[a:b].sum() for a, b in whole) >= MOST * each.sum():
         return "in all pixels at " + _spans(whole, axes.series)
     first, last = np.flatnonzero(each)[[0, -1]]
     when = ""
-    if last - first + 1 <= 0.5 * len(found):
+    if last - first + 1 <= 0.5 * len(marked):
         when = f"at {axes.series.span(*axes.series.values[[first, last]])}, "
-    often = found.sum(axis=0)
+    often = marked.sum(axis=0)
     return when + _in_frame(often >= max(0.5 * often.max(), 1), np.any(known, axis=0), axes, counted=False)
 
 
-def _in_frame(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool = True) -> str:
+def _in_frame(marked: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool = True) -> str:
     """Describe where pixels of one image, one set of sites or one line are."""
-    count = int(found.sum())
+    count = int(marked.sum())
     if count <= FEW and axes.kind != "line":
-        return "at " + " and at ".join(axes.place(*index) for index in np.argwhere(found).tolist())
+        return "at " + " and at ".join(axes.place(*index) for index in np.argwhere(marked).tolist())
     if axes.kind == "line":
-        return _on_line(found, axes.x)
+        return _on_line(marked, axes.x)
     if axes.kind == "sites":
-        return _at_sites(found, known, axes)
+        return _at_sites(marked, known, axes)
     if count == known.sum():
         return "everywhere"
-    if around := _around(found, axes):
-        return _edge(found, known) or around
-    return _rows(found, known, axes) or _edge(found, known) or _patches(found, known, axes, counted)
+    if around := _around(marked, axes):
+        return _edge(marked, known) or around
+    return _rows(marked, known, axes) or _edge(marked, known) or _patches(marked, known, axes, counted)
 
 
-def _around(found: np.ndarray, axes: MapAxes) -> str:
+def _around(marked: np.ndarray, axes: MapAxes) -> str:
     """All around one region, as outside a mask, or nothing."""
-    border = np.concatenate([found[0], found[-1], found[:, 0], found[:, -1]])
-    rows, columns = (np.flatnonzero(~np.all(found, axis=i)) for i in (1, 0))
+    border = np.concatenate([marked[0], marked[-1], marked[:, 0], marked[:, -1]])
+    rows, columns = (np.flatnonzero(~np.all(marked, axis=i)) for i in (1, 0))
     if border.mean() < WHOLE or not rows.size:
         return ""
-    box = found[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    if box.mean() > 1 - FILLED or box.size > MOST * found.size:
+    box = marked[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    if box.mean() > 1 - FILLED or box.size > MOST * marked.size:
         return ""
     assert axes.y is not None
     x, y = (axis.span(*axis.values[at[[0, -1]]]) for axis, at in ((axes.x, columns), (axes.y, rows)))
     return f"all around {x}, {y}"
 
 
-def _on_line(found: np.ndarray, axis: Axis) -> str:
-    runs = sorted(_runs(found), key=lambda run: run[0] - run[1])[:FEW]
-    if sum(b - a for a, b in runs) < MOST * found.sum():
+def _on_line(marked: np.ndarray, axis: Axis) -> str:
+    runs = sorted(_runs(marked), key=lambda run: run[0] - run[1])[:FEW]
+    if sum(b - a for a, b in runs) < MOST * marked.sum():
         return "in scattered pixels"
     return "at " + _spans(sorted(runs), axis)
 
 
-def _at_sites(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+def _at_sites(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     """Sites far from the centre of all, near it, or neither."""
     assert axes.y is not None
     x, y = axes.x.values, axes.y.values
     radius = np.hypot(x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2)
     order = np.flatnonzero(known)[np.argsort(radius[known])]
-    size = min(int(np.ceil(1.25 * found.sum())), len(order) // 2)
+    size = min(int(np.ceil(1.25 * marked.sum())), len(order) // 2)
     for word, end in (("outer", order[::-1][:size]), ("inner", order[:size])):
-        if size and found[end].sum() >= MOST * found.sum():
+        if size and marked[end].sum() >= MOST * marked.sum():
             return f"at the {word} sites"
     return "at scattered sites"
 
 
-def _rows(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
+def _rows(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     """Whole rows or columns, or nothing; those at a border of the image are along an edge."""
     assert axes.y is not None
     top, bottom = ("top", "bottom") if axes.downward else ("bottom", "top")
@@ -110,9 +110,9 @@ def _rows(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
         (1, "row", axes.y, (top, bottom)),
         (0, "column", axes.x, ("left", "right")),
     ):
-        each = found.sum(axis=along)
+        each = marked.sum(axis=along)
         runs = _runs(each > 0.5 * np.maximum(known.sum(axis=along), 1))
-        covered = sum(each[a:b].sum() for a, b in runs) / found.sum()
+        covered = sum(each[a:b].sum() for a, b in runs) / marked.sum()
         if covered < MOST:
             continue
         mostly = _mostly(covered)
@@ -131,25 +131,25 @@ def _rows(found: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
     return ""
 
 
-def _edge(found: np.ndarray, known: np.ndarray) -> str:
+def _edge(marked: np.ndarray, known: np.ndarray) -> str:
     """Along the border of the pixels with data, or nothing."""
     from scipy.ndimage import binary_fill_holes, distance_transform_edt  # slow to import
 
-    step = int(np.ceil(np.sqrt(found.size / MOST_PIXELS)))  # distances take 30 bytes a pixel
-    found, known = found[::step, ::step], known[::step, ::step]
-    if not found.any():
+    step = int(np.ceil(np.sqrt(marked.size / MOST_PIXELS)))  # distances take 30 bytes a pixel
+    marked, known = marked[::step, ::step], known[::step, ::step]
+    if not marked.any():
         return ""
     inside = np.asarray(binary_fill_holes(known))
     depth = np.asarray(distance_transform_edt(np.pad(inside, 1)))[1:-1, 1:-1]
     for covered in (0.97, 0.85):
-        reach = np.quantile(depth[found], covered)
+        reach = np.quantile(depth[marked], covered)
         band = inside & (depth <= reach)
-        if reach <= max(2.0, DEEP * depth.max()) and (found & band).sum() >= COVERED * band.sum():
+        if reach <= max(2.0, DEEP * depth.max()) and (marked & band).sum() >= COVERED * band.sum():
             return _mostly(covered) + "along the edge"
     return ""
 
 
-def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool) -> str:
+def _patches(marked: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool) -> str:
     """One patch, a few, many, or pixels scattered at random."""
     from scipy.ndimage import convolve, find_objects, label  # slow to import
 
@@ -157,17 +157,17 @@ def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool)
     assert y_axis is not None
     ring = np.ones((3, 3), np.uint8)
     ring[1, 1] = 0
-    around = convolve(found.astype(np.uint8), ring, mode="constant")[found].sum()
-    neighbours = convolve(known.astype(np.uint8), ring, mode="constant")[found].sum()
-    density = found.sum() / known.sum()
+    around = convolve(marked.astype(np.uint8), ring, mode="constant")[marked].sum()
+    neighbours = convolve(known.astype(np.uint8), ring, mode="constant")[marked].sum()
+    density = marked.sum() / known.sum()
     if around / max(neighbours, 1) - density < CLUSTERED * (1 - density):
         return "in scattered pixels"
-    labelled: Any = label(found, np.ones((3, 3)))
+    labelled: Any = label(marked, np.ones((3, 3)))
     labels, number = labelled
     sizes = np.bincount(labels.ravel())[1:]
     largest = np.argsort(-sizes)
     boxes = find_objects(labels)
-    listed = next((n for n in range(1, FEW + 1) if sizes[largest[:n]].sum() >= MOST * found.sum()), 0)
+    listed = next((n for n in range(1, FEW + 1) if sizes[largest[:n]].sum() >= MOST * marked.sum()), 0)
     if not listed:
         return f"in {number} patches of up to {sizes.max()} pixels"
 
@@ -181,7 +181,7 @@ def _patches(found: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool)
         return f"{size}at {x}, {y_axis.span(*y_axis.values[[rows.start, rows.stop - 1]])}"
 
     texts = [described(i) for i in largest[:listed].tolist()]
-    mostly = _mostly(sizes[largest[:listed]].sum() / found.sum())
+    mostly = _mostly(sizes[largest[:listed]].sum() / marked.sum())
     return mostly + (
         f"in one patch {texts[0]}" if listed == 1 else f"in {listed} patches, {' and '.join(texts)}"
     )

@@ -100,8 +100,8 @@ def free_parameters(dataset: Dataset) -> list[str]:
     """Variables of the free parameters of a map, in the order of the fits: those with a standard error."""
     order = [variable_name(str(text).split(" ")[0]) for text in dataset.attrs.get("parameters", ())]
     names = [str(name) for name in dataset.data_vars if not str(name).endswith("_rate")]
-    found = [name for name in names if f"{name}_stderr" in dataset.data_vars]
-    return sorted(found, key=lambda name: order.index(name) if name in order else len(order))
+    free = [name for name in names if f"{name}_stderr" in dataset.data_vars]
+    return sorted(free, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def parameter_name(dataset: Dataset, variable: str) -> str:
@@ -149,10 +149,10 @@ def summarise(made: Dataset | Map) -> MapSummary:
 
 def _plan(dataset: Dataset) -> tuple[Mapping[str, Any], ...]:
     """Rows of the plan, with that of the neighbours."""
-    stored, found = dataset.attrs.get("plan"), evidence(dataset)
+    stored, counted = dataset.attrs.get("plan"), evidence(dataset)
     rows = [] if stored is None else json.loads(stored)
     named = any(each["effect"] == "neighbours" for each in rows)
-    return (*rows, *([asdict(row(found))] if found is not None and not named else []))
+    return (*rows, *([asdict(row(counted))] if counted is not None and not named else []))
 
 
 def thinned(dataset: Dataset, axes: MapAxes) -> Dataset:
@@ -252,7 +252,7 @@ def summarise_rates(dataset: Dataset) -> tuple[RateSummary, ...]:
         made = growth(dataset)
     except UsageError:  # times without unit, or no thickness
         return ()
-    found = []
+    rates = []
     for name in (str(key).removesuffix("_rate_status") for key in made if str(key).endswith("_rate_status")):
         status = made[f"{name}_rate_status"].values
         known = status != RATES.index("no-data")
@@ -260,7 +260,7 @@ def summarise_rates(dataset: Dataset) -> tuple[RateSummary, ...]:
             continue
         of = {key: made[f"{name}_rate{key}"].values[known] for key in ("", "_stderr", "_stderr_noise")}
         low, middle, high = np.percentile(of[""], [5, 50, 95]).tolist()
-        found.append(
+        rates.append(
             RateSummary(
                 name,
                 made[f"{name}_rate"].attrs["units"],
@@ -271,4 +271,4 @@ def summarise_rates(dataset: Dataset) -> tuple[RateSummary, ...]:
                 int(np.count_nonzero(status == RATES.index("not-constant"))),
             )
         )
-    return tuple(found)
+    return tuple(rates)

@@ -216,27 +216,27 @@ def plan_rows(made: MapSummary) -> list[tuple[str, str]]:
 
 def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[str, Any]:
     """Convert a map to the dictionary of its summary; infinite and undefined numbers are None."""
-    found = summarise(made) if summary is None else summary
-    about, run = found.attributes, found.run
+    facts = summarise(made) if summary is None else summary
+    about, run = facts.attributes, facts.run
     return {
         "schema": SCHEMA,
         "data": {
             "path": about.get("path", ""),
             "fingerprint": about.get("fingerprint", ""),
             "signal": about.get("signal", "R"),
-            "shape": dict(zip(map(str, dataset_of(made)["status"].dims), found.axes.shape, strict=True)),
-            "pixels": found.pixels,
-            "with_data": found.with_data,
+            "shape": dict(zip(map(str, dataset_of(made)["status"].dims), facts.axes.shape, strict=True)),
+            "pixels": facts.pixels,
+            "with_data": facts.with_data,
         },
-        "summary": in_words(found),
-        "status": dict(found.counts),
-        "places": dict(found.places),
-        "converged": found.counts.get(str(Status.CONVERGED), 0) / found.with_data if found.with_data else 0.0,
-        "parameters": {p.name: _parameter_json(p) for p in found.parameters},
-        "rates": {rate.variable: asdict(rate) for rate in found.rates},
-        "plan": [dict(row) for row in found.plan],
+        "summary": in_words(facts),
+        "status": dict(facts.counts),
+        "places": dict(facts.places),
+        "converged": facts.counts.get(str(Status.CONVERGED), 0) / facts.with_data if facts.with_data else 0.0,
+        "parameters": {p.name: _parameter_json(p) for p in facts.parameters},
+        "rates": {rate.variable: asdict(rate) for rate in facts.rates},
+        "plan": [dict(row) for row in facts.plan],
         "preview": int(about.get("preview", 1)),
-        "notes": list(found.notes),
+        "notes": list(facts.notes),
         "seconds": None if run is None else number(run.seconds),
         "pixels_per_second": number(_rate(run)) if run is not None and run.pixels else None,
         "versions": versions(),

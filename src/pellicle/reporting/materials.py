@@ -91,13 +91,13 @@ def describe(name: str) -> str:
 
 
 def _facts_of_file(path: str) -> list[tuple[str, str]]:
-    found = read_material_file(path)
+    material = read_material_file(path)
     return [
         ("file", path),
-        ("format", found.format),
-        ("columns", found.columns),
-        ("title", found.title),
-        ("comments", found.comments),
+        ("format", material.format),
+        ("columns", material.columns),
+        ("title", material.title),
+        ("comments", material.comments),
     ]
 
 

@@ -276,8 +276,8 @@ def cube_json(cube: Cube) -> dict[str, Any]:
 def _sample(cube: Cube) -> dict[str, np.ndarray]:
     """Sampled values by name, psi and delta of ellipsometry."""
     names = {"values": "psi" if "delta" in cube.arrays else "values", "delta": "delta"}
-    found = sample({n: cube.arrays[n] for n in names if n in cube.arrays}, len(cube.dims))
-    return {names[name]: values for name, values in found.items()}
+    sampled = sample({n: cube.arrays[n] for n in names if n in cube.arrays}, len(cube.dims))
+    return {names[name]: values for name, values in sampled.items()}
 
 
 def _medians(cube: Cube, seen: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -82,13 +82,13 @@ def to_json(made: ThicknessMap) -> dict[str, Any]:
 
 def to_csv(made: ThicknessMap) -> str:
     """Format a strip as rows, one for each admissible thickness of each position."""
-    found, rows = made.found, []
+    films, rows = made.found, []
     assert made.position is not None
     for i, (at, colour) in enumerate(zip(made.position, made.colours, strict=True)):
-        for order in np.flatnonzero(np.nan_to_num(found.probability[i]) >= LEAST):
-            columns = (found.thickness, found.stderr, found.probability, found.delta_e)
+        for order in np.flatnonzero(np.nan_to_num(films.probability[i]) >= LEAST):
+            columns = (films.thickness, films.stderr, films.probability, films.delta_e)
             values = [f"{float(x[i, order]):.6g}" for x in columns]
-            rows.append([f"{at:.6g}", *(f"{x:.5f}" for x in colour), order + 1, *values, found.status[i]])
+            rows.append([f"{at:.6g}", *(f"{x:.5f}" for x in colour), order + 1, *values, films.status[i]])
     return csv_rows(_HEADER, rows)
 
 
@@ -131,9 +131,9 @@ def _strip(made: ThicknessMap, name: str) -> Figure:
     shown.set_yticks([0, 1], ["data", "fit"])
     shown.tick_params(length=0)
     shown.set_title(name.replace("$", r"\$"))
-    found = made.found
-    for order in range(found.thickness.shape[1] - 1, -1, -1):
-        probability = np.nan_to_num(found.probability[:, order])
+    films = made.found
+    for order in range(films.thickness.shape[1] - 1, -1, -1):
+        probability = np.nan_to_num(films.probability[:, order])
         seen = probability >= LEAST
         if not seen.any():
             continue
@@ -142,8 +142,8 @@ def _strip(made: ThicknessMap, name: str) -> Figure:
         )
         axes.errorbar(
             position[seen],
-            found.thickness[seen, order],
-            found.stderr[seen, order],
+            films.thickness[seen, order],
+            films.stderr[seen, order],
             fmt=".",
             color=colour,
             alpha=1.0 if order == 0 else 0.5,
@@ -151,10 +151,10 @@ def _strip(made: ThicknessMap, name: str) -> Figure:
             elinewidth=0.6,
             label=label,
         )
-    misfit = found.status == "misfit"
+    misfit = films.status == "misfit"
     if misfit.any():
         axes.plot(
-            position[misfit], found.thickness[misfit, 0], "x", color=ORANGE, markersize=4, label="misfit"
+            position[misfit], films.thickness[misfit, 0], "x", color=ORANGE, markersize=4, label="misfit"
         )
     axes.set(xlabel="position along the strip (pixels)", ylabel="thickness (nm)")
     axes.legend(frameon=False, fontsize="small")

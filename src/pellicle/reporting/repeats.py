@@ -21,11 +21,15 @@ FILES = RECORD, TABLE, TEXT = "repeats.json", "repeats.csv", "repeats.txt"
 
 def report(repeats: Repeats) -> str:
     """Format the verdict, a row for each parameter, and what was left out."""
-    found = warnings(repeats)
+    sentences = warnings(repeats)
     return (
         block("Repeats", wrapped(repeats.verdict))
         + block("Scatter of the parameters", [*table(rows(repeats)), "", *facts(notes(repeats))])
-        + (block("Warnings", [line for text in found for line in wrapped(text, "- ", "  ")]) if found else "")
+        + (
+            block("Warnings", [line for text in sentences for line in wrapped(text, "- ", "  ")])
+            if sentences
+            else ""
+        )
     )
 
 

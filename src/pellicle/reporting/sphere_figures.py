@@ -123,14 +123,14 @@ def balls(
     """
     target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
     surroundings = studio()
-    found = [ball(films, nm, surroundings, size) for nm in thickness]
-    factor = exposure(*(each.whole for each in found), percentile=LAMP_PERCENTILE)
+    renderings = [ball(films, nm, surroundings, size) for nm in thickness]
+    factor = exposure(*(each.whole for each in renderings), percentile=LAMP_PERCENTILE)
     behind = _background(surroundings, factor)
-    rows = {"in reflection": [display(each.reflected, factor, DARK) for each in found]}
-    through = [each.transmitted for each in found if each.transmitted is not None]
+    rows = {"in reflection": [display(each.reflected, factor, DARK) for each in renderings]}
+    through = [each.transmitted for each in renderings if each.transmitted is not None]
     if through:
         rows["seen through"] = [display(each, factor, behind) for each in through]
-        rows["together"] = [display(each.whole, factor, behind) for each in found]
+        rows["together"] = [display(each.whole, factor, behind) for each in renderings]
     names = [f"{nm:g} nm" for nm in thickness]
     save_figure(_draw_grid(rows, names, title, _lighting(f"{illuminant}, studio", factor)), target, dpi=DPI)
 
@@ -152,9 +152,9 @@ def bubbles(
     """
     target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
     tent = light_tent()
-    found = [bubble(films, top, tent, size) for top in thickness]
-    factor = exposure(*found)
-    shown = [display(each, factor, _background(tent, factor)) for each in found]
+    renderings = [bubble(films, top, tent, size) for top in thickness]
+    factor = exposure(*renderings)
+    shown = [display(each, factor, _background(tent, factor)) for each in renderings]
     names = [f"{float(f'{top:.3g}'):g} nm at the top" for top in thickness]
     save_figure(
         _draw_grid({"": shown}, names, title, _lighting(f"{illuminant}, light tent", factor)), target, dpi=DPI
@@ -238,19 +238,19 @@ def _draw(
     white, scale = sensor(*OBSERVER).white, Normalize(0.0, LARGEST)
     figure = new_figure(1.0 + 1.9 * len(maps), 5.1)
     panels = figure.subplots(2, len(maps), squeeze=False)
-    for above, below, found in zip(*panels, maps, strict=True):
-        linear = np.asarray(linear_srgb(found.xyz, white))
+    for above, below, colours in zip(*panels, maps, strict=True):
+        linear = np.asarray(linear_srgb(colours.xyz, white))
         above.imshow(
             display(pixels.rendering(_over(pixels, linear)), factor, DARK), interpolation="antialiased"
         )
-        above.set_title(f"{found.name}\n{_time(found.seconds)} a colour", fontsize="small")
+        above.set_title(f"{colours.name}\n{_time(colours.seconds)} a colour", fontsize="small")
         error = np.full(pixels.mask.shape, np.nan)
         error[pixels.mask] = np.where(
-            pixels.share > 0.5, _over(pixels, found.delta_e[..., None])[:, 0], np.nan
+            pixels.share > 0.5, _over(pixels, colours.delta_e[..., None])[:, 0], np.nan
         )
         below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
-        mean, largest = (_size(size) for size in (np.mean(found.delta_e), np.max(found.delta_e)))
-        words = "the reference" if found.name == EXACT else f"mean {mean}, largest {largest}"
+        mean, largest = (_size(size) for size in (np.mean(colours.delta_e), np.max(colours.delta_e)))
+        words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
         below.set_title(words, fontsize="small")
     for axes in panels.flat:
         axes.set(xticks=[], yticks=[])

@@ -49,13 +49,13 @@ def folding_at(
     """
     if not can_be_folded(delta):
         return None
-    found: list[tuple[float, float]] = []
+    places: list[tuple[float, float]] = []
     for value in np.unique(group):
         rows = np.flatnonzero(group == value)
         rows = rows[np.argsort(wavelength[rows], kind="stable")]
         if np.all(np.diff(wavelength[rows]) > 0):
-            found += kinks(wavelength[rows], psi[rows], delta[rows])
-    return max(found)[1] if found else None
+            places += kinks(wavelength[rows], psi[rows], delta[rows])
+    return max(places)[1] if places else None
 
 
 def folding_note(wavelength: float) -> str:

@@ -73,8 +73,8 @@ def interference_spectra(
         position = varied_layer(scene, layer)
         varying = _over(with_wavelength(scene, wavelength), thickness, angle, position)
         grid = np.stack(np.meshgrid(thickness, angle), axis=-1).reshape(-1, 2)
-        found = signals(exact(varying), tabulated(varying), grid, build)
-    return found.reshape(len(angle), len(thickness), len(wavelength))
+        spectra = signals(exact(varying), tabulated(varying), grid, build)
+    return spectra.reshape(len(angle), len(thickness), len(wavelength))
 
 
 def colour_table(

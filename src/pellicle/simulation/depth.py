@@ -68,8 +68,8 @@ def absorptance(
 
     ```
     """
-    found = _absorptances(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
-    return found[0] if len(found) == 1 else 0.5 * (found[0] + found[1])
+    absorbed = _absorptances(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
+    return absorbed[0] if len(absorbed) == 1 else 0.5 * (absorbed[0] + absorbed[1])
 
 
 def _absorptances(*arguments: Any) -> tuple[Any, ...]:
@@ -140,15 +140,15 @@ def _fields(
     angle: Any,
     polarisations: str,
 ) -> Field:
-    found = fields(ambient, layers, substrate, wavenumber, thicknesses, depth, angle, polarisations)
-    energy = sum(each.energy() * (1 / len(found)) for each in found)
+    waves = fields(ambient, layers, substrate, wavenumber, thicknesses, depth, angle, polarisations)
+    energy = sum(each.energy() * (1 / len(waves)) for each in waves)
     _, q0 = transverse(ambient, angle)
     incident = jnp.sqrt(q0)  # |E| of the incident wave is 1, of each of these 1/√q₀
-    turns = [jax.lax.complex(incident * jnp.cos(x.phase), incident * jnp.sin(x.phase)) for x in found]
+    turns = [jax.lax.complex(incident * jnp.cos(x.phase), incident * jnp.sin(x.phase)) for x in waves]
 
     def turned(components: Any) -> Any:
         axes = zip(*components, strict=True)
         return jnp.stack([sum(t * to_complex(x) for t, x in zip(turns, axis, strict=True)) for axis in axes])
 
-    electric, magnetic = turned([x.electric for x in found]), turned([x.magnetic for x in found])
-    return Field(q0 * energy, wavenumber * found[0].loss * energy, electric, magnetic)
+    electric, magnetic = turned([x.electric for x in waves]), turned([x.magnetic for x in waves])
+    return Field(q0 * energy, wavenumber * waves[0].loss * energy, electric, magnetic)

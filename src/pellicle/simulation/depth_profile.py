@@ -104,12 +104,12 @@ def energy(
         return fields(group.above, group.layers, group.below, k0, depths, at, angle, polarisation)[0]
 
     from_above = lit(groups[position], thicknesses, depth)
-    found = powers.down[position] * from_above.energy()
+    both = powers.down[position] * from_above.energy()
     if position < len(groups) - 1:
         total = sum(thicknesses, 0.0 * wavelength)
         from_below = lit(upside_down(groups, position), thicknesses[::-1], total - depth)
-        found += powers.up[position] * from_below.energy()
-    return found, from_above.loss
+        both += powers.up[position] * from_below.energy()
+    return both, from_above.loss
 
 
 def upside_down(groups: list[CoherentGroup], position: int) -> CoherentGroup:
@@ -135,8 +135,8 @@ def _layers(group: CoherentGroup, polarisation: str) -> Any:
     return absorptances(*film, polarisation)[0]
 
 
-def _ratio(found: response.Response, from_below: bool = False) -> Number:
-    return (found.below if from_below else found.reflected) / found.denominator
+def _ratio(waves: response.Response, from_below: bool = False) -> Number:
+    return (waves.below if from_below else waves.reflected) / waves.denominator
 
 
 def _exchange(index: Number, q: Number, r: Number, polarisation: str) -> Any:
@@ -148,16 +148,16 @@ def _exchange(index: Number, q: Number, r: Number, polarisation: str) -> Any:
 
 
 def _upward_difference(
-    groups: list[CoherentGroup], position: int, found: response.Response, q: Number, polarisation: str
+    groups: list[CoherentGroup], position: int, waves: response.Response, q: Number, polarisation: str
 ) -> Any:
     """Power that light from a plate loses at the face above it, besides R, A and T of light from above."""
     group = groups[position]
-    exchanged = _exchange(group.below, q, _ratio(found, from_below=True), polarisation)
+    exchanged = _exchange(group.below, q, _ratio(waves, from_below=True), polarisation)
     _, q_above = interface.transverse(group.above, group.angle)
     here, above = _sine_square(group.below, q, polarisation), _sine_square(group.above, q_above, polarisation)
     evanescent = here == 1
     ratio = (here - above) / jnp.where(evanescent, 1.0, 1 - here)
-    return exchanged + jnp.where(evanescent, 0.0, response.transmittance(found) * ratio)
+    return exchanged + jnp.where(evanescent, 0.0, response.transmittance(waves) * ratio)
 
 
 def _sine_square(index: Number, q: Number, polarisation: str) -> Any:
@@ -292,8 +292,8 @@ def _polarisations(plan: Plan, scene: Scene) -> str:
 
 @partial(jax.jit, static_argnames=("plan", "letters"))
 def _mean_powers(scene: Scene, plan: Plan, letters: str) -> Any:
-    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
-    each = [absorbed_power(plan, found, groups(scene)[1], wavelength, letter)[:4] for letter in letters]
+    coherent, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    each = [absorbed_power(plan, coherent, groups(scene)[1], wavelength, letter)[:4] for letter in letters]
     return jax.tree.map(lambda *x: sum(x) / len(x), *each)
 
 
@@ -302,15 +302,15 @@ def _at_depths(
     scene: Scene, depth: Any, thicknesses: list[Any], plan: Plan, letters: str, position: int
 ) -> tuple[Any, Any]:
     """|E|² and the absorbed share of the power per nm at depths of a group, at one wavelength."""
-    found, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
+    coherent, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
     thicknesses = [d * jnp.ones_like(wavelength) for d in thicknesses]
     per_power = density = jnp.zeros_like(depth)
     for letter in letters:
-        powers = absorbed_power(plan, found, groups(scene)[1], wavelength, letter)
-        E, loss = energy(found, position, wavelength, thicknesses, depth, powers, letter)
+        powers = absorbed_power(plan, coherent, groups(scene)[1], wavelength, letter)
+        E, loss = energy(coherent, position, wavelength, thicknesses, depth, powers, letter)
         per_power += E / len(letters)
         density += 2 * jnp.pi / wavelength * loss * E / len(letters)
-    return transverse(found[0].above, found[0].angle)[1] * per_power, density
+    return transverse(coherent[0].above, coherent[0].angle)[1] * per_power, density
 
 
 def _sections(

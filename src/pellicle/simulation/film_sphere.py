@@ -98,10 +98,10 @@ def spectra(films: Stack, thickness: float | np.ndarray, cosine: np.ndarray) -> 
     rows = np.pad(rows, ((0, 0), (0, -count % size)), "edge").reshape(2, -1, size)
     media = (films.ambient, films.layers, films.substrate, films.eye.wavelength)
     with jax.enable_x64(True):
-        found = [
+        parts = [
             np.asarray(_spectra(media, films.thickness, films.varied, *each)) for each in rows.swapaxes(0, 1)
         ]
-    whole = np.concatenate(found, axis=2)[:, :, :count]
+    whole = np.concatenate(parts, axis=2)[:, :, :count]
     return Spectra(*whole.reshape(3, 2, *at[0].shape, -1))
 
 
@@ -161,18 +161,18 @@ def ball(films: Stack, thickness: float, environment: Environment, size: int) ->
     """
     pixels = sphere(size)
     cosine = np.linspace(0.0, 1.0, COSINES + 1)[1:]
-    found = spectra(films, thickness, cosine)
+    light = spectra(films, thickness, cosine)
 
     def colour(spectrum: np.ndarray) -> np.ndarray:
         table = linear_srgb(films, spectrum)
         return np.stack([np.interp(pixels.cosine, cosine, channel) for channel in table.T], axis=-1)
 
     seen = environment.radiance(pixels.mirrored())[:, None]
-    reflected = pixels.rendering(colour(found.reflected) * seen)
+    reflected = pixels.rendering(colour(light.reflected) * seen)
     if is_opaque(films):
         return Ball(reflected, None)
     return Ball(
-        reflected, pixels.rendering(_through(pixels, _relative_index(films), found, environment, colour))
+        reflected, pixels.rendering(_through(pixels, _relative_index(films), light, environment, colour))
     )
 
 
@@ -192,7 +192,7 @@ def _relative_index(films: Stack) -> float:
 def _through(
     pixels: Sphere,
     index: float,
-    found: Spectra,
+    seen: Spectra,
     environment: Environment,
     colour: Callable[[np.ndarray], np.ndarray],
 ) -> np.ndarray:
@@ -200,11 +200,11 @@ def _through(
     outside = np.arccos(pixels.cosine)
     inside = np.arcsin(np.clip(np.sin(outside) / index, -1.0, 1.0))
     total = np.zeros((len(outside), 3))
-    spectrum = found.transmitted**2
+    spectrum = seen.transmitted**2
     for chord in range(CHORDS):
         turned = 2 * (outside - inside) + chord * (np.pi - 2 * inside)
         total += colour(spectrum) * environment.radiance(pixels.deflected(-turned))[:, None]
-        spectrum = spectrum * found.below
+        spectrum = spectrum * seen.below
     return total
 
 
@@ -245,12 +245,12 @@ def bubble(films: Stack, top: float, environment: Environment, size: int) -> Ren
         along = angle + crossing * step
         height = np.sin(along) * pixels.outward[:, 1]
         nm = drained_thickness(np.arccos(np.clip(height, -1.0, 1.0)), top)
-        found = spectra(films, nm, pixels.cosine)
+        light = spectra(films, nm, pixels.cosine)
         if crossing == 0:
-            linear += linear_srgb(films, found.reflected) * environment.radiance(pixels.mirrored())[:, None]
-            passed = found.transmitted
+            linear += linear_srgb(films, light.reflected) * environment.radiance(pixels.mirrored())[:, None]
+            passed = light.transmitted
             continue
         seen = environment.radiance(pixels.deflected(-(crossing - 1) * step))
-        linear += linear_srgb(films, passed * found.transmitted) * seen[:, None]
-        passed = passed * found.reflected
+        linear += linear_srgb(films, passed * light.transmitted) * seen[:, None]
+        passed = passed * light.reflected
     return pixels.rendering(linear)

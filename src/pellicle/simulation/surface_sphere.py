@@ -60,24 +60,24 @@ def render(
         narrowest, width = lobe_widths(surface)
         shared = (fixed, studio() if environment is None else environment, _squares(count), width)
         shared = jax.tree_util.tree_map(lambda x: jnp.asarray(x, jnp.float32), shared)
-        found = []
+        radiance = []
         for start in range(0, len(theta), _BATCH):
             rows = np.minimum(np.arange(start, start + _BATCH), len(theta) - 1)
             batch = {key: jnp.asarray(x[rows, None], jnp.float32) for key, x in maps.items()}
             lit = _radiance(shading.brdf, narrowest > NARROW, batch, jnp.asarray(axes[rows]), *shared)
-            found.append(np.asarray(lit))
-    return pixels.rendering(np.concatenate(found)[: len(theta)] @ shading.to_srgb)
+            radiance.append(np.asarray(lit))
+    return pixels.rendering(np.concatenate(radiance)[: len(theta)] @ shading.to_srgb)
 
 
 def following(surface: Surface, noise: Relief) -> dict[str, np.ndarray]:
     """The thickness by the noise's height, and the deviation by its slope, where they are free."""
     depth, tilt = (surface.numbers.get(key) for key in ("thickness", "deviation"))
-    found = {}
+    arrays = {}
     if isinstance(depth, Free):
-        found["thickness"] = depth.lower + noise.height * (depth.upper - depth.lower)
+        arrays["thickness"] = depth.lower + noise.height * (depth.upper - depth.lower)
     if isinstance(tilt, Free):
-        found |= {"deviation": tilt.upper * noise.slope, "azimuth": noise.azimuth}
-    return found
+        arrays |= {"deviation": tilt.upper * noise.slope, "azimuth": noise.azimuth}
+    return arrays
 
 
 def lobe_widths(surface: Surface) -> tuple[float, float]:
@@ -190,28 +190,28 @@ def in_colour(surface: Surface) -> Shading:
     interpolated linearly between the wavelengths of the channels, and constant beyond them. Free parameters
     take their start values.
     """
-    found: dict[str, Any] = dict(surface.start_numbers())
+    numbers: dict[str, Any] = dict(surface.start_numbers())
     low, high = thickness_range(surface)
     brdf = surface.brdf
-    found.pop("weights", None)  # of a sensor that is not the eye
-    if not found.get("multiple_scattering"):
-        found.pop("multiple_scattering", None)
+    numbers.pop("weights", None)  # of a sensor that is not the eye
+    if not numbers.get("multiple_scattering"):
+        numbers.pop("multiple_scattering", None)
     if brdf.from_film_colour is not None:
-        at = _at(surface, found, _EVERYWHERE)
+        at = _at(surface, numbers, _EVERYWHERE)
         table = FilmColourTable.build(
             _medium(at, "n", "k"),
             _medium(at, "base_n", "base_k"),
             (0.99 * low, 1.01 * high + 1.0),
-            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else found.get("coat_n", 1.0),
+            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else numbers.get("coat_n", 1.0),
             angle=(0.0, STEEPEST),
         )
         matrix = to_srgb(sensor())
-        found |= {"table": table, "xyz_to_srgb": np.linalg.lstsq(sensor().weights, matrix, rcond=None)[0]}
-        return Shading(_by_table(brdf), found, np.eye(3))
-    thick = high * float(np.max(found["n"])) > THIN
+        numbers |= {"table": table, "xyz_to_srgb": np.linalg.lstsq(sensor().weights, matrix, rcond=None)[0]}
+        return Shading(_by_table(brdf), numbers, np.eye(3))
+    thick = high * float(np.max(numbers["n"])) > THIN
     bands = integration_bands(BANDS if thick else "uniform-32")
-    found |= _at(surface, found, bands.wavelength) | {"wavelengths": bands.wavelength}
-    return Shading(brdf, found, to_srgb(Sensor(bands.wavelength, bands.weights)))
+    numbers |= _at(surface, numbers, bands.wavelength) | {"wavelengths": bands.wavelength}
+    return Shading(brdf, numbers, to_srgb(Sensor(bands.wavelength, bands.weights)))
 
 
 def thickness_range(surface: Surface) -> tuple[float, float]:

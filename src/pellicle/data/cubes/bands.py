@@ -28,10 +28,10 @@ def parse_wavelengths(value: str | os.PathLike[str] | Sequence[float] | np.ndarr
     The unit is empty unless the first line of the file names it. Raises UsageError.
     """
     if not isinstance(value, str | os.PathLike):
-        found = np.asarray(value, dtype=float)
-        if found.ndim != 1 or not found.size:
+        given = np.asarray(value, dtype=float)
+        if given.ndim != 1 or not given.size:
             raise UsageError(f"`wavelengths` must be one list of numbers, {_EXAMPLE}")
-        return found, ""
+        return given, ""
     text = os.fspath(value)
     unit = ""
     if Path(text).is_file():
@@ -211,14 +211,14 @@ def chosen_bands(
 def _intervals(without: str | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     if not isinstance(without, str):
         return [(float(low), float(high)) for low, high in without]
-    found = []
+    intervals = []
     try:
         for word in without.split(","):
             low, _, high = word.partition(":")
-            found.append((float(low), float(high or low)))
+            intervals.append((float(low), float(high or low)))
     except ValueError:
         raise UsageError(
             "`without_bands` must be wavelengths in nm, LO:HI or single ones, as in 755:775,820, not "
             f"{without!r}"
         ) from None
-    return found
+    return intervals

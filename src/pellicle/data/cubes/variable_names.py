@@ -82,8 +82,8 @@ def choose_variables(
 def _measured(values: Mapping[str, Column], signal: str | None) -> list[str]:
     """Names of the variables that may be meant: those of known quantities first."""
     for wanted in ((signal,), ("R", "T"), ("intensity", "counts", "sample counts")):
-        if found := [name for name, column in values.items() if column.role in wanted]:
-            return found
+        if named := [name for name, column in values.items() if column.role in wanted]:
+            return named
     return [name for name, column in values.items() if column.role not in ("psi", "delta", "foreign")]
 
 

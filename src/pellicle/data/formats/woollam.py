@@ -66,24 +66,23 @@ def layouts(file: TextFile) -> list[Layout] | None:
     transmitted = "TransmissionMeas=1" in method.replace(" ", "")
     facts = _facts(heading, method) + ([("light", "transmitted")] if transmitted else [])
     axis = f"wavelength ({wavelength_unit(unit[0])})"
-    found, left_out = [], {}
+    kept, left_out = [], {}
     for time, groups in _by_time(rows, dynamic, path).items():
         name = f"{time} min" if dynamic else ""
         tables = _tables(groups, trigonometric, transmitted, path)
         left_out |= dict.fromkeys(groups)
         for quantity, (names, own, notes) in tables:
             alone = f"{name} {quantity}" if quantity and dynamic else name
-            found.append((alone, (axis, *names), own, [NOTE, *notes]))
+            kept.append((alone, (axis, *names), own, [NOTE, *notes]))
     ignored = _described(left_out, transmitted)
-    if not found:
+    if not kept:
         raise DataError(
             f"{path}: looks like a Woollam file, but has no psi and delta, reflectance or transmittance, "
             f"only {ignored or 'a heading'}; export psi and delta as text"
         )
     said = [f"rows of other quantities ignored: {ignored}"] if ignored else []
     return [
-        plain_columns(names, own, [*notes, *said], name=name, facts=facts)
-        for name, names, own, notes in found
+        plain_columns(names, own, [*notes, *said], name=name, facts=facts) for name, names, own, notes in kept
     ]
 
 

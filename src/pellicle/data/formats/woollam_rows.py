@@ -80,8 +80,8 @@ def with_depolarisation(selected: Selected, label: str, shares: Rows) -> Selecte
         return without("its rows are not wavelength, angle, a value and its error")
     one_angle = len({cells[1] for _, cells in rows}) == 1 and all(_is(cells[1], 0.0) for _, cells in shares)
     values = [cells[2:] for _, cells in shares]
-    found = dict(zip(_points(shares, one_angle), values, strict=True))
-    beside = [found.get(point, []) for point in _points(rows, one_angle)]
+    by_point = dict(zip(_points(shares, one_angle), values, strict=True))
+    beside = [by_point.get(point, []) for point in _points(rows, one_angle)]
     lacking = sum(not cells or not all(map(_finite, cells)) for cells in beside)
     if lacking:
         return without(f"{lacking} of {len(rows)} points have none")

@@ -53,7 +53,7 @@ class BrdfMeasurements(NamedTuple):
             result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
         return result
 
-    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+    def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """One part for each set of samples, in their order."""
         views = zip(self.samples, self.ranked.problem.views, self.ranked.fits, strict=True)
         return tuple(
@@ -70,7 +70,7 @@ class BrdfMeasurements(NamedTuple):
             for each, view, fit in views
         )
 
-    def missed(self, parts: tuple[Part, ...], found: Discrepancy) -> list[Part]:
+    def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy) -> list[Part]:
         """The parts that the surface does not explain: residuals are large, and not noise."""
         views = zip(parts, self.ranked.problem.views, self.ranked.fits, strict=True)
         return [part for part, view, fit in views if _misses(view, fit)]

@@ -106,9 +106,9 @@ def _collected(
     residual, design = np.concatenate(residuals), np.concatenate(columns)
     size = np.linalg.norm(design, axis=0)
     design = design / np.where(size > 0, size, 1.0)
-    found = np.linalg.lstsq(design, residual, rcond=1e-10)[0]
-    explains = 1 - np.sum((residual - design @ found) ** 2) / np.sum(residual**2)
-    share = 1 - found[-1] / size[-1] if size[-1] > 0 else 1.0
+    shares = np.linalg.lstsq(design, residual, rcond=1e-10)[0]
+    explains = 1 - np.sum((residual - design @ shares) ** 2) / np.sum(residual**2)
+    share = 1 - shares[-1] / size[-1] if size[-1] > 0 else 1.0
     return (float(share), float(explains)) if explains > _STRUCTURE and 0.05 < share < 0.9 else (None, 0.0)
 
 

@@ -71,18 +71,18 @@ class Local(NamedTuple):
 @kept
 def local(form: ColourForm, scene: Scene, data: ColourData, values: Any) -> Local:
     """Colours, their Jacobian, and the layer's index at `values` (parameters,)."""
-    found = linearised(form, scene, data, values)
-    colours = found.signal.reshape(-1, 3)
+    linear = linearised(form, scene, data, values)
+    colours = linear.signal.reshape(-1, 3)
     own = record(colours, data)
     return Local(
         colours,
-        found.slope.reshape(-1, 3, len(values)),
+        linear.slope.reshape(-1, 3, len(values)),
         own.model,
         own.residual / jnp.sqrt(data.independent_fraction),
         own.coefficients,
         own.exposure,
-        found.layer,
-        found.layer_slope,
+        linear.layer,
+        linear.layer_slope,
     )
 
 

@@ -73,8 +73,8 @@ def wider(
         if not gain > RIVAL:
             break
         now, gains = again, gains + gain
-    found, values = now.problem.parameters, np.asarray(now.problem.values(now.minima.units))
-    pairs = list(zip(old, found, values[0].tolist(), strict=True))
+    parameters, values = now.problem.parameters, np.asarray(now.problem.values(now.minima.units))
+    pairs = list(zip(old, parameters, values[0].tolist(), strict=True))
     if any(_at_moved_bound(*each) for each in pairs):
         resting = [p for p, value in zip(old, ranked.values.tolist(), strict=True) if _moved(p, value) != p]
         words = tuple(
@@ -89,7 +89,7 @@ def wider(
         for p, q, _ in pairs
         if p != q
     )
-    return Wider(found, values, words)
+    return Wider(parameters, values, words)
 
 
 def _moved(p: Parameter, value: float) -> Parameter:
@@ -145,12 +145,12 @@ def measured_within(
     ]
 
 
-def joined(problem: Problem, found: Minima, values: np.ndarray) -> Minima:
+def joined(problem: Problem, searched: Minima, values: np.ndarray) -> Minima:
     """The minima of a search and those below `values` (starts, parameters), best first."""
     own = minima(problem, _inside(problem, values))
     columns = ("units", "deviance", "converged")
-    both = {name: np.concatenate([getattr(found, name), getattr(own, name)]) for name in columns}
-    return distinct(problem, replace(found, **both), MOST)
+    both = {name: np.concatenate([getattr(searched, name), getattr(own, name)]) for name in columns}
+    return distinct(problem, replace(searched, **both), MOST)
 
 
 def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:

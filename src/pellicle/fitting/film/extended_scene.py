@@ -273,8 +273,8 @@ class ExtendedScene:
             for row, (position, change) in zip(rows, own, strict=False):
                 row[position] += change  # of the last number, 0 where nothing changes
             form, scene, order = program
-            found = np.asarray(simulated(form, scene, data, rows[:, order]).signal)
-            result |= dict(zip(own, found, strict=False))
+            simulations = np.asarray(simulated(form, scene, data, rows[:, order]).signal)
+            result |= dict(zip(own, simulations, strict=False))
         return np.stack([result[key] for key in keys])
 
     @cached_property

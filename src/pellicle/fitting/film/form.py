@@ -62,7 +62,7 @@ class Local(NamedTuple):
 @kept
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
-    found = linearised(form, scene, data, values)
-    solved = nuisance.solve(found.signal, data, scene.instrument)
+    linear = linearised(form, scene, data, values)
+    solved = nuisance.solve(linear.signal, data, scene.instrument)
     curves = solved.model, solved.gain, solved.offset
-    return Local(found.signal, found.slope, *curves, found.layer, found.layer_slope)
+    return Local(linear.signal, linear.slope, *curves, linear.layer, linear.layer_slope)

@@ -70,14 +70,14 @@ def together(parts: tuple[Part, ...]) -> float | None:
 
 
 def missed(
-    parts: tuple[Part, ...], ranked: RankedMinima, found: Discrepancy, silent: Sequence[Fringes | None]
+    parts: tuple[Part, ...], ranked: RankedMinima, discrepancy: Discrepancy, silent: Sequence[Fringes | None]
 ) -> tuple[Part, ...]:
     """Spectra that the scene does not explain, and those of which it misses clear fringes, the `silent`."""
-    each = zip(parts, ranked.problem.views, found.remaining, silent, strict=True)
+    each = zip(parts, ranked.problem.views, discrepancy.remaining, silent, strict=True)
     return tuple(
         part
         for part, view, left, fringe in each
-        if fringe is not None or misfit(found, left, _accuracy(part, view))
+        if fringe is not None or misfit(discrepancy, left, _accuracy(part, view))
     )
 
 

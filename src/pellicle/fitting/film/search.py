@@ -92,8 +92,8 @@ def _near_fringes(problem: Problem, units: np.ndarray, lowest: np.ndarray) -> np
     be wrong."""
     chosen = []
     for thickness in proposed(problem):
-        found = np.asarray(problem.values(units[lowest]))[:, problem.thickness_axis]
-        chosen.append(lowest[np.abs(np.log(np.maximum(found, 1e-9) / thickness)) < _INDEX][:_NEAR])
+        depths = np.asarray(problem.values(units[lowest]))[:, problem.thickness_axis]
+        chosen.append(lowest[np.abs(np.log(np.maximum(depths, 1e-9) / thickness)) < _INDEX][:_NEAR])
     return np.concatenate([lowest[:0], *chosen])
 
 

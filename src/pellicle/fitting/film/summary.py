@@ -66,13 +66,13 @@ class FilmMeasurements:
         """Residuals of each view and what may explain them."""
         return evidence(self.targets, self.ranked, jacobian)
 
-    def parts(self, found: Discrepancy) -> tuple[Part, ...]:
+    def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """One part for each measurement."""
-        return parts.parts(self.data, self.ranked, found.errors)
+        return parts.parts(self.data, self.ranked, discrepancy.errors)
 
-    def missed(self, every: tuple[Part, ...], found: Discrepancy) -> tuple[Part, ...]:
+    def missed(self, every: tuple[Part, ...], discrepancy: Discrepancy) -> tuple[Part, ...]:
         """The parts that the scene does not explain."""
-        return parts.missed(every, self.ranked, found, self.silent)
+        return parts.missed(every, self.ranked, discrepancy, self.silent)
 
     def fixed(self) -> list[Estimate]:
         """The fixed numbers of the layers and the instruments."""

@@ -56,9 +56,9 @@ class PixelEffects:
         by = [r.number.position if r.number.position in programs else None for r in self._rows]
         for position, program in programs.items():
             own = [at == position for at in by]
-            found = _simulation(program, self._rows, own, unchanged=position is None)
-            if found.terms:
-                self._simulations.append(found)
+            simulation = _simulation(program, self._rows, own, unchanged=position is None)
+            if simulation.terms:
+                self._simulations.append(simulation)
         if nodes is not None:
             self._table = np.zeros((len(nodes), len(self._rows), view.points))
             self._simulated_at = np.zeros(len(nodes), bool)
@@ -69,8 +69,8 @@ class PixelEffects:
 
         `view` is that of the pixels: its frame may have an axis of pixels.
         """
-        found = self._simulated(view, at, values) if self._simulations else []
-        return [*found, *effects_on_signal(view, at, self._scene)]
+        simulated = self._simulated(view, at, values) if self._simulations else []
+        return [*simulated, *effects_on_signal(view, at, self._scene)]
 
     def _simulated(self, view: SpectrumView, at: Local, values: np.ndarray) -> list[Effect]:
         if self._nodes is not None and view.data.frame is None:

@@ -176,7 +176,7 @@ class PixelErrors:
         about = [(self.parameters[i], values[:, i]) for i in own]
         resting = [p.on_bound(x) & ~p.on_natural_bound(x) for p, x in about]
         close = (delta_chi2 < RIVAL) & outside(values, stderr, rivals).any(axis=2)
-        found = judged(
+        verdicts = judged(
             [p.name for p, _ in about],
             [p.limits is not None for p, _ in about],
             *(values[:, own], stderr[:, own], np.reshape(resting, (len(own), len(values))).T),
@@ -184,7 +184,7 @@ class PixelErrors:
             misfit=misfit,
             ambiguous=close.any(axis=1),
         )
-        return np.array([CODES[str(status)] for status in ORDER], np.uint8)[found.position]
+        return np.array([CODES[str(status)] for status in ORDER], np.uint8)[verdicts.position]
 
     def _judged(self, data: PixelData, minima: PixelMinima, group: Group) -> _Judged:
         view, who = self.view, group.pixels
@@ -205,9 +205,11 @@ class PixelErrors:
         evidence = self._evidence(group, taken, pixels, residual, noise)._replace(
             jacobian=columns, effects=effects
         )
-        found = discrepancy([evidence], scaled, minima.units[who, 0], contributions=False)
-        wrong = misfit(found, found.remaining[0], self._accuracy(taken(pixels.values)[..., 0]))
-        doubtful = np.flatnonzero((found.remaining[0].ratio > DOUBTFUL) & ~wrong)
+        discrepancies = discrepancy([evidence], scaled, minima.units[who, 0], contributions=False)
+        wrong = misfit(
+            discrepancies, discrepancies.remaining[0], self._accuracy(taken(pixels.values)[..., 0])
+        )
+        doubtful = np.flatnonzero((discrepancies.remaining[0].ratio > DOUBTFUL) & ~wrong)
         if len(doubtful):
             units = minima.units[who, 0][doubtful]
             again = discrepancy([evidence.of(doubtful)], scaled.of(doubtful), units)
@@ -215,10 +217,10 @@ class PixelErrors:
         return _Judged(
             noise=noise,
             covariance=noise_errors.covariance[:, :count, :count],
-            systematic=np.maximum(found.variance - noise_errors.variance, 0.0)[:, :count],
+            systematic=np.maximum(discrepancies.variance - noise_errors.variance, 0.0)[:, :count],
             flat=self.limits.flat_sides(data, minima, who, noise, ~wrong),
             misfit=wrong,
-            evidence_share=found.evidence_share,
+            evidence_share=discrepancies.evidence_share,
             rms=_rms(taken(residual)),
         )
 

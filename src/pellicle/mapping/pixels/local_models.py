@@ -58,10 +58,10 @@ def local_models(form: SpectrumForm, scene: Scene, data: Data, pixels: PixelArra
 
     def one(pixel: PixelArrays, values: Any) -> PixelLocals:
         own = pixel.of(data)
-        found = linearised(form, scene, own, values)
-        solved = nuisance.solve(found.signal, own, scene.instrument)
+        linear = linearised(form, scene, own, values)
+        solved = nuisance.solve(linear.signal, own, scene.instrument)
         curves = solved.model, solved.gain, solved.offset
-        return PixelLocals(found.signal, found.slope, *curves, found.layer, solved.deviance)
+        return PixelLocals(linear.signal, linear.slope, *curves, linear.layer, solved.deviance)
 
     return jax.vmap(one)(pixels, at)
 
@@ -100,9 +100,11 @@ def in_lanes(program: Callable[..., Any], view: SpectrumView, arrays: PixelArray
 
 def locals_of(view: SpectrumView, arrays: PixelArrays, at: np.ndarray) -> tuple[Local, np.ndarray]:
     """The model of each pixel around `at` (pixels, parameters), without layer slopes, and its deviance."""
-    found: PixelLocals = in_lanes(local_models, view, arrays, at)
-    local = Local(found.signal, found.slope, found.model, found.gain, found.offset, found.layer, np.zeros(0))
-    return local, found.deviance
+    models: PixelLocals = in_lanes(local_models, view, arrays, at)
+    local = Local(
+        models.signal, models.slope, models.model, models.gain, models.offset, models.layer, np.zeros(0)
+    )
+    return local, models.deviance
 
 
 class Nuisances:

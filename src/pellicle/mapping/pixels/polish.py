@@ -83,10 +83,10 @@ def _residual(static: Static, common: Common, row: PixelData, unit: Any) -> tupl
     form, coordinates = static
     data = _of(common, row)
     values = coordinates.values(common.box, unit)
-    found = form.explain((common.scene, data), list(values))
+    explained = form.explain((common.scene, data), list(values))
     prior = common.box.prior_rows(values)
-    misfit = jnp.sum(found.residual[: data.values.size] ** 2)
-    return (found.residual, prior), (found.deviance + jnp.sum(prior**2), misfit)
+    misfit = jnp.sum(explained.residual[: data.values.size] ** 2)
+    return (explained.residual, prior), (explained.deviance + jnp.sum(prior**2), misfit)
 
 
 def _quadratic(unit: Any, gradient: Any, hessian: Any) -> QuadraticModel:
@@ -154,21 +154,23 @@ def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best
         def fn(unit):
             values = coordinates.values(common.box, unit)
             signal = compute_once(form.simulate(insert(common.scene, list(values)), data))
-            found = nuisance.solve(signal, data, common.scene.instrument)
+            nuisances = nuisance.solve(signal, data, common.scene.instrument)
             prior = common.box.prior_rows(values)
-            return (signal, found.residual, prior), (found, prior)
+            return (signal, nuisances.residual, prior), (nuisances, prior)
 
-        (signal, *residuals), push, (found, prior) = jax.linearize(fn, unit, has_aux=True)
-        signal, residuals, push, found = jax.lax.optimization_barrier((signal, residuals, push, found))
+        (signal, *residuals), push, (nuisances, prior) = jax.linearize(fn, unit, has_aux=True)
+        signal, residuals, push, nuisances = jax.lax.optimization_barrier(
+            (signal, residuals, push, nuisances)
+        )
         slope, *steep = jax.vmap(push)(jnp.eye(unit.size))
         residual, steep = jnp.concatenate(residuals), jnp.concatenate(steep, axis=1)
         model = _quadratic(unit, steep @ residual, steep @ steep.T)
         moved, (fall, _), promise = model.propose(jnp.zeros(()), jnp.array(False))
         fall = jnp.maximum(fall, 0.0)
-        misfit = jnp.sum(found.residual[: data.values.size] ** 2) - fall
+        misfit = jnp.sum(nuisances.residual[: data.values.size] ** 2) - fall
         span = common.box.upper - common.box.lower
-        deviance = found.deviance + jnp.sum(prior**2) - fall
-        curves = found.model, found.gain, found.offset
+        deviance = nuisances.deviance + jnp.sum(prior**2) - fall
+        curves = nuisances.model, nuisances.gain, nuisances.offset
         return Best(moved, deviance, misfit, promise, *curves, signal, slope.T / span)
 
     return jax.vmap(one)(rows, units)
@@ -204,11 +206,11 @@ def settle(
         if not len(left):
             break
         own = data.of(pixels[left])
-        found = in_rows(stepped, static, common, own, units[left], damping[left])
-        units[left], deviance[left], misfit[left] = found.units, found.deviance, found.misfit
-        promise[left], damping[left] = found.promise, found.damping
+        polished = in_rows(stepped, static, common, own, units[left], damping[left])
+        units[left], deviance[left], misfit[left] = polished.units, polished.deviance, polished.misfit
+        promise[left], damping[left] = polished.promise, polished.damping
         enough = tolerance[left]
         if coarse is not None:
-            enough = np.maximum(enough, COARSE * (found.deviance - coarse[left]))
+            enough = np.maximum(enough, COARSE * (polished.deviance - coarse[left]))
         left = left[promise[left] > enough]
     return units, deviance, misfit, promise

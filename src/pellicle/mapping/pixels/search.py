@@ -107,9 +107,9 @@ def minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     pixels, points = data.values.shape
     count, nodes = len(search.problem.parameters), len(search.thickness)
     valid = np.flatnonzero(np.sum(data.weight > 0, axis=1) >= 2)
-    found = _minima(search, data.of(valid) if len(valid) < pixels else data) if len(valid) else None
-    if found is not None and len(valid) == pixels:
-        return found
+    best = _minima(search, data.of(valid) if len(valid) < pixels else data) if len(valid) else None
+    if best is not None and len(valid) == pixels:
+        return best
     orders, curve = (pixels, ORDERS), (pixels, points)
     result = PixelMinima(
         values=np.full((*orders, count), np.nan),
@@ -125,7 +125,7 @@ def minima(search: PixelSearch, data: PixelData) -> PixelMinima:
         offset=np.full(curve, np.nan),
         slope=np.full((*curve, count), np.nan),
     )
-    for name, rows in zip(PixelMinima._fields, found or (), strict=False):
+    for name, rows in zip(PixelMinima._fields, best or (), strict=False):
         if name != "thickness":
             getattr(result, name)[valid] = rows
     return result
@@ -155,13 +155,13 @@ class _Points:
     def polish(self, where: np.ndarray, rounds: int, best: np.ndarray, *, coarse: bool = True) -> None:
         """Polish the points `where`, as far as their distance to the `best` (pixels,) asks if `coarse`."""
         at, which = np.nonzero(where)
-        found = polish.settle(
+        settled = polish.settle(
             *(self.search.static, self.search.common, self.data, at, self.units[at, which]),
             rounds=rounds,
             tolerance=_NEAR * self.search.noise(best[at]),
             coarse=best[at] if coarse else None,
         )
-        for mine, own in zip((self.units, self.deviance, self.misfit, self.promise), found, strict=True):
+        for mine, own in zip((self.units, self.deviance, self.misfit, self.promise), settled, strict=True):
             mine[at, which] = own
 
     def end(self, lowest: np.ndarray) -> polish.Best:
@@ -358,7 +358,7 @@ def _candidates(search: PixelSearch, data: PixelData) -> _Candidates:
     scale = np.sqrt(
         np.sum((seen * (common > 0)) ** 2, axis=1) / np.maximum(np.sum(common**2, axis=1), 1e-300)
     )
-    found = in_chunks(lambda own: scan(search.layout, lookup, *own), (values, scale), search.block)
+    scanned = in_chunks(lambda own: scan(search.layout, lookup, *own), (values, scale), search.block)
     square = np.sum((values * lookup.weight - lookup.known) ** 2, axis=1)
     alike = (
         len(search.problem.parameters) == 1
@@ -366,7 +366,7 @@ def _candidates(search: PixelSearch, data: PixelData) -> _Candidates:
         and np.allclose(seen, scale[:, None] * lookup.weight, rtol=1e-3, atol=0.0)
     )
     rounding = _ROUNDING * square * scale**2
-    return _Candidates(found.units, found.deviance.astype(float), found.profile, rounding, bool(alike))
+    return _Candidates(scanned.units, scanned.deviance.astype(float), scanned.profile, rounding, bool(alike))
 
 
 def _filled(values: np.ndarray, weight: np.ndarray, common: np.ndarray, channels: int) -> np.ndarray:

@@ -118,5 +118,5 @@ def sliced(
         reflected = whole.reflected + product(product(whole.up, lower), inside)
         return jnp.where(needed, reflected, state[0]), jnp.where(needed, inside, state[1])
 
-    found = jax.lax.cond(jnp.any(needed), by_slices, lambda state: state, stored(direct))
-    return to_pair(found[0]), to_pair(found[1])
+    reached = jax.lax.cond(jnp.any(needed), by_slices, lambda state: state, stored(direct))
+    return to_pair(reached[0]), to_pair(reached[1])

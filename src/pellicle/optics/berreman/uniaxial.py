@@ -110,8 +110,10 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), jnp.broadcast_to(near, shape)
 
     def by_differences(_: Any) -> tuple[Number, Number]:
-        found = _differences(t, k, growth)
-        return tuple(where(near, _broadcast(new, shape), old) for new, old in zip(found, (X, Y), strict=True))  # type: ignore[return-value]
+        differences = _differences(t, k, growth)
+        return tuple(
+            where(near, _broadcast(new, shape), old) for new, old in zip(differences, (X, Y), strict=True)
+        )  # type: ignore[return-value]
 
     X, Y = jax.lax.cond(jnp.any(near), by_differences, lambda _: (X, Y), None)
     X, Y, V = stored((X, Y, t.gamma * f_e - t.Q * X))

@@ -71,18 +71,18 @@ def _scatter(repeats: Repeats) -> dict[str, Any]:
 
 def _parameters(records: Sequence[Record]) -> list[str]:
     """Names of free parameters, those of the instrument last, without scale and offset."""
-    found = dict.fromkeys(
+    names = dict.fromkeys(
         name
         for record in records
         for name, p in record["parameters"].items()
         if p["free"] and not NUISANCE.fullmatch(name)
     )
-    return sorted(found, key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
+    return sorted(names, key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
 
 
 def _unit(records: Sequence[Record], name: str) -> str:
-    found = (record["parameters"][name]["unit"] for record in records if name in record["parameters"])
-    return next(found, "")
+    units = (record["parameters"][name]["unit"] for record in records if name in record["parameters"])
+    return next(units, "")
 
 
 def _row(record: Record, link: str | None, names: Sequence[str]) -> dict[str, Any]:

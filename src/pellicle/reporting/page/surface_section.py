@@ -95,9 +95,9 @@ def _panels(lobes: np.ndarray, names: list[str]) -> list[Panel]:
 def _at(fit: Fit, changed: dict[str, float]) -> Surface:
     """The fitted surface, with some of its numbers changed."""
     values = {name: p.value for name, p in fit.parameters.items()} | changed
-    found = with_values(fit.surface, values)
-    assert isinstance(found, Surface)
-    return found
+    surface = with_values(fit.surface, values)
+    assert isinstance(surface, Surface)
+    return surface
 
 
 def _names(surface: Surface) -> list[str]:
@@ -107,8 +107,8 @@ def _names(surface: Surface) -> list[str]:
 
 def _seen(surface: Surface) -> Views:
     numbers = {key: np.asarray(value, dtype=float) for key, value in surface.start_numbers().items()}
-    found = _views(surface.model, numbers, sphere(_SIZE).normal)
-    return Views(*map(np.asarray, found))
+    views = _views(surface.model, numbers, sphere(_SIZE).normal)
+    return Views(*map(np.asarray, views))
 
 
 def _sphere(radiance: np.ndarray) -> dict[str, str]:
