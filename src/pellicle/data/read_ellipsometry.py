@@ -9,11 +9,10 @@ A column of depolarisation, 1 − N² − C² − S², is read with them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pellicle.data import depolarisation
 from pellicle.data.ellipsometry_angles import (
     ALPHA_BETA,
     FOLDED_FORMS,
@@ -26,20 +25,26 @@ from pellicle.data.ellipsometry_angles import (
     from_ncs,
     from_tan_cos,
 )
-from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.spectrum import Spectrum, inside_range
-from pellicle.data.tabular.axis_and_signal import Axis, axis_note, axis_unit, read_axis
-from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, first_column, only
+from pellicle.data.repeated_sweeps import sweep_numbers
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum_rows import REMEDY, Rows, without_header
+from pellicle.data.tabular.axis_and_signal import Axis
+from pellicle.data.tabular.column_selection import (
+    AxisColumns,
+    axis_columns,
+    choice_notes,
+    first_column,
+    only,
+)
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
-from pellicle.signals.limits import FOLDED_DELTA, check_psi_delta, refuse_first
+from pellicle.signals.limits import FOLDED_DELTA, check_depolarisation, check_psi_delta, refuse_first
 
 SIGNAL = "psi-delta"
 _METAL_N, _METAL_K = 13, 80
 """Largest n and k of common metals up to 12 µm (gold), in tables that look like psi and delta."""
-_REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
 
 
@@ -77,59 +82,41 @@ def read_ellipsometry(
     Raises DataError or UsageError.
     """
     _check_form(table, chosen, folded, analyser)
-    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
-    cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []), *chosen.errors)
-    axis, every = read_axis(table, chosen.axis, (*cells, *chosen.depolarisation), unit)
-    read, shares = every[: len(cells)], every[len(cells) :]
-    psi, delta, note, share = _psi_delta(table, chosen, read, analyser)
-    errors = read[len(cells) - len(chosen.errors) :]
-    shares = depolarisation.fractions(chosen.depolarisation, shares)
+    cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []))
+    every = (*cells, *chosen.errors, *chosen.depolarisation)
+    rows = Rows.read(table, chosen.axis, every, wavelength_unit, chosen.notes)
+    psi, delta, note, share = _psi_delta(table, chosen, rows.columns, analyser)
+    errors = rows.columns[len(cells) : len(cells) + len(chosen.errors)]
+    pairs = zip(chosen.depolarisation, rows.columns[len(cells) + len(errors) :], strict=True)
+    shares = [x / 100.0 if column.unit == "percent" else x for column, x in pairs]
     if not shares and share is not None:
         shares = [share]
-    notes = [*table.notes, *chosen.notes, axis_note(unit), *([note] if note else [])]
+    notes = [note] if note else []
     if noise is not None:
-        errors = [np.full(psi.size, float(noise))] * 2
+        errors = (np.full(psi.size, float(noise)),) * 2
         notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
     if chosen.form in FOLDED_FORMS:
         folded = True
     elif chosen.form == NCS:
         folded = False
     notes.append("psi and delta in degrees")
-    folding = None
-    if folded is None:
-        folding = _folding(axis, psi, delta)
-    rows = np.arange(psi.size)
-    if range is not None:
-        inside, note = inside_range(axis.wavelength, range, table.path)
-        rows, notes = rows[inside], [*notes, note]
-    sigma = [error[rows] for error in errors]
-    shares = [share[rows] for share in shares]
-    axis = axis.taken(rows)
-    _check(table, chosen, rows, psi[rows], delta[rows], sigma, bool(folded))
-    depolarisation.check(table, chosen.depolarisation, rows, shares)
+    folding = _folding(rows.axis, psi, delta) if folded is None else None
+    rows = replace(rows, columns=(psi, delta, *errors, *shares)).cut(range)
+    psi, delta, *rest = rows.columns
+    sigma, shares = rest[: len(errors)], rest[len(errors) :]
+    _check(rows, chosen, psi, delta, sigma, bool(folded))
+    _check_depolarisation(rows, chosen.depolarisation, shares)
     if folded is None:
         # outside of the range nothing is checked
-        folding = folding or _folding(axis, psi[rows], delta[rows])
-        folded = folding is not None and can_be_folded(delta[rows])
+        folding = folding or _folding(rows.axis, psi, delta)
+        folded = folding is not None and can_be_folded(delta)
         notes += [folding_note(folding)] if folded and folding else []
     elif folded:
         notes.append("delta is known in 0 to 180 only: cos(delta) is fitted")
-    arrays = {
-        **axis._asdict(),
-        "values": psi[rows],
-        "delta": np.clip(delta[rows], *FOLDED_DELTA) if folded else delta[rows] % 360.0,
-    }
-    errors = {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
-    errors |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
-    return of_rows(
-        sweep_numbers(axis.wavelength, axis.setting),
-        arrays | errors | {"lines": table.source_lines(rows)},
-        signal=SIGNAL,
-        path=table.path,
-        sha256=table.sha256,
-        notes=tuple(notes),
-        folded=folded,
-    )
+    arrays = {"values": psi, "delta": np.clip(delta, *FOLDED_DELTA) if folded else delta % 360.0}
+    arrays |= {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
+    arrays |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
+    return rows.spectrum(notes, arrays, signal=SIGNAL, folded=folded)
 
 
 def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
@@ -179,7 +166,7 @@ def _psi_delta(
     if columns.analyser is None:
         angles = np.full(read[0].size, analyser, dtype=float)
         return from_alpha_beta(table, position, np.array(read[:2]), angles)
-    angles, reason = read[2], f"is not between 0 and 90 degrees; {_REMEDY}"
+    angles, reason = read[2], f"is not between 0 and 90 degrees; {REMEDY}"
     refuse_first(angles, (angles <= 0) | (angles >= 90), table.places(columns.analyser.position), reason)
     return from_alpha_beta(table, position, np.array(read[:2]), angles)
 
@@ -205,23 +192,19 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
     axis = axis_columns(table, columns, _EXAMPLE)
     errors = _error_columns(table, columns) if form == PSI_DELTA else ()
     analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
-    shares = depolarisation.columns(table, columns)
-    read = [*values, *errors, *shares, *(column for column in (*axis, analyser) if column)]
-    ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
-    notes = [f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as {', '.join(form)}"]
-    notes += [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
-    notes += depolarisation.notes(shares)
-    notes += axis.notes
-    notes += [f"ignored: {listed(ignored)}"] if ignored else []
-    return EllipsometryColumns(axis, form, values, analyser, errors, shares, tuple(notes))
+    shares = _depolarisation_columns(table, columns)
+    notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
+    notes += [
+        f"{column.name!r} read as {meaning}, {'in percent' if column.unit == 'percent' else 'a fraction'}"
+        for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False)
+    ]
+    notes = choice_notes(columns, axis, values, ", ".join(form), [*errors, *shares, analyser], notes)
+    return EllipsometryColumns(axis, form, values, analyser, errors, shares, notes)
 
 
 def _by_position(table: Table) -> EllipsometryColumns:
     if table.layout.width != 3:
-        raise UsageError(
-            f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
-            f"{_EXAMPLE}"
-        )
+        raise without_header(table, _EXAMPLE)
     axis = AxisColumns(first_column(table))
     psi, delta = (Column(i, "", role) for i, role in ((1, "psi"), (2, "delta")))
     note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
@@ -242,10 +225,33 @@ def _error_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...
     return (both,) if both else ()
 
 
+def _depolarisation_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:
+    """The depolarisation and, if there is one, its standard deviation. Raises DataError."""
+    share, error = only(table, columns, "depolarisation"), only(table, columns, "sigma_depolarisation")
+    if share is None:
+        return ()
+    chosen = (share, error) if error else (share,)
+    for column in chosen:
+        if column.unknown_unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write a "
+                "depolarisation as a fraction, or in percent with % in the column's name"
+            )
+    return chosen
+
+
+def _check_depolarisation(rows: Rows, columns: Sequence[Column], values: Sequence[np.ndarray]) -> None:
+    """Refuse a depolarisation that is no fraction, or errors of it not above zero. Raises DataError."""
+    if columns:
+        percent = "if it is in percent, name the column `depolarisation (%)`"
+        remedy = REMEDY if columns[0].unit == "percent" else percent
+        check_depolarisation(values[0], rows.places(columns[0]), remedy)
+        rows.check_errors(columns[1:], values[1:])
+
+
 def _check(
-    table: Table,
+    rows: Rows,
     columns: EllipsometryColumns,
-    rows: np.ndarray,
     psi: np.ndarray,
     delta: np.ndarray,
     sigma: Sequence[np.ndarray],
@@ -253,22 +259,21 @@ def _check(
 ) -> None:
     """Refuse Ψ, Δ and errors outside their limits, and values in radians. Raises DataError."""
     named = columns.values if columns.form == PSI_DELTA else (columns.axis.wavelength,) * 2
-    at_psi, at_delta = (table.places(column.position, rows) for column in named)
-    check_psi_delta(psi, delta, folded, at_psi, at_delta, _REMEDY)
-    for column, values in zip((columns.errors * 2)[:2], sigma, strict=False):
-        where = table.places(column.position, rows)
-        refuse_first(values, values <= 0, where, f"is a standard deviation not above zero; {_REMEDY}")
+    at_psi, at_delta = map(rows.places, named)
+    check_psi_delta(psi, delta, folded, at_psi, at_delta, REMEDY)
+    rows.check_errors((columns.errors * 2)[:2], sigma)
+    path = rows.table.path
     unnamed = not any(column.name for column in columns.values)
     if unnamed and psi.max() < _METAL_N and delta.min() >= 0 and delta.max() < _METAL_K:
         raise DataError(
-            f"{table.path}: has no header, and its values up to {psi.max():g} and {delta.max():g} may be n "
+            f"{path}: has no header, and its values up to {psi.max():g} and {delta.max():g} may be n "
             "and k; give optical constants as `layer` or `substrate`, or say that they are angles with "
             '`columns=["wavelength", "psi_deg", "delta_deg"]`'
         )
     stated = any(column.unit == "deg" for column in columns.values) or columns.form != PSI_DELTA
     if not stated and psi.max() < np.pi / 2 and np.abs(delta).max() < 2 * np.pi:
         raise DataError(
-            f"{table.path}: psi is at most {psi.max():g} and delta {np.abs(delta).max():g}, "
+            f"{path}: psi is at most {psi.max():g} and delta {np.abs(delta).max():g}, "
             "which look like radians, or tan(psi) and cos(delta); write degrees and name the columns psi_deg "
             "and delta_deg, or name them tan_psi and cos_delta"
         )

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.spectrum import Spectrum, inside_range
-from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_axis
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum_rows import REMEDY, Rows, error_columns, without_header
 from pellicle.data.tabular.column_names import RATIO_COLUMNS
-from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
+from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, choice_notes, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma
-from pellicle.signals.limits import check_psi_delta, refuse_first
+from pellicle.signals.limits import check_psi_delta
 
-_REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "psi_ane", "delta_ane", "psi_aps", "delta_aps"]`'
 
 
@@ -43,10 +41,7 @@ def generalised_columns(
 ) -> GeneralisedColumns:
     """Choose the columns of the ratios, all or those named. Raises DataError or UsageError."""
     if columns is None:
-        raise UsageError(
-            f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
-            f"{_EXAMPLE}"
-        )
+        raise without_header(table, _EXAMPLE)
     if ratios is not None:
         Generalised(tuple(ratios))
     pairs: dict[str, tuple[Column, Column]] = {}
@@ -76,38 +71,14 @@ def generalised_columns(
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
                 "delta in degrees"
             )
-    axis, errors = axis_columns(table, columns, _EXAMPLE), _error_columns(table, columns, values)
-    read = [*values, *errors, *(column for column in axis if column)]
-    ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
-    notes = [
-        f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as generalised psi and delta",
-        *([f"{listed(errors)} read as their standard deviations"] if errors else []),
-        *axis.notes,
-        *([f"ignored: {listed(ignored)}"] if ignored else []),
-    ]
-    return GeneralisedColumns(axis, chosen, values, errors, tuple(notes))
+    axis, errors = axis_columns(table, columns, _EXAMPLE), error_columns(table, columns, values, "columns")
+    notes = [f"{listed(errors)} read as their standard deviations"] if errors else []
+    notes = choice_notes(columns, axis, values, "generalised psi and delta", errors, notes)
+    return GeneralisedColumns(axis, chosen, values, errors, notes)
 
 
-def _error_columns(table: Table, columns: Sequence[Column], values: Sequence[Column]) -> tuple[Column, ...]:
-    """A standard deviation of each value, one `sigma` for every Ψ, or none."""
-    own = [only(table, columns, f"sigma_{column.role}") for column in values]
-    stated = tuple(column for column in own if column is not None)
-    if stated and len(stated) < len(values):
-        raise DataError(
-            f"{table.path}: gives standard deviations of some of the columns only ({listed(stated)}); add the"
-            " others, or skip these with _ in `columns`"
-        )
-    one = only(table, columns, "sigma")
-    return stated or ((one,) if one else ())
-
-
-def _sigmas(
-    table: Table, chosen: GeneralisedColumns, errors: list[np.ndarray], rows: np.ndarray, psi: np.ndarray
-) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _sigmas(errors: Sequence[np.ndarray], psi: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
     """σ of Ψ and of Δ (rows, ratios) from the columns of `errors`; None without any."""
-    for column, error in zip(chosen.errors, errors, strict=True):
-        reason = f"is a standard deviation not above zero; {_REMEDY}"
-        refuse_first(error, error <= 0, table.places(column.position, rows), reason)
     if len(errors) > 1:
         of_psi, of_delta = (np.stack(errors[i::2], axis=1) for i in (0, 1))
         return of_psi, of_delta
@@ -129,37 +100,19 @@ def read_generalised(
     One σ for all, of a column or the `noise`, is that of Ψ, and Δ has that of `generalised.delta_sigma`.
     Raises DataError or UsageError.
     """
-    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
-    axis, read = read_axis(table, chosen.axis, (*chosen.values, *chosen.errors), unit)
-    notes, rows = [*table.notes, *chosen.notes, axis_note(unit)], np.arange(len(axis.wavelength))
-    if range is not None:
-        inside, note = inside_range(axis.wavelength, range, table.path)
-        rows, notes = rows[inside], [*notes, note]
-    axis, columns = axis.taken(rows), [own[rows] for own in read]
-    count = len(chosen.values)
-    psi, delta = (np.stack(columns[i:count:2], axis=1) for i in (0, 1))
+    cells = (*chosen.values, *chosen.errors)
+    rows = Rows.read(table, chosen.axis, cells, wavelength_unit, chosen.notes).cut(range)
+    count, notes = len(chosen.values), []
+    psi, delta = (np.stack(rows.columns[i:count:2], axis=1) for i in (0, 1))
     for i, name in enumerate(chosen.ratios):
-        at_psi, at_delta = (table.places(c.position, rows) for c in chosen.values[2 * i : 2 * i + 2])
-        check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{_REMEDY} ({name})")
+        at_psi, at_delta = (rows.places(column) for column in chosen.values[2 * i : 2 * i + 2])
+        check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{REMEDY} ({name})")
     if noise is None:
-        psi_sigma, delta_error = _sigmas(table, chosen, columns[count:], rows, psi)
+        rows.check_errors(chosen.errors, rows.columns[count:])
+        psi_sigma, delta_error = _sigmas(rows.columns[count:], psi)
     else:
         psi_sigma = np.full(psi.shape, float(noise))
         delta_error = delta_sigma(psi, psi_sigma)
         notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    return of_rows(
-        sweep_numbers(axis.wavelength, axis.setting),
-        {
-            **axis._asdict(),
-            "values": psi,
-            "sigma": psi_sigma,
-            "delta": delta % 360.0,
-            "delta_sigma": delta_error,
-            "lines": table.source_lines(rows),
-        },
-        signal=Generalised.word,
-        ratios=chosen.ratios,
-        path=table.path,
-        sha256=table.sha256,
-        notes=tuple(notes),
-    )
+    arrays = {"values": psi, "sigma": psi_sigma, "delta": delta % 360.0, "delta_sigma": delta_error}
+    return rows.spectrum(notes, arrays, signal=Generalised.word, ratios=chosen.ratios)

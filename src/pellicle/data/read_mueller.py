@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.spectrum import Spectrum, inside_range
-from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_axis
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum_rows import REMEDY, Rows, error_columns, without_header
 from pellicle.data.tabular.column_names import MUELLER
-from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, only
+from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, choice_notes, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 from pellicle.signals.mueller import ELEMENTS, HIGHEST, Mueller, check_element, sign_notes
 
-_REMEDY = "correct or delete that row"
 _EXAMPLE = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
 _NORMALISED = 1e-3
 """Deviation of m11 from 1 by rounding."""
@@ -50,10 +48,7 @@ def mueller_columns(
 ) -> MuellerColumns:
     """Choose the columns of elements, all or those named. Raises DataError or UsageError."""
     if columns is None:
-        raise UsageError(
-            f"{table.path}: has {table.layout.width} columns and no header; name them in order, as in "
-            f"{_EXAMPLE}"
-        )
+        raise without_header(table, _EXAMPLE)
     present = {role: only(table, columns, role) for role in MUELLER}
     if elements is not None:
         Mueller(tuple(elements))
@@ -74,34 +69,12 @@ def mueller_columns(
                 f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
             )
     axis = axis_columns(table, columns, _EXAMPLE)
-    errors, notes = _error_columns(table, columns, values)
-    m11 = present["m11"]
-    read = [*values, *errors, *(column for column in (*axis, m11) if column)]
-    ignored = [c for c in columns if c not in read and c.name not in ("_", "")]
-    said = [
-        f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as Mueller elements",
-        *notes,
-    ]
-    said += axis.notes
-    said += [f"ignored: {listed(ignored)}"] if ignored else []
-    return MuellerColumns(axis, values, m11, errors, tuple(said))
-
-
-def _error_columns(
-    table: Table, columns: Sequence[Column], values: Sequence[Column]
-) -> tuple[tuple[Column, ...], list[str]]:
-    """A standard deviation of each element, one `sigma` for all, or none, with a sentence."""
-    own = [only(table, columns, f"sigma_{column.role}") for column in values]
-    stated = tuple(column for column in own if column is not None)
-    if stated and len(stated) < len(values):
-        raise DataError(
-            f"{table.path}: gives standard deviations of some of the elements only ({listed(stated)}); add"
-            " the others, or skip these with _ in `columns`"
-        )
-    if stated:
-        return stated, [f"{listed(stated)} read as their standard deviations"]
-    both = only(table, columns, "sigma")
-    return ((both,), [f"{listed([both])} read as the standard deviation of each"]) if both else ((), [])
+    errors, m11 = error_columns(table, columns, values, "elements"), present["m11"]
+    one = any(column.role == "sigma" for column in errors)
+    meaning = "the standard deviation of each" if one else "their standard deviations"
+    notes = [f"{listed(errors)} read as {meaning}"] if errors else []
+    notes = choice_notes(columns, axis, values, "Mueller elements", [*errors, m11], notes)
+    return MuellerColumns(axis, values, m11, errors, notes)
 
 
 def read_mueller(
@@ -112,59 +85,37 @@ def read_mueller(
     range: tuple[float, float] | None,
 ) -> Spectrum:
     """Read the chosen elements; other arguments as in `read_spectrum`. Raises DataError or UsageError."""
-    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
     cells = (*chosen.values, *chosen.errors, *([chosen.m11] if chosen.m11 else []))
-    axis, read = read_axis(table, chosen.axis, cells, unit)
-    count = len(chosen.values)
-    values, errors = np.stack(read[:count], axis=1), read[count : count + len(chosen.errors)]
+    rows = Rows.read(table, chosen.axis, cells, wavelength_unit, chosen.notes).cut(range)
+    count, notes = len(chosen.values), []
+    values, errors = np.stack(rows.columns[:count], axis=1), rows.columns[count : count + len(chosen.errors)]
     sigma = np.broadcast_to(np.stack(errors, axis=1), values.shape) if errors else None
-    notes = [*table.notes, *chosen.notes, axis_note(unit)]
     if noise is not None:
         sigma = np.full(values.shape, float(noise))
         notes += ["the given noise replaces the columns of errors"] if errors else []
-    rows = np.arange(len(values))
-    if range is not None:
-        inside, note = inside_range(axis.wavelength, range, table.path)
-        rows, notes = rows[inside], [*notes, note]
-    values, sigma = values[rows], None if sigma is None else sigma[rows]
+    else:
+        rows.check_errors(chosen.errors, errors)
     if chosen.m11 is not None:
-        values, sigma, note = _normalised(table, chosen.m11, rows, read[-1][rows], values, sigma)
+        values, sigma, note = _normalised(rows, chosen.m11, values, sigma)
         notes += [note] if note else []
     elements = chosen.elements
-    if sigma is not None:
-        for i, column in enumerate(chosen.errors if noise is None else ()):
-            reason = f"is a standard deviation not above zero; {_REMEDY}"
-            refuse_first(sigma[:, i], sigma[:, i] <= 0, table.places(column.position, rows), reason)
     for i, column in enumerate(chosen.values):
-        where = table.places(column.position, rows)
-        check_element(values[:, i], None if sigma is None else sigma[:, i], elements[i], where, _REMEDY)
+        error = None if sigma is None else sigma[:, i]
+        check_element(values[:, i], error, elements[i], rows.places(column), REMEDY)
     values, sigma, elements, note = _without_constants(table, values, sigma, elements)
     notes += [*note, *sign_notes(elements, values)]
-    axis = axis.taken(rows)
-    return of_rows(
-        sweep_numbers(axis.wavelength, axis.setting),
-        {**axis._asdict(), "values": values, "sigma": sigma, "lines": table.source_lines(rows)},
-        signal=Mueller.word,
-        elements=elements,
-        path=table.path,
-        sha256=table.sha256,
-        notes=tuple(notes),
-    )
+    return rows.spectrum(notes, {"values": values, "sigma": sigma}, signal=Mueller.word, elements=elements)
 
 
 def _normalised(
-    table: Table,
-    column: Column,
-    rows: np.ndarray,
-    m11: np.ndarray,
-    values: np.ndarray,
-    sigma: np.ndarray | None,
+    rows: Rows, column: Column, values: np.ndarray, sigma: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Elements and σ over m11, with a sentence; as they are where m11 is 1, or an intensity beside them."""
+    """Elements and σ over m11, the last column of the rows, with a sentence; as they are where m11 is 1, or
+    an intensity beside them."""
+    m11 = rows.columns[-1]
     if np.all(np.abs(m11 - 1) < _NORMALISED):
         return values, sigma, ""
-    reason = f"is no m11, which is above zero; {_REMEDY}"
-    refuse_first(m11, m11 <= 0, table.places(column.position, rows), reason)
+    refuse_first(m11, m11 <= 0, rows.places(column), f"is no m11, which is above zero; {REMEDY}")
     divided = values / m11[:, None]
     if np.max(np.abs(values)) <= HIGHEST and np.max(np.abs(divided)) > HIGHEST:
         return values, sigma, "m11 is an intensity beside normalised elements: ignored"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
-from pellicle.data.spectrum import Spectrum, inside_range
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum_rows import Rows
 from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns, signal_scale
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
@@ -35,48 +35,42 @@ def read_power(
     scale = signal_scale(table, columns, signal_unit)
     axis, values, sigma = read_columns(table, columns, unit)
     values, sigma = scale.fractions(values, sigma)
-    notes = [*table.notes, *columns.notes, axis_note(unit), scale.note(kind, calibrated)]
+    notes = [axis_note(unit), scale.note(kind, calibrated)]
     if noise is not None:
         notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
         sigma = np.full(values.shape, float(noise))
-    lines, rows = table.lines, None
-    if range is not None:
-        inside, note = inside_range(axis.wavelength, range, table.path)
-        rows, notes = np.flatnonzero(inside), [*notes, note]
-        axis, values = axis.taken(rows), values[rows]
-        sigma, lines = (None if array is None else array[rows] for array in (sigma, lines))
-    _check(table, columns, kind, rows, values, sigma, calibrated, scale.stated)
-    return of_rows(
-        sweep_numbers(axis.wavelength, axis.setting),
-        {**axis._asdict(), "values": values, "sigma": sigma, "lines": lines},
+    read = (values,) if sigma is None else (values, sigma)
+    rows = Rows(table, np.arange(values.size), axis, read, (*table.notes, *columns.notes, *notes)).cut(range)
+    values, sigma = rows.columns[0], rows.columns[1] if len(rows.columns) > 1 else None
+    _check(rows, columns, kind, values, sigma, calibrated, scale.stated)
+    return rows.spectrum(
+        (),
+        {"values": values, "sigma": sigma},
         signal=kind,
         polarisation=columns.signal.polarisation or polarisation or "unpolarised",
         calibrated=calibrated,
-        path=table.path,
-        sha256=table.sha256,
-        notes=tuple(notes),
     )
 
 
 def _check(
-    table: Table,
+    rows: Rows,
     columns: SpectrumColumns,
     signal: str,
-    rows: np.ndarray | None,
     values: np.ndarray,
     sigma: np.ndarray | None,
     calibrated: bool,
     unit_stated: bool,
 ) -> None:
     """Check σ and the values of these rows, naming line and column. Raises DataError."""
+    table = rows.table
     if sigma is not None and columns.sigma is not None:
         if not columns.sigma.name and np.median(sigma) > np.abs(values).max():
             raise DataError(
                 f"{table.path}: has no header, and its third column, by custom the standard deviation, is "
                 "larger than the signal; name the columns, or give n and k as `layer` or `substrate`"
             )
-        at = table.places(columns.sigma.position, rows)
-        refuse_first(sigma, sigma <= 0, at, "is not above zero; correct or delete that row")
+        where = rows.places(columns.sigma)
+        refuse_first(sigma, sigma <= 0, where, "is not above zero; correct or delete that row")
     position = columns.signal.position
     if not calibrated:
         if values.max() <= 0:
@@ -87,7 +81,7 @@ def _check(
         'if the file is in percent or an absorbance, say so with `signal_unit="percent"` or '
         '`signal_unit="absorbance"`, or in its header'
     )
-    where = table.places(position, rows)
+    where = rows.places(columns.signal)
     kind = KINDS[signal]()
     assert isinstance(kind, OneColumn)
     kind.check_values(values, sigma, where, remedy if unit_stated else too_high, remedy)

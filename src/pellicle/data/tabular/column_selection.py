@@ -49,6 +49,28 @@ class AxisColumns(NamedTuple):
         return sentences
 
 
+def choice_notes(
+    columns: Sequence[Column],
+    axis: AxisColumns,
+    values: Sequence[Column],
+    meaning: str,
+    others: Sequence[Column | None] = (),
+    notes: Sequence[str] = (),
+) -> tuple[str, ...]:
+    """Sentences on the columns of the axis and of the `values`, `notes`, and on columns that are ignored.
+
+    `others` are columns that are read, too.
+    """
+    read = {column.position for column in (*axis, *values, *others) if column}
+    ignored = [c for c in columns if c.position not in read and c.name not in ("_", "")]
+    return (
+        f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as {meaning}",
+        *notes,
+        *axis.notes,
+        *([f"ignored: {listed(ignored)}"] if ignored else []),
+    )
+
+
 @dataclass(frozen=True)
 class SpectrumColumns:
     """Columns to read, and sentences on the choice.
@@ -151,15 +173,9 @@ def _by_position(table: Table, role: str) -> SpectrumColumns:
 def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> SpectrumColumns:
     axis = axis_columns(table, columns, '`columns=["wavelength", "R"]`')
     sigma = only(table, columns, "sigma")
-    used = {c.position for c in (*axis, signal, sigma) if c}
-    ignored = [c for c in columns if c.position not in used and c.name not in ("_", "")]
-    notes = [f"{listed([axis.wavelength])} read as the wavelength, {listed([signal])} as the signal"]
-    if sigma:
-        notes.append(f"{listed([sigma])} read as the standard deviation of the signal")
-    notes += axis.notes
-    if ignored:
-        notes.append(f"ignored: {listed(ignored)}")
-    return SpectrumColumns(axis, signal, sigma, tuple(notes))
+    notes = [f"{listed([sigma])} read as the standard deviation of the signal"] if sigma else []
+    notes = choice_notes(columns, axis, [signal], "the signal", [sigma], notes)
+    return SpectrumColumns(axis, signal, sigma, notes)
 
 
 def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> SpectrumColumns:
