@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pellicle.data.read_ellipsometry import (
-    SIGNAL,
-    EllipsometryColumns,
-    ellipsometry_columns,
-    has_ellipsometry,
-)
-from pellicle.data.read_generalised import GeneralisedColumns, generalised_columns, has_generalised
-from pellicle.data.read_mueller import MuellerColumns, has_mueller, mueller_columns
+from pellicle.data.ellipsometry_angles import FORMS, PSI_DELTA
+from pellicle.data.read_ellipsometry import SIGNAL, EllipsometryColumns, ellipsometry_columns
+from pellicle.data.read_generalised import GeneralisedColumns, generalised_columns
+from pellicle.data.read_mueller import MuellerColumns, mueller_columns
+from pellicle.data.spectrum_rows import Reading
+from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.data.tabular.column_selection import SpectrumColumns, named_columns, signal_columns
 from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import Generalised
-from pellicle.signals.mueller import Mueller
+from pellicle.signals.mueller import ELEMENTS, Mueller
 
 ALL = "all"
 _MOST_LISTED = 40
@@ -41,35 +39,26 @@ class Candidate(NamedTuple):
     polarisation: str | None
 
 
-def candidates(
-    table: Table,
-    columns: str | Sequence[str] | None,
-    signal: str | None,
-    polarisation: str | None,
-    elements: Sequence[str] | None = None,
-) -> list[Candidate]:
-    """Find the spectra of a table; arguments as in `read_spectrum`.
-
-    Raises UsageError or DataError where there is none.
-    """
-    named = named_columns(table, columns)
+def _candidates(table: Table, asked: Reading) -> list[Candidate]:
+    """The spectra of a table. Raises UsageError or DataError where there is none."""
+    named = named_columns(table, asked.columns)
     if {column.role for column in named or ()}.issuperset(DIRECTIONS):
         raise UsageError(
             f"{table.path}: holds samples of a BRDF, not a spectrum; fit them with a `recipe` of the surface "
             "(Python: pl.read_brdf_samples)"
         )
     own, spectra = table.layout.name, []
-    word, wanted = _ellipsometric(named, signal, elements)
+    word, wanted = _ellipsometric(named, asked)
     if word is not None:
         if word == SIGNAL:
             chosen = ellipsometry_columns(table, named)
         else:
             select = generalised_columns if word == Generalised.word else mueller_columns
-            chosen = select(table, named, elements)
+            chosen = select(table, named, asked.elements)
         spectra.append(Candidate(table, chosen, own or word, word, None))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
             return spectra
-    powers = signal_columns(table, columns, signal, polarisation)
+    powers = signal_columns(table, asked.columns, asked.signal, asked.polarisation)
     for power in powers:
         column = power.signal
         alone = len(powers) + len(spectra) == 1
@@ -78,45 +67,39 @@ def candidates(
     return spectra
 
 
-def _ellipsometric(
-    named: Sequence[Column] | None, signal: str | None, elements: Sequence[str] | None
-) -> tuple[str | None, bool]:
+def _ellipsometric(named: Sequence[Column] | None, asked: Reading) -> tuple[str | None, bool]:
     """The signal of ellipsometry that a table has, None without one, and whether it was asked for."""
-    words = (Generalised.word, Mueller.word, SIGNAL)
-    if signal is not None:
-        return (signal, True) if signal in words else (None, False)
-    if elements is not None:
-        ratios = not set(elements).isdisjoint(Generalised().parts)
+    if asked.signal is not None:
+        return (asked.signal, True) if asked.signal in _ELLIPSOMETRY else (None, False)
+    if asked.elements is not None:
+        ratios = not set(asked.elements).isdisjoint(Generalised().parts)
         return (Generalised.word if ratios else Mueller.word), True
+    roles = {column.role for column in named or ()}
     # psi and delta go before what only anisotropic samples need
-    present = ((SIGNAL, has_ellipsometry), (Generalised.word, has_generalised), (Mueller.word, has_mueller))
-    return next((word for word, has in present if has(named)), None), False
+    if roles & set(PSI_DELTA) or any(roles.issuperset(form) for form in FORMS):
+        return SIGNAL, False
+    present = ((Generalised.word, RATIO_COLUMNS), (Mueller.word, ELEMENTS))
+    return next((word for word, known in present if roles & set(known)), None), False
 
 
-def file_candidates(
-    tables: Sequence[Table],
-    columns: str | Sequence[str] | None,
-    signal: str | None,
-    polarisation: str | None,
-    elements: Sequence[str] | None = None,
-) -> list[Candidate]:
+def file_candidates(tables: Sequence[Table], asked: Reading) -> list[Candidate]:
     """Find the spectra of all tables of a file that have the wanted signal and polarisation; of Ψ and Δ and
     a Mueller matrix or generalised Ψ and Δ beside them Ψ and Δ, where none is wanted.
 
-    Raises as `candidates` does where no table has them.
+    Raises UsageError or DataError where no table has them.
     """
     spectra: list[Candidate] = []
     refusals: list[DataError | UsageError] = []
     for table in tables:
         try:
-            spectra += candidates(table, columns, signal, polarisation, elements)
+            spectra += _candidates(table, asked)
         except (DataError, UsageError) as refusal:
-            if len(tables) == 1 or (signal is None and polarisation is None and elements is None):
+            if len(tables) == 1 or asked.signal is asked.polarisation is asked.elements is None:
                 raise
             refusals.append(refusal)
     if not spectra:
         raise refusals[0]
-    if signal is None and elements is None and any(one.signal == SIGNAL for one in spectra):
+    if asked.signal is None and asked.elements is None and any(one.signal == SIGNAL for one in spectra):
         return [one for one in spectra if one.signal not in _OF_ANISOTROPIC]
     return spectra
 

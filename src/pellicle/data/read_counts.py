@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from pellicle.data.formats.detect import read_tables
-from pellicle.data.repeated_sweeps import of_rows, sweep_numbers
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns
+from pellicle.data.spectrum_rows import read_signal
 from pellicle.data.tabular.column_selection import (
     COUNTS,
     SpectrumColumns,
@@ -76,17 +75,8 @@ def _only_table(path: str | os.PathLike[str]) -> Table:
 
 
 def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) -> Spectrum:
-    unit = axis_unit(table, chosen.axis.wavelength, wavelength_unit)
-    axis, values, _ = read_columns(table, chosen, unit)
-    counts = of_rows(
-        sweep_numbers(axis.wavelength, axis.setting),
-        {**axis._asdict(), "values": values, "lines": table.lines},
-        signal="counts",
-        calibrated=False,
-        path=table.path,
-        sha256=table.sha256,
-        notes=(*table.notes, *chosen.notes, axis_note(unit)),
-    )
+    rows = read_signal(table, chosen, wavelength_unit)
+    counts = rows.spectrum((), {"values": rows.columns[0]}, signal="counts", calibrated=False)
     return replace(counts, declared=table.layout.declared.facts)
 
 

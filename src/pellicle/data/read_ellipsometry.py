@@ -27,7 +27,7 @@ from pellicle.data.ellipsometry_angles import (
 )
 from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import REMEDY, Rows, without_header
+from pellicle.data.spectrum_rows import REMEDY, Reading, Rows, SeveralColumns, error_columns, without_header
 from pellicle.data.tabular.axis_and_signal import Axis
 from pellicle.data.tabular.column_selection import (
     AxisColumns,
@@ -46,62 +46,43 @@ SIGNAL = "psi-delta"
 _METAL_N, _METAL_K = 13, 80
 """Largest n and k of common metals up to 12 µm (gold), in tables that look like psi and delta."""
 _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
+_SOME = "the standard deviation of only one of psi and delta; add the other, or skip it"
 
 
 @dataclass(frozen=True)
-class EllipsometryColumns:
-    """Columns of one form, with the errors of Ψ and Δ or none, the depolarisation (and its error) or none,
-    and sentences on the choice."""
+class EllipsometryColumns(SeveralColumns):
+    """Columns of one form, with the errors of Ψ and Δ or none, and the depolarisation (and its error) or
+    none."""
 
-    axis: AxisColumns
-    form: tuple[str, ...]
-    values: tuple[Column, ...]
-    analyser: Column | None
-    errors: tuple[Column, ...]
-    depolarisation: tuple[Column, ...]
-    notes: tuple[str, ...]
+    form: tuple[str, ...] = PSI_DELTA
+    analyser: Column | None = None
+    depolarisation: tuple[Column, ...] = ()
 
 
-def has_ellipsometry(columns: Sequence[Column] | None) -> bool:
-    """Return True if Ψ and Δ are among the columns, in any form."""
-    roles = {column.role for column in columns or ()}
-    return bool(roles & set(PSI_DELTA)) or any(roles.issuperset(form) for form in FORMS)
-
-
-def read_ellipsometry(
-    table: Table,
-    chosen: EllipsometryColumns,
-    wavelength_unit: str | None,
-    noise: float | None,
-    range: tuple[float, float] | None,
-    folded: bool | None = None,
-    analyser: float | None = None,
-) -> Spectrum:
-    """Read Ψ and Δ of the chosen columns, Δ in 0 to 360; other arguments as in `read_spectrum`.
-
-    Raises DataError or UsageError.
-    """
-    _check_form(table, chosen, folded, analyser)
+def read_ellipsometry(table: Table, chosen: EllipsometryColumns, asked: Reading) -> Spectrum:
+    """Read Ψ and Δ of the chosen columns, Δ in 0 to 360. Raises DataError or UsageError."""
+    facts, folded = dict(table.layout.declared.facts), asked.folded
+    if folded is None and facts.get("delta", "").startswith("folded"):
+        folded = True
+    _check_form(table, chosen, folded, asked.analyser)
     cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []))
     every = (*cells, *chosen.errors, *chosen.depolarisation)
-    rows = Rows.read(table, chosen.axis, every, wavelength_unit, chosen.notes)
-    psi, delta, note, share = _psi_delta(table, chosen, rows.columns, analyser)
+    rows = Rows.read(table, chosen, every, asked.wavelength_unit)
+    psi, delta, note, share = _psi_delta(table, chosen, rows.columns, asked.analyser)
     errors = rows.columns[len(cells) : len(cells) + len(chosen.errors)]
     pairs = zip(chosen.depolarisation, rows.columns[len(cells) + len(errors) :], strict=True)
     shares = [x / 100.0 if column.unit == "percent" else x for column, x in pairs]
     if not shares and share is not None:
         shares = [share]
     notes = [note] if note else []
-    if noise is not None:
-        errors = (np.full(psi.size, float(noise)),) * 2
+    if asked.noise is not None:
+        errors = (np.full(psi.size, float(asked.noise)),) * 2
         notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    if chosen.form in FOLDED_FORMS:
-        folded = True
-    elif chosen.form == NCS:
-        folded = False
+    if chosen.form in (*FOLDED_FORMS, NCS):
+        folded = chosen.form != NCS
     notes.append("psi and delta in degrees")
     folding = _folding(rows.axis, psi, delta) if folded is None else None
-    rows = replace(rows, columns=(psi, delta, *errors, *shares)).cut(range)
+    rows = replace(rows, columns=(psi, delta, *errors, *shares)).cut(asked.range)
     psi, delta, *rest = rows.columns
     sigma, shares = rest[: len(errors)], rest[len(errors) :]
     _check(rows, chosen, psi, delta, sigma, bool(folded))
@@ -116,7 +97,13 @@ def read_ellipsometry(
     arrays = {"values": psi, "delta": np.clip(delta, *FOLDED_DELTA) if folded else delta % 360.0}
     arrays |= {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
     arrays |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
-    return rows.spectrum(notes, arrays, signal=SIGNAL, folded=folded)
+    spectrum = rows.spectrum(notes, arrays, signal=SIGNAL, folded=folded)
+    transmitted = facts.get("light", "").startswith("transmitted")
+    if transmitted if asked.transmission is None else asked.transmission:
+        sweeps = tuple(replace(sweep, transmission=True) for sweep in spectrum.sweeps)
+        notes = (*spectrum.notes, "of transmitted light: conj(t_p/t_s)")
+        spectrum = replace(spectrum, transmission=True, notes=notes, sweeps=sweeps)
+    return spectrum
 
 
 def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
@@ -190,7 +177,7 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
             )
     axis = axis_columns(table, columns, _EXAMPLE)
-    errors = _error_columns(table, columns) if form == PSI_DELTA else ()
+    errors = error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
     analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
     shares = _depolarisation_columns(table, columns)
     notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
@@ -199,7 +186,7 @@ def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Elli
         for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False)
     ]
     notes = choice_notes(columns, axis, values, ", ".join(form), [*errors, *shares, analyser], notes)
-    return EllipsometryColumns(axis, form, values, analyser, errors, shares, notes)
+    return EllipsometryColumns(axis, values, errors, notes, form, analyser, shares)
 
 
 def _by_position(table: Table) -> EllipsometryColumns:
@@ -208,21 +195,7 @@ def _by_position(table: Table) -> EllipsometryColumns:
     axis = AxisColumns(first_column(table))
     psi, delta = (Column(i, "", role) for i, role in ((1, "psi"), (2, "delta")))
     note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
-    return EllipsometryColumns(axis, PSI_DELTA, (psi, delta), None, (), (), (note,))
-
-
-def _error_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:
-    """The errors of Ψ and Δ, or one `sigma` for both; either both or none."""
-    psi, delta = only(table, columns, "sigma_psi"), only(table, columns, "sigma_delta")
-    if psi and delta:
-        return psi, delta
-    if psi or delta:
-        raise DataError(
-            f"{table.path}: gives the standard deviation of only one of psi and delta; add the other, or "
-            "skip it with _ in `columns`"
-        )
-    both = only(table, columns, "sigma")
-    return (both,) if both else ()
+    return EllipsometryColumns(axis, (psi, delta), (), (note,))
 
 
 def _depolarisation_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:

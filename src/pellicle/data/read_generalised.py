@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import REMEDY, Rows, error_columns, without_header
-from pellicle.data.tabular.column_names import RATIO_COLUMNS
-from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, choice_notes, only
+from pellicle.data.spectrum_rows import REMEDY, Reading, Rows, SeveralColumns, error_columns, without_header
+from pellicle.data.tabular.column_selection import axis_columns, choice_notes, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -18,22 +17,15 @@ from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma
 from pellicle.signals.limits import check_psi_delta
 
 _EXAMPLE = '`columns=["wavelength", "angle", "psi_ane", "delta_ane", "psi_aps", "delta_aps"]`'
+_SOME = "standard deviations of some of the columns only ({}); add the others, or skip these"
 
 
 @dataclass(frozen=True)
-class GeneralisedColumns:
-    """Columns of Ψ and Δ of each ratio, of their standard deviations or none, and sentences on the choice."""
+class GeneralisedColumns(SeveralColumns):
+    """Columns of Ψ and Δ of the first ratio, then of the next; standard deviations are one for each of these,
+    one for every Ψ, or none."""
 
-    axis: AxisColumns
     ratios: tuple[str, ...]
-    values: tuple[Column, ...]  # Ψ and Δ of the first ratio, then of the next
-    errors: tuple[Column, ...]
-    notes: tuple[str, ...]
-
-
-def has_generalised(columns: Sequence[Column] | None) -> bool:
-    """Return True if Ψ or Δ of one of the ratios is among the columns."""
-    return any(column.role in RATIO_COLUMNS for column in columns or ())
 
 
 def generalised_columns(
@@ -71,48 +63,36 @@ def generalised_columns(
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
                 "delta in degrees"
             )
-    axis, errors = axis_columns(table, columns, _EXAMPLE), error_columns(table, columns, values, "columns")
+    axis, errors = axis_columns(table, columns, _EXAMPLE), error_columns(table, columns, values, _SOME)
     notes = [f"{listed(errors)} read as their standard deviations"] if errors else []
     notes = choice_notes(columns, axis, values, "generalised psi and delta", errors, notes)
-    return GeneralisedColumns(axis, chosen, values, errors, notes)
+    return GeneralisedColumns(axis, values, errors, notes, chosen)
 
 
-def _sigmas(errors: Sequence[np.ndarray], psi: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """σ of Ψ and of Δ (rows, ratios) from the columns of `errors`; None without any."""
-    if len(errors) > 1:
-        of_psi, of_delta = (np.stack(errors[i::2], axis=1) for i in (0, 1))
-        return of_psi, of_delta
-    if not errors:
-        return None, None
-    of_psi = np.broadcast_to(errors[0][:, None], psi.shape)
-    return of_psi, delta_sigma(psi, of_psi)
+def read_generalised(table: Table, chosen: GeneralisedColumns, asked: Reading) -> Spectrum:
+    """Read Ψ and Δ of the chosen ratios.
 
-
-def read_generalised(
-    table: Table,
-    chosen: GeneralisedColumns,
-    wavelength_unit: str | None,
-    noise: float | None,
-    range: tuple[float, float] | None,
-) -> Spectrum:
-    """Read Ψ and Δ of the chosen ratios; other arguments as in `read_spectrum`.
-
-    One σ for all, of a column or the `noise`, is that of Ψ, and Δ has that of `generalised.delta_sigma`.
+    One σ for all, of a column or the noise, is that of Ψ, and Δ has that of `generalised.delta_sigma`.
     Raises DataError or UsageError.
     """
     cells = (*chosen.values, *chosen.errors)
-    rows = Rows.read(table, chosen.axis, cells, wavelength_unit, chosen.notes).cut(range)
+    rows = Rows.read(table, chosen, cells, asked.wavelength_unit).cut(asked.range)
     count, notes = len(chosen.values), []
     psi, delta = (np.stack(rows.columns[i:count:2], axis=1) for i in (0, 1))
     for i, name in enumerate(chosen.ratios):
         at_psi, at_delta = (rows.places(column) for column in chosen.values[2 * i : 2 * i + 2])
         check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{REMEDY} ({name})")
-    if noise is None:
-        rows.check_errors(chosen.errors, rows.columns[count:])
-        psi_sigma, delta_error = _sigmas(rows.columns[count:], psi)
+    errors = rows.columns[count:]
+    if asked.noise is None:
+        rows.check_errors(chosen.errors, errors)
     else:
-        psi_sigma = np.full(psi.shape, float(noise))
-        delta_error = delta_sigma(psi, psi_sigma)
-        notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    arrays = {"values": psi, "sigma": psi_sigma, "delta": delta % 360.0, "delta_sigma": delta_error}
+        notes += ["the given noise replaces the columns of errors"] if errors else []
+        errors = (np.full(len(psi), float(asked.noise)),)
+    of_psi = of_delta = None
+    if len(errors) > 1:
+        of_psi, of_delta = (np.stack(errors[i::2], axis=1) for i in (0, 1))
+    elif errors:
+        of_psi = np.broadcast_to(errors[0][:, None], psi.shape)
+        of_delta = delta_sigma(psi, of_psi)
+    arrays = {"values": psi, "sigma": of_psi, "delta": delta % 360.0, "delta_sigma": of_delta}
     return rows.spectrum(notes, arrays, signal=Generalised.word, ratios=chosen.ratios)

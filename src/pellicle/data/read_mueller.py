@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import REMEDY, Rows, error_columns, without_header
+from pellicle.data.spectrum_rows import REMEDY, Reading, Rows, SeveralColumns, error_columns, without_header
 from pellicle.data.tabular.column_names import MUELLER
-from pellicle.data.tabular.column_selection import AxisColumns, axis_columns, choice_notes, only
+from pellicle.data.tabular.column_selection import axis_columns, choice_notes, only
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -18,29 +18,17 @@ from pellicle.signals.limits import refuse_first
 from pellicle.signals.mueller import ELEMENTS, HIGHEST, Mueller, check_element, sign_notes
 
 _EXAMPLE = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
+_SOME = "standard deviations of some of the elements only ({}); add the others, or skip these"
 _NORMALISED = 1e-3
 """Deviation of m11 from 1 by rounding."""
 
 
 @dataclass(frozen=True)
-class MuellerColumns:
-    """Columns of elements, of m11 (or None), and of standard deviations (one for each element, one for all,
-    or none), and sentences on the choice."""
+class MuellerColumns(SeveralColumns):
+    """Columns of elements, and of m11 (or None); standard deviations are one for each element, one for all,
+    or none."""
 
-    axis: AxisColumns
-    values: tuple[Column, ...]
     m11: Column | None
-    errors: tuple[Column, ...]
-    notes: tuple[str, ...]
-
-    @property
-    def elements(self) -> tuple[str, ...]:
-        return tuple(column.role for column in self.values)
-
-
-def has_mueller(columns: Sequence[Column] | None) -> bool:
-    """Return True if elements of a Mueller matrix are among the columns."""
-    return any(column.role in ELEMENTS for column in columns or ())
 
 
 def mueller_columns(
@@ -69,36 +57,30 @@ def mueller_columns(
                 f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
             )
     axis = axis_columns(table, columns, _EXAMPLE)
-    errors, m11 = error_columns(table, columns, values, "elements"), present["m11"]
+    errors, m11 = error_columns(table, columns, values, _SOME), present["m11"]
     one = any(column.role == "sigma" for column in errors)
     meaning = "the standard deviation of each" if one else "their standard deviations"
     notes = [f"{listed(errors)} read as {meaning}"] if errors else []
     notes = choice_notes(columns, axis, values, "Mueller elements", [*errors, m11], notes)
-    return MuellerColumns(axis, values, m11, errors, notes)
+    return MuellerColumns(axis, values, errors, notes, m11)
 
 
-def read_mueller(
-    table: Table,
-    chosen: MuellerColumns,
-    wavelength_unit: str | None,
-    noise: float | None,
-    range: tuple[float, float] | None,
-) -> Spectrum:
-    """Read the chosen elements; other arguments as in `read_spectrum`. Raises DataError or UsageError."""
+def read_mueller(table: Table, chosen: MuellerColumns, asked: Reading) -> Spectrum:
+    """Read the chosen elements. Raises DataError or UsageError."""
     cells = (*chosen.values, *chosen.errors, *([chosen.m11] if chosen.m11 else []))
-    rows = Rows.read(table, chosen.axis, cells, wavelength_unit, chosen.notes).cut(range)
+    rows = Rows.read(table, chosen, cells, asked.wavelength_unit).cut(asked.range)
     count, notes = len(chosen.values), []
     values, errors = np.stack(rows.columns[:count], axis=1), rows.columns[count : count + len(chosen.errors)]
     sigma = np.broadcast_to(np.stack(errors, axis=1), values.shape) if errors else None
-    if noise is not None:
-        sigma = np.full(values.shape, float(noise))
+    if asked.noise is not None:
+        sigma = np.full(values.shape, float(asked.noise))
         notes += ["the given noise replaces the columns of errors"] if errors else []
     else:
         rows.check_errors(chosen.errors, errors)
     if chosen.m11 is not None:
         values, sigma, note = _normalised(rows, chosen.m11, values, sigma)
         notes += [note] if note else []
-    elements = chosen.elements
+    elements = tuple(column.role for column in chosen.values)
     for i, column in enumerate(chosen.values):
         error = None if sigma is None else sigma[:, i]
         check_element(values[:, i], error, elements[i], rows.places(column), REMEDY)

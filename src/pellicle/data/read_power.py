@@ -2,54 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import Rows
-from pellicle.data.tabular.axis_and_signal import axis_note, axis_unit, read_columns, signal_scale
+from pellicle.data.spectrum_rows import Reading, Rows, read_signal
+from pellicle.data.tabular.axis_and_signal import axis_unit, signal_scale
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 from pellicle.signals.one_column import OneColumn
 from pellicle.signals.registry import KINDS
 
 
-def read_power(
-    table: Table,
-    columns: SpectrumColumns,
-    wavelength_unit: str | None,
-    signal_unit: str | None,
-    signal: str | None,
-    range: tuple[float, float] | None,
-    noise: float | None,
-    polarisation: str | None,
-    calibrated: bool,
-) -> Spectrum:
-    """Read a reflectance or transmittance, cut to `range` before its values are checked.
+def read_power(table: Table, columns: SpectrumColumns, asked: Reading) -> Spectrum:
+    """Read a reflectance or transmittance, cut to the range before its values are checked.
 
-    Arguments as in `read_spectrum`. Raises DataError or UsageError.
+    Raises DataError or UsageError.
     """
-    kind = signal or columns.signal.role
-    unit = axis_unit(table, columns.axis.wavelength, wavelength_unit)
-    scale = signal_scale(table, columns, signal_unit)
-    axis, values, sigma = read_columns(table, columns, unit)
-    values, sigma = scale.fractions(values, sigma)
-    notes = [axis_note(unit), scale.note(kind, calibrated)]
-    if noise is not None:
+    kind, calibrated = asked.signal or columns.signal.role, asked.calibrated
+    if calibrated is None:
+        calibrated = columns.signal.role != "intensity"
+    polarisation = _polarisation(table, columns, asked.polarisation)
+    axis_unit(table, columns.axis.wavelength, asked.wavelength_unit)  # asked for before that of the signal
+    scale = signal_scale(table, columns, asked.signal_unit)
+    rows = read_signal(table, columns, asked.wavelength_unit)
+    values, sigma = scale.fractions(rows.columns[0], rows.columns[1] if len(rows.columns) > 1 else None)
+    notes = [scale.note(kind, calibrated)]
+    if asked.noise is not None:
         notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
-        sigma = np.full(values.shape, float(noise))
+        sigma = np.full(values.shape, float(asked.noise))
     read = (values,) if sigma is None else (values, sigma)
-    rows = Rows(table, np.arange(values.size), axis, read, (*table.notes, *columns.notes, *notes)).cut(range)
+    rows = replace(rows, columns=read, notes=(*rows.notes, *notes)).cut(asked.range)
     values, sigma = rows.columns[0], rows.columns[1] if len(rows.columns) > 1 else None
     _check(rows, columns, kind, values, sigma, calibrated, scale.stated)
-    return rows.spectrum(
-        (),
-        {"values": values, "sigma": sigma},
-        signal=kind,
-        polarisation=columns.signal.polarisation or polarisation or "unpolarised",
-        calibrated=calibrated,
-    )
+    arrays = {"values": values, "sigma": sigma}
+    return rows.spectrum((), arrays, signal=kind, polarisation=polarisation, calibrated=calibrated)
+
+
+def _polarisation(table: Table, columns: SpectrumColumns, asked: str | None) -> str:
+    """The polarisation that column, file or caller state. Raises UsageError where they differ."""
+    declared, named = table.layout.declared.polarisation, columns.signal.polarisation
+    if declared is not None and not named and asked not in (None, declared):
+        raise UsageError(
+            f'{table.path}: declares {declared} light, which contradicts `polarisation="{asked}"`; leave '
+            "that out"
+        )
+    return named or declared or asked or "unpolarised"
 
 
 def _check(

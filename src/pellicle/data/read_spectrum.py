@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from logging import INFO, getLogger
 from typing import Any
 
@@ -12,19 +12,17 @@ import numpy as np
 
 from pellicle.data.file_spectra import ALL, Candidate, chosen, file_candidates
 from pellicle.data.formats.detect import read_tables
-from pellicle.data.options import SpectrumOptions
-from pellicle.data.read_ellipsometry import SIGNAL, read_ellipsometry
+from pellicle.data.read_ellipsometry import SIGNAL, EllipsometryColumns, read_ellipsometry
 from pellicle.data.read_generalised import GeneralisedColumns, read_generalised
 from pellicle.data.read_mueller import MuellerColumns, read_mueller
 from pellicle.data.read_power import read_power
-from pellicle.data.spectrum import POLARISATIONS, Spectrum
+from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum_rows import Reading
 from pellicle.data.tabular.column_selection import SpectrumColumns
 from pellicle.data.tabular.table import Table
 from pellicle.errors import UsageError
 from pellicle.signals.generalised import Generalised
-from pellicle.signals.limits import check_noise
 from pellicle.signals.mueller import Mueller
-from pellicle.signals.registry import SIMULATED
 
 log = getLogger(__name__)
 
@@ -77,7 +75,7 @@ def read_spectrum(
     **Raises:** DataError (unreadable or impossible data) or UsageError (an argument missing or wrong): one
     sentence with file, line and remedy.
     """
-    reading = _Reading(
+    reading = Reading(
         signal=signal,
         columns=columns,
         wavelength_unit=wavelength_unit,
@@ -94,9 +92,9 @@ def read_spectrum(
     )
     if spectrum == ALL:
         raise UsageError(f"{path}: one spectrum is wanted; read all of a file with pl.read_spectra")
-    candidates = reading.find(path)
+    candidates = _find(path, reading)
     [one] = candidates if len(candidates) == 1 else chosen(candidates, spectrum, together=False)
-    return reading.read(one, several=len(candidates) > 1)
+    return _read(one, reading, several=len(candidates) > 1)
 
 
 def read_spectra(
@@ -112,112 +110,50 @@ def read_spectra(
 
     **Raises:** as `read_spectrum`.
     """
-    options = _Reading(**reading)
-    candidates = options.find(path)
+    options = Reading(**reading)
+    candidates = _find(path, options)
     several = len(candidates) > 1
-    return [options.read(one, several) for one in chosen(candidates, spectrum, together=True)]
+    return [_read(one, options, several) for one in chosen(candidates, spectrum, together=True)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Reading(SpectrumOptions):
-    """Arguments of `read_spectrum`, and reading with them. Raises UsageError for an unknown word."""
-
-    noise: float | int | None = None
-    calibrated: bool | None = None
-
-    def __post_init__(self) -> None:
-        for name, known in (
-            ("signal", SIMULATED),
-            ("polarisation", POLARISATIONS),
-        ):
-            value = getattr(self, name)
-            if value is not None and value not in known:
-                raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {value!r}")
-        check_noise(self.noise)
-
-    def find(self, path: str | os.PathLike[str]) -> list[Candidate]:
-        """Find the spectra of a file that these arguments may mean."""
-        tables = read_tables(path, self.spot)
-        candidates = file_candidates(tables, self.columns, self.signal, self.polarisation, self.elements)
-        stated = ("folded", self.folded), ("analyser", self.analyser is not None)
-        asked = [name for name, given in (*stated, ("transmission", self.transmission)) if given]
-        if asked and all(one.signal != SIGNAL for one in candidates):
-            name = asked[0]
-            raise UsageError(f"{path}: `{name}` is for ellipsometry, and the file has none; leave it out")
-        kinds = {SIGNAL: "psi and delta are in degrees", Mueller.word: "Mueller elements have no unit"}
-        kinds[Generalised.word] = kinds[SIGNAL]
-        if all(one.signal in kinds for one in candidates):
-            if self.signal_unit is not None:
-                raise UsageError(f"{path}: {kinds[candidates[0].signal]}; leave `signal_unit` out")
-            if self.polarisation in ("s", "p"):
-                raise UsageError(f"{path}: ellipsometry compares p with s light; leave `polarisation` out")
-        return candidates
-
-    def read(self, one: Candidate, several: bool) -> Spectrum:
-        """Read one of them; `several` keeps its name."""
-        table = one.table
-        if isinstance(one.columns, SpectrumColumns):
-            calibrated = self.calibrated
-            if calibrated is None:
-                calibrated = one.columns.signal.role != "intensity"
-            spectrum = read_power(
-                table,
-                one.columns,
-                self.wavelength_unit,
-                self.signal_unit,
-                self.signal,
-                self.range,
-                self.noise,
-                _polarisation(table, one.columns, self.polarisation),
-                calibrated,
-            )
-        elif isinstance(one.columns, MuellerColumns):
-            spectrum = read_mueller(table, one.columns, self.wavelength_unit, self.noise, self.range)
-        elif isinstance(one.columns, GeneralisedColumns):
-            spectrum = read_generalised(table, one.columns, self.wavelength_unit, self.noise, self.range)
-        else:
-            spectrum = read_ellipsometry(
-                table,
-                one.columns,
-                self.wavelength_unit,
-                self.noise,
-                self.range,
-                _folded(table) if self.folded is None else self.folded,
-                self.analyser,
-            )
-            declared = dict(table.layout.declared.facts).get("light", "").startswith("transmitted")
-            if declared if self.transmission is None else self.transmission:
-                sweeps = tuple(replace(sweep, transmission=True) for sweep in spectrum.sweeps)
-                notes = (*spectrum.notes, "of transmitted light: conj(t_p/t_s)")
-                spectrum = replace(spectrum, transmission=True, notes=notes, sweeps=sweeps)
-        angle = table.layout.declared.angle
-        if angle is not None and spectrum.angle is None:
-            notes = (*spectrum.notes, f"angle of incidence {angle:g} degrees, as the file declares")
-            spectrum = replace(spectrum, angle=np.full(len(spectrum), angle), notes=notes)
-        name, declared = one.name if several else "", table.layout.declared.facts
-        if name or declared:
-            spectrum = replace(spectrum, name=name, declared=declared)
-        if log.isEnabledFor(INFO):
-            low, high = spectrum.values.min(), spectrum.values.max()
-            first, last = spectrum.wavelength[[0, -1]]
-            text = "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g"
-            log.info(text, spectrum.path, len(spectrum), spectrum.signal, first, last, low, high)
-        return spectrum
+def _find(path: str | os.PathLike[str], asked: Reading) -> list[Candidate]:
+    """The spectra of a file that the arguments may mean."""
+    candidates = file_candidates(read_tables(path, asked.spot), asked)
+    stated = ("folded", asked.folded), ("analyser", asked.analyser is not None)
+    given = [name for name, given in (*stated, ("transmission", asked.transmission)) if given]
+    if given and all(one.signal != SIGNAL for one in candidates):
+        raise UsageError(f"{path}: `{given[0]}` is for ellipsometry, and the file has none; leave it out")
+    kinds = {SIGNAL: "psi and delta are in degrees", Mueller.word: "Mueller elements have no unit"}
+    kinds[Generalised.word] = kinds[SIGNAL]
+    if all(one.signal in kinds for one in candidates):
+        if asked.signal_unit is not None:
+            raise UsageError(f"{path}: {kinds[candidates[0].signal]}; leave `signal_unit` out")
+        if asked.polarisation in ("s", "p"):
+            raise UsageError(f"{path}: ellipsometry compares p with s light; leave `polarisation` out")
+    return candidates
 
 
-def _folded(table: Table) -> bool | None:
-    """True where the file says that its Δ is folded, None where it says nothing."""
-    return True if dict(table.layout.declared.facts).get("delta", "").startswith("folded") else None
+_READERS: dict[type, Callable[[Table, Any, Reading], Spectrum]] = {
+    SpectrumColumns: read_power,
+    MuellerColumns: read_mueller,
+    GeneralisedColumns: read_generalised,
+    EllipsometryColumns: read_ellipsometry,
+}
 
 
-def _polarisation(table: Table, columns: SpectrumColumns, asked: str | None) -> str | None:
-    """The polarisation that the caller or the file states. Raises UsageError where they differ."""
-    declared = table.layout.declared.polarisation
-    if declared is None or columns.signal.polarisation:
-        return asked
-    if asked not in (None, declared):
-        raise UsageError(
-            f'{table.path}: declares {declared} light, which contradicts `polarisation="{asked}"`; leave '
-            "that out"
-        )
-    return declared
+def _read(one: Candidate, asked: Reading, several: bool) -> Spectrum:
+    """Read one of the spectra of a file; `several` keeps its name."""
+    declared = one.table.layout.declared
+    spectrum = _READERS[type(one.columns)](one.table, one.columns, asked)
+    if declared.angle is not None and spectrum.angle is None:
+        notes = (*spectrum.notes, f"angle of incidence {declared.angle:g} degrees, as the file declares")
+        spectrum = replace(spectrum, angle=np.full(len(spectrum), declared.angle), notes=notes)
+    name = one.name if several else ""
+    if name or declared.facts:
+        spectrum = replace(spectrum, name=name, declared=declared.facts)
+    if log.isEnabledFor(INFO):
+        low, high = spectrum.values.min(), spectrum.values.max()
+        first, last = spectrum.wavelength[[0, -1]]
+        text = "%s: %d rows used: %s from %g to %g nm, values from %.4g to %.4g"
+        log.info(text, spectrum.path, len(spectrum), spectrum.signal, first, last, low, high)
+    return spectrum

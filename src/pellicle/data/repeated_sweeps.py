@@ -62,22 +62,6 @@ def one_way(wavelength: np.ndarray) -> bool:
     return bool((steps > 0).all() or (steps < 0).all())
 
 
-def of_rows(number: Int[np.ndarray, " rows"], arrays: dict[str, Any], **words: Any) -> Spectrum:
-    """Build a `Spectrum` of rows, or the mean of their sweeps.
-
-    `arrays` are arguments of `Spectrum` with one number per row, or None. Raises DataError as
-    `mean_spectrum` does.
-    """
-    if number.max(initial=0) == 0:
-        return Spectrum(**arrays, **words)
-    sweeps = []
-    for k in range(number.max(initial=0) + 1):
-        rows = number == k
-        own = {name: None if array is None else array[rows] for name, array in arrays.items()}
-        sweeps.append(Spectrum(**own, **words))
-    return mean_spectrum(sweeps)
-
-
 _EQUAL = (
     "signal",
     "transmission",

@@ -78,26 +78,6 @@ def axis_note(unit: str | None) -> str:
     return f"wavelength unit: {unit}" if unit else "wavelength unit: nm, assumed"
 
 
-def read_columns(
-    table: Table, columns: SpectrumColumns, unit: str | None
-) -> tuple[Axis, np.ndarray, np.ndarray | None]:
-    """Return the axis, signal and sigma in file order; None for a missing column.
-
-    A quotient of counts is infinite where the reference has none. Raises DataError as `read_axis` does.
-    """
-    optional = (columns.sigma, columns.reference, columns.dark)
-    others = [columns.signal, *(column for column in optional if column)]
-    axis, read = read_axis(table, columns.axis, others, unit)
-    signal, *rest = read
-    sigma, reference, dark = (rest.pop(0) if column else None for column in optional)
-    if reference is not None:
-        background = 0.0 if dark is None else dark
-        with np.errstate(divide="ignore", invalid="ignore"):
-            quotient = (signal - background) / (reference - background)
-        signal = np.where(reference > background, quotient, np.inf)
-    return axis, signal, sigma
-
-
 def read_axis(
     table: Table, axis: AxisColumns, others: Sequence[Column], unit: str | None
 ) -> tuple[Axis, list[np.ndarray]]:

@@ -51,10 +51,6 @@ class Table:
             return self.layout.cells
         raise TypeError(f"{self.path} is no text")
 
-    def source_lines(self, rows: np.ndarray) -> np.ndarray | None:
-        """Return the source lines of rows (N,), None for a binary file."""
-        return None if self.lines is None else self.lines[rows]
-
     def __len__(self) -> int:
         return len(self.layout.cells)
 
