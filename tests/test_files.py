@@ -30,9 +30,8 @@ def test_text_arrives_whole_and_readable_as_other_files_are(tmp_path):
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
-def test_an_existing_file_is_kept(tmp_path):
-    target = tmp_path / "mine.csv"
-    target.write_text("mine")
+def test_an_existing_file_is_kept(write):
+    target = write("mine", "mine.csv")
     with pytest.raises(UsageError, match=r"mine\.csv: exists and is not overwritten; choose another `path`"):
         write_text(target, "theirs")
     assert target.read_text() == "mine"
@@ -75,9 +74,8 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
     assert os.listdir(tmp_path) == ["mine.csv"]
 
 
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
-    target = tmp_path / "figure.png"
-    target.write_text("old")
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, write):
+    target = write("old", "figure.png")
 
     def fail_half_way():
         with replacing(target, overwrite=True) as temporary:
@@ -138,12 +136,11 @@ def dead():
     return process.pid
 
 
-def test_temporary_files_of_killed_processes_are_removed(tmp_path, dead):
+def test_temporary_files_of_killed_processes_are_removed(tmp_path, write, dead):
     write_text(tmp_path / "result.json", '{"schema": "pellicle.fit/1"}')
     gone = _stray(tmp_path, dead)
     elsewhere, alive = _stray(tmp_path, dead, machine="00000000"), _stray(tmp_path, os.getppid(), "nk")
-    mine = tmp_path / ".figure.png"
-    mine.write_text("mine")
+    mine = write("mine", ".figure.png")
     new_folder(tmp_path)
     assert [path.exists() for path in (gone, elsewhere, alive, mine)] == [False, True, True, True]
     os.utime(elsewhere, (1e9, 1e9))  # of 2001: its process has ended, wherever it ran
@@ -169,9 +166,8 @@ def test_a_killed_process_leaves_a_name_that_is_recognised(tmp_path):
     [OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), OSError("HDF5: " + os.strerror(errno.ENOSPC))],
     ids=["by number", "by text"],
 )
-def test_a_full_disk_is_one_sentence_and_leaves_the_old_file(tmp_path, error):
-    target = tmp_path / "chain.h5"
-    target.write_text("old")
+def test_a_full_disk_is_one_sentence_and_leaves_the_old_file(tmp_path, write, error):
+    target = write("old", "chain.h5")
     with (
         pytest.raises(DataError, match=r"chain\.h5: cannot be written \(.*No space left.*make room"),
         replacing(target, overwrite=True),

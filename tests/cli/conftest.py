@@ -42,14 +42,15 @@ class Ran:
 
 @pytest.fixture
 def pellicle(monkeypatch, capsys) -> Callable[..., Ran]:
-    """Runs `pellicle ARGUMENTS` without touching the user's cache of programs."""
+    """Runs `pellicle ARGUMENTS` without the user's cache of programs; `code` is the exit code to check."""
     monkeypatch.setenv("PELLICLE_CACHE", "off")
 
-    def run(*arguments: Any) -> Ran:
+    def run(*arguments: Any, code: int | None = None) -> Ran:
         monkeypatch.setattr(sys, "argv", ["pellicle", *map(str, arguments)])
         capsys.readouterr()
-        code = main()
-        return Ran(code, *capsys.readouterr())
+        ran = Ran(main(), *capsys.readouterr())
+        assert code is None or ran.code == code, ran.err
+        return ran
 
     return run
 
@@ -77,3 +78,14 @@ SCENE = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:800")
 def scene() -> tuple[str, ...]:
     """The flags of the scene that `spectrum_file` was simulated from."""
     return SCENE
+
+
+@pytest.fixture
+def scene_recipe(write) -> Callable[..., Any]:
+    """Writes the recipe of this scene, or of other media, with these lines under [data] and at its end."""
+
+    def recipe(data="", name="film.toml", material="1.46", substrate="3.9+0.02j", end=""):
+        layer = f"[[scene.layer]]\nmaterial = {material}\nthickness = {{ lower = 10, upper = 800 }}\n"
+        return write(f"[data]\n{data}\n[scene]\nsubstrate = '{substrate}'\n{layer}{end}", name)
+
+    return recipe

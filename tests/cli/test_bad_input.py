@@ -11,8 +11,7 @@ def check_refused(pellicle, tmp_path):
 
     def run(*arguments, code: int, said: tuple[str, ...]):
         before = sorted(tmp_path.rglob("*"))
-        ran = pellicle(*arguments, "--out", tmp_path / "out")
-        ran.refused(code, *said)
+        pellicle(*arguments, "--out", tmp_path / "out").refused(code, *said)
         assert [p for p in sorted(tmp_path.rglob("*")) if p != tmp_path / "out"] == before
         assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
@@ -32,9 +31,8 @@ ROWS = "".join(f"{400 + 10 * i},0.{20 + i}\n" for i in range(10))
         ),
     ],
 )
-def test_data(check_refused, tmp_path, scene, text, said):
-    file = tmp_path / "film.csv"
-    file.write_text(text)
+def test_data(check_refused, write, scene, text, said):
+    file = write(text)
     check_refused("fit", file, *scene, code=3, said=(str(file), *said))
 
 
@@ -93,9 +91,8 @@ def test_unknown_material_suggests_the_nearest(check_refused, spectrum_file, lay
     )
 
 
-def test_an_intensity_without_a_scale(check_refused, tmp_path, scene):
-    file = tmp_path / "counts.csv"
-    file.write_text("wavelength,intensity\n" + ROWS)
+def test_an_intensity_without_a_scale(check_refused, write, scene):
+    file = write("wavelength,intensity\n" + ROWS, "counts.csv")
     said = (str(file), "--scale slow")
     check_refused("fit", file, *scene, "--signal", "R", code=3, said=said)
 
@@ -107,16 +104,16 @@ def test_an_intensity_without_a_scale(check_refused, tmp_path, scene):
         ("[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 'SiO3'\nthickness = 10\n", ("SiO3", "SiO2")),
     ],
 )
-def test_recipes(check_refused, tmp_path, recipe, said):
+def test_recipes(check_refused, write, recipe, said):
     """Of what the tables and the scene refuse; tests/recipes has every case."""
-    path = tmp_path / "film.toml"
-    path.write_text(recipe)
+    path = write(recipe, "film.toml")
     check_refused("fit", "a.csv", "--recipe", path, code=3, said=(str(path), *said))
 
 
-def test_psi_and_delta_without_an_angle(check_refused, tmp_path, scene):
-    file = tmp_path / "psi.csv"
-    file.write_text("wavelength,psi,delta\n" + "".join(f"{400 + 10 * i},{20 + i},100\n" for i in range(10)))
+def test_psi_and_delta_without_an_angle(check_refused, write, scene):
+    file = write(
+        "wavelength,psi,delta\n" + "".join(f"{400 + 10 * i},{20 + i},100\n" for i in range(10)), "psi.csv"
+    )
     check_refused("fit", file, *scene, code=3, said=(str(file), "angle of incidence", "--angle 70"))
 
 
@@ -128,8 +125,9 @@ def test_a_grid_without_end(pellicle, tmp_path, step):
         f"[data]\nwavelengths = {{ start = 400, step = {step}{stop} }}\n[scene]\nsubstrate = 'Si'\n"
         "[[scene.layer]]\nmaterial = 1.46\nthickness = 100\n"
     )
-    ran = pellicle("simulate", path, "--out", tmp_path / "out.csv")
-    ran.refused(3, f"{path}: ", "wavelengths", "larger step" if "e-9" in step else "finite")
+    pellicle("simulate", path, "--out", tmp_path / "out.csv").refused(
+        3, f"{path}: ", "wavelengths", "larger step" if "e-9" in step else "finite"
+    )
 
 
 def test_a_plate_without_thickness(check_refused, tmp_path, spectrum_file, scene):

@@ -26,9 +26,8 @@ layer = [{ material = 1.46, thickness = { lower = 10, upper = 500, value = 310 }
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    (tmp_path / "film.toml").write_text(RECIPE)
-    return tmp_path / "film.toml"
+def recipe(write):
+    return write(RECIPE, "film.toml")
 
 
 @pytest.mark.slow
@@ -51,8 +50,7 @@ def test_simulated_colours_are_read_and_fitted(pellicle, recipe, tmp_path):
 
 @pytest.mark.slow  # measures every effect
 def test_a_plan_of_colours_is_that_of_the_spectra_behind_them(pellicle, recipe):
-    found = pellicle("plan", recipe, "--json", "--tolerance", "1e-3")
-    assert found.code == 0
+    found = pellicle("plan", recipe, "--json", "--tolerance", "1e-3", code=0)
     effects = {row["effect"]: row["on"] for row in json.loads(found.out)["effects"]}
     assert effects["oblique"]
     assert not effects["absorption"]
@@ -72,9 +70,7 @@ def photo(tmp_path):
 
 def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
     path, colours = photo
-    found = pellicle("read", path, "--region", "2,2,9,9;22,2,9,9", "--json")
-    assert found.code == 0
-    records = found.objects
+    records = pellicle("read", path, "--region", "2,2,9,9;22,2,9,9", "--json", code=0).objects
     assert [record["name"] for record in records] == ["2,2,9,9", "22,2,9,9"]
     for record, colour in zip(records, colours, strict=True):
         np.testing.assert_allclose(record["colours"][0], colour, atol=0.5 / 255 + 1e-6)

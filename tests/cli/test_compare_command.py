@@ -8,48 +8,24 @@ import pytest
 from pellicle.dispersion import Constant
 from pellicle.simulation.functions import reflectance
 
-PLAIN = """[data]
-{data}
-[scene]
-substrate = "3.9+0.02j"
-[[scene.layer]]
-material = {material}
-thickness = {{ lower = 10, upper = 800 }}
-"""
+CAUCHY = "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    def write(name, material="1.46", data=""):
-        path = tmp_path / name
-        path.write_text(PLAIN.format(material=material, data=data))
-        return path
-
-    return write
-
-
-@pytest.fixture
-def wrong_index(tmp_path):
+def wrong_index(write):
     """A film of 1.52, which a recipe with 1.46 misses."""
     nm = np.linspace(400.0, 796.0, 100)
     clean = np.asarray(reflectance(nm, 300.0, Constant(1.52), Constant(3.9, 0.02)))
     values = clean + np.random.default_rng(0).normal(0, 0.002, nm.size)
-    path = tmp_path / "film.csv"
-    path.write_text(
-        "wavelength_nm,R\n" + "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True))
-    )
-    return path
+    return write("wavelength_nm,R\n" + "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True)))
 
 
 @pytest.mark.slow
-def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tmp_path):
-    a, b = (
-        recipe("a.toml"),
-        recipe("b.toml", "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"),
-    )
-    ran = pellicle("compare", wrong_index, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out")
-    assert ran.code == 0, ran.err
-    [again] = ran.objects
+def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, wrong_index, tmp_path):
+    a, b = scene_recipe(name="a.toml"), scene_recipe(name="b.toml", material=CAUCHY)
+    [again] = pellicle(
+        "compare", wrong_index, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out", code=0
+    ).objects
     assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
     assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")
     assert again["verdict"].endswith("the data strongly favour A.")
@@ -71,23 +47,20 @@ def test_data_that_call_for_one_more_parameter(pellicle, recipe, wrong_index, tm
     assert row.split()[:4] == ["*", "b.toml", "0.0", "0.0"]
 
 
-def test_data_that_do_not(pellicle, recipe, spectrum_file):
+def test_data_that_do_not(pellicle, scene_recipe, spectrum_file):
     """The film is 1.46: a free index gains next to nothing, and costs ln n."""
     path = spectrum_file()
-    a, b = (
-        recipe("a.toml"),
-        recipe("b.toml", "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"),
-    )
+    a, b = scene_recipe(name="a.toml"), scene_recipe(name="b.toml", material=CAUCHY)
     [found] = pellicle("compare", path, "--recipe", a, "--recipe", b, "--json").objects
     assert found["best"] == "a.toml"
     assert 0 < found["recipes"][1]["delta_bic"] <= math.log(100) + 0.1
     assert "A is not needed" in found["verdict"] or "prefer a.toml" in found["verdict"]
 
 
-def test_bad_input_in_one_sentence(pellicle, recipe, spectrum_file, tmp_path):
-    path, a = spectrum_file(), recipe("a.toml")
-    narrow = recipe("narrow.toml", data="range = [500, 700]")
-    robust = recipe("robust.toml", data='loss = "huber"')
+def test_bad_input_in_one_sentence(pellicle, scene_recipe, spectrum_file, tmp_path):
+    path, a = spectrum_file(), scene_recipe(name="a.toml")
+    narrow = scene_recipe("range = [500, 700]", "narrow.toml")
+    robust = scene_recipe('loss = "huber"', "robust.toml")
     for recipes, code, words in (
         ([a], 2, "two recipes or more"),
         ([a, a], 2, "given twice"),

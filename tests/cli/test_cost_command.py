@@ -22,17 +22,13 @@ thickness = { value = 321.5, lower = 10, upper = 800 }
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text(RECIPE)
-    return path
+def recipe(write):
+    return write(RECIPE, "film.toml")
 
 
 def test_table_folder_and_record_say_the_same(pellicle, recipe, tmp_path):
     out = tmp_path / "cost"
-    ran = pellicle("cost", recipe, "--datasets", 0, "--json", "--out", out)
-    assert ran.code == 0
-    (record,) = ran.objects
+    (record,) = pellicle("cost", recipe, "--datasets", 0, "--json", "--out", out, code=0).objects
     assert record == json.loads((out / "result.json").read_text())
     assert record["schema"] == "pellicle.cost/1"
     assert (record["reference"], record["tolerance"], record["unit"]) == ("float64", 0.002, "R")

@@ -13,8 +13,7 @@ RESULT_KEYS |= {"correlation", "budget", "plan", "warnings", "versions", "second
 
 
 def test_stdout_is_the_report_and_stderr_the_talk(pellicle, spectrum_file, scene):
-    ran = pellicle("fit", spectrum_file(), *scene)
-    assert ran.code == 0
+    ran = pellicle("fit", spectrum_file(), *scene, code=0)
     assert "thickness" in ran.out
     assert "converged" in ran.out
     assert "unit" not in ran.out.split("[[")[0]
@@ -53,8 +52,7 @@ def test_several_files_in_order_and_one_that_cannot_be_read(pellicle, spectrum_f
     bad, out = tmp_path / "bad.csv", tmp_path / "all"
     bad.write_text("wavelength_nm,R\n400,0.1\n401,much\n")
     files = spectrum_file("one.csv", 250.0), bad, spectrum_file("two.csv", 420.0)
-    ran = pellicle("fit", *files, *scene, "--json", "--out", out)
-    assert ran.code == 3
+    ran = pellicle("fit", *files, *scene, "--json", "--out", out, code=3)
     found = ran.objects
     assert [f["data"]["path"] for f in found] == list(map(str, files))
     assert [f["status"] for f in found] == ["converged", "failed", "converged"]
@@ -86,8 +84,7 @@ FILES = {"recipe.toml", "report.html", "report.txt", "result.json", "figure.png"
 
 def test_out_writes_the_five_files(pellicle, spectrum_file, scene, tmp_path):
     out = tmp_path / "results" / "oxide"
-    ran = pellicle("fit", spectrum_file(), *scene, "--out", out)
-    assert ran.code == 0
+    ran = pellicle("fit", spectrum_file(), *scene, "--out", out, code=0)
     assert {p.name for p in out.iterdir()} == FILES
     assert json.loads((out / "result.json").read_text())["status"] == "converged"
     assert (out / "report.txt").read_text().strip() == ran.out.strip()
@@ -109,28 +106,12 @@ def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(
 
     monkeypatch.setattr(fits, "fit", never)
     for files in ([spectrum_file()], [spectrum_file("a.csv"), spectrum_file("b.csv")]):
-        ran = pellicle("fit", *files, *scene, "--out", out)
-        ran.refused(2, "pellicle did not write", "--out")
+        pellicle("fit", *files, *scene, "--out", out).refused(2, "pellicle did not write", "--out")
         assert [p.name for p in out.iterdir()] == ["thesis.txt"]
 
 
-RECIPE = """
-[data]
-files = ["oxide.csv"]
-
-[scene]
-substrate = "3.9+0.02j"
-
-[[scene.layer]]
-name = "oxide"
-material = 1.46
-thickness = { lower = 10, upper = 800 }
-"""
-
-
-def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, tmp_path):
-    file, recipe = spectrum_file(), tmp_path / "film.toml"
-    recipe.write_text(RECIPE)
+def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, scene_recipe):
+    file, recipe = spectrum_file(), scene_recipe("files = ['oxide.csv']")
     (by_recipe,) = pellicle("fit", "--recipe", recipe, "--json").objects
     (by_flags,) = pellicle("fit", file, *scene, "--json").objects
     (named,) = pellicle("fit", file, "--recipe", recipe, "--json").objects
@@ -140,9 +121,8 @@ def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, tmp_
 
 
 @pytest.mark.slow
-def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, tmp_path):
-    file, recipe = spectrum_file(), tmp_path / "film.toml"
-    recipe.write_text(RECIPE.replace("[scene]", "angle = 20\n[scene]"))
+def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, scene_recipe):
+    file, recipe = spectrum_file(), scene_recipe("angle = 20")
     (found,) = pellicle("fit", file, "--recipe", recipe, "--angle", "40", "--json").objects
     assert next(row["why"] for row in found["plan"] if row["effect"] == "oblique") == "incidence at 40°"
 
@@ -165,7 +145,7 @@ def test_flags_reach_the_scene(pellicle, spectrum_file):
     assert p["instrument.offset"]["free"]
 
 
-def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene, tmp_path):
+def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene, scene_recipe):
     """By flag and by recipe; a name that is none is refused, and so is a posterior of it."""
     path = spectrum_file()
     lines = path.read_text().splitlines()
@@ -174,20 +154,16 @@ def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene
         lines[row] = f"{nm},{float(value) + 0.2:.6f}"
     path.write_text("\n".join(lines) + "\n")
     plain = pellicle("fit", path, *scene, "--json").objects[0]
-    ran = pellicle("fit", path, *scene, "--json", "--loss", "student-t")
-    [robust] = ran.objects
-    assert ran.code == 0
+    [robust] = pellicle("fit", path, *scene, "--json", "--loss", "student-t", code=0).objects
     assert plain["noise"]["sigma"] > 10 * robust["noise"]["sigma"]
     assert robust["noise"]["sigma"] == pytest.approx(0.002, rel=0.4)
     assert robust["noise"]["source"] == "residuals"
-    recipe = tmp_path / "robust.toml"
-    recipe.write_text(
-        f'[data]\nfiles = ["{path.name}"]\nloss = "student-t"\n[scene]\nsubstrate = "3.9+0.02j"\n'
-        "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
-    )
+    recipe = scene_recipe(f"files = ['{path.name}']\nloss = 'student-t'")
     [again] = pellicle("fit", "--recipe", recipe, "--json").objects
     assert again["parameters"]["thickness"]["value"] == robust["parameters"]["thickness"]["value"]
-    wrong = pellicle("fit", path, *scene, "--loss", "cauchy")
-    wrong.refused(2, "--loss must be one of least-squares, huber, student-t, not 'cauchy'")
-    both = pellicle("fit", path, *scene, "--loss", "huber", "--posterior")
-    both.refused(2, "leave the loss out, or the posterior")
+    pellicle("fit", path, *scene, "--loss", "cauchy").refused(
+        2, "--loss must be one of least-squares, huber, student-t, not 'cauchy'"
+    )
+    pellicle("fit", path, *scene, "--loss", "huber", "--posterior").refused(
+        2, "leave the loss out, or the posterior"
+    )

@@ -20,9 +20,7 @@ def files(spectrum_file):
 @pytest.mark.slow
 def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
     out = tmp_path / "out"
-    ran = pellicle("fit", *files, *scene, "--joint", "--json", "--out", out)
-    assert ran.code == 0
-    [found] = ran.objects
+    [found] = pellicle("fit", *files, *scene, "--joint", "--json", "--out", out, code=0).objects
     assert [(d["name"], d["path"], d["points"]) for d in found["data"]] == [
         ("a", str(files[0]), 100),
         ("b", str(files[1]), 100),
@@ -34,22 +32,15 @@ def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_recipe_says_so_too(pellicle, files, tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text(
-        "[data]\nfiles = ['a.csv', 'b.csv']\njoint = true\n[scene]\nsubstrate = '3.9+0.02j'\n"
-        "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
-    )
-    ran = pellicle("fit", "--recipe", path)
-    assert ran.code == 0
+def test_a_recipe_says_so_too(pellicle, files, scene_recipe):
+    path = scene_recipe("files = ['a.csv', 'b.csv']\njoint = true")
+    ran = pellicle("fit", "--recipe", path, code=0)
     assert ran.out.count("[[Verdict]]") == 1
     assert "rms residual of b" in ran.out
 
 
 def test_a_bad_file_is_one_failed_object(pellicle, files, scene, tmp_path):
-    ran = pellicle("fit", files[0], tmp_path / "gone.csv", *scene, "--joint", "--json")
-    assert ran.code == 3
-    [found] = ran.objects
+    [found] = pellicle("fit", files[0], tmp_path / "gone.csv", *scene, "--joint", "--json", code=3).objects
     assert found["status"] == "failed"
     assert len(found["data"]) == 2
     assert "gone.csv" in found["error"]
@@ -69,23 +60,19 @@ def asked(monkeypatch):
     return calls
 
 
-def test_files_with_their_own_words(pellicle, files, tmp_path, asked):
+def test_files_with_their_own_words(pellicle, files, scene_recipe, asked):
     """b.csv has counts, not fractions, so only it has a scale; and its own noise and range."""
     files[1].write_text(files[1].read_text().replace("R", "intensity"))
-    path = tmp_path / "film.toml"
-    path.write_text(
-        "[data]\njoint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'b.csv'\nsignal = 'R'\n"
-        "noise = 0.006\nrange = [420, 790]\ninstrument = { scale = 'free' }\n"
-        "[scene]\nsubstrate = '3.9+0.02j'\n"
-        "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
+    path = scene_recipe(
+        "joint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'b.csv'\nsignal = 'R'\n"
+        "noise = 0.006\nrange = [420, 790]\ninstrument = { scale = 'free' }"
     )
     pellicle("fit", "--recipe", path)
     [([a, b], [seen_a, seen_b])] = asked
     assert (a.sigma, set(b.sigma)) == (None, {0.006})
     assert (a.wavelength.min(), b.wavelength.min()) == (400, 420)
     assert (seen_a.instrument.scale, seen_b.instrument.scale) == (1.0, Drift(0))
-    refused = pellicle("fit", files[0], "--recipe", path)
-    refused.refused(2, "[[data.file]]")
+    pellicle("fit", files[0], "--recipe", path).refused(2, "[[data.file]]")
 
 
 def test_one_file_may_be_joint_and_several_need_not(pellicle, files, scene, asked):
@@ -98,20 +85,11 @@ def test_one_file_may_be_joint_and_several_need_not(pellicle, files, scene, aske
 
 
 @pytest.fixture
-def beside(files, tmp_path):
+def beside(files, write, scene_recipe):
     """A recipe of a reflectance of free scale and of Ψ and Δ, about which `own` is said."""
-
-    def write(own: str = ""):
-        (tmp_path / "e.csv").write_text("wavelength,psi,delta,angle\n500,30,170,70\n600,31,160,70\n")
-        path = tmp_path / "film.toml"
-        path.write_text(
-            f"[data]\njoint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'e.csv'\n{own}\n"
-            "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\n"
-            "thickness = { lower = 10, upper = 800 }\n[instrument]\nscale = 'free'\n"
-        )
-        return path
-
-    return write
+    write("wavelength,psi,delta,angle\n500,30,170,70\n600,31,160,70\n", "e.csv")
+    both = "joint = true\n[[data.file]]\npath = 'a.csv'\n[[data.file]]\npath = 'e.csv'\n"
+    return lambda own="": scene_recipe(both + own, substrate="Si", end="[instrument]\nscale = 'free'\n")
 
 
 def test_ellipsometry_leaves_out_the_scale_of_all(pellicle, beside, asked):
@@ -121,8 +99,9 @@ def test_ellipsometry_leaves_out_the_scale_of_all(pellicle, beside, asked):
 
 
 def test_ellipsometry_with_a_scale_of_its_own_is_refused(pellicle, beside):
-    ran = pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }"))
-    ran.refused(3, "e.csv: ellipsometry has no scale and no offset")
+    pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }")).refused(
+        3, "e.csv: ellipsometry has no scale and no offset"
+    )
 
 
 def test_a_folded_delta_is_said_by_flag_or_recipe(pellicle, beside, scene, tmp_path, asked):
@@ -134,14 +113,10 @@ def test_a_folded_delta_is_said_by_flag_or_recipe(pellicle, beside, scene, tmp_p
     assert (in_recipe.folded, by_flag.folded, rotating.folded) == (True, True, True)
 
 
-def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, tmp_path, asked):
+def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, write, scene_recipe, asked):
     """What a flag says goes before the recipe."""
-    (tmp_path / "f.csv").write_text("500,20,30\n600,21,31\n")
-    path = tmp_path / "film.toml"
-    path.write_text(
-        "[data]\nfiles = ['f.csv']\ncolumns = 'wavelength,_,R'\nsignal_unit = 'percent'\n"
-        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 1, upper = 9 }\n"
-    )
+    write("500,20,30\n600,21,31\n", "f.csv")
+    path = scene_recipe("files = ['f.csv']\ncolumns = 'wavelength,_,R'\nsignal_unit = 'percent'")
     pellicle("fit", "--recipe", path)
     pellicle("fit", "--recipe", path, "--columns", "wavelength,R,_")
     spots = ROOT / "measurements" / "ellipsometry" / "post_synthesis.dat"
@@ -151,14 +126,9 @@ def test_columns_and_spots_are_said_by_flag_or_recipe(pellicle, scene, tmp_path,
     assert spot.values[0] == 34.733
 
 
-def test_the_recipe_turns_a_sample_whose_file_states_no_azimuth(tmp_path):
-    (tmp_path / "film.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
-    recipe = tmp_path / "film.toml"
-    recipe.write_text(
-        '[data]\nfiles = ["film.csv"]\nangle = 60\nazimuth = 45\n\n[scene]\nsubstrate = "BK7"\n\n'
-        "[[scene.layer]]\n"
-        "thickness = { lower = 10, upper = 500 }\n"
-        "material = { ordinary = 1.6, extraordinary = 1.7, axis = [90, 0] }\n"
-    )
+def test_the_recipe_turns_a_sample_whose_file_states_no_azimuth(write, scene_recipe):
+    write("wavelength_nm,R\n500,0.2\n600,0.3\n")
+    crystal = "{ ordinary = 1.6, extraordinary = 1.7, axis = [90, 0] }"
+    recipe = scene_recipe("files = ['film.csv']\nangle = 60\nazimuth = 45", material=crystal)
     (file,) = inputs([], str(recipe)).files
     assert (file.scene.light.angle, file.scene.light.azimuth) == (60.0, 45.0)

@@ -22,13 +22,8 @@ layer = [{{ material = 1.46, thickness = {{ lower = 20, upper = 200 }} }}]
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    def write(signal="srgb", more=""):
-        path = tmp_path / "film.toml"
-        path.write_text(RECIPE.format(signal=signal, more=more))
-        return path
-
-    return write
+def recipe(write):
+    return lambda signal="srgb", more="": write(RECIPE.format(signal=signal, more=more), "film.toml")
 
 
 THICKNESS = np.linspace(30.0, 190.0, 60)
@@ -53,9 +48,7 @@ def photo(path, linear, gamma=None):
 def test_a_strip_across_a_wedge(pellicle, recipe, colours, tmp_path):
     path = photo(tmp_path / "wedge.png", colours)
     words = ("map", path, "--recipe", recipe(), "--strip", "0,6,59,6")
-    ran = pellicle(*words, "--out", tmp_path / "out", "--json")
-    assert ran.code == 0
-    [record] = ran.objects
+    [record] = pellicle(*words, "--out", tmp_path / "out", "--json", code=0).objects
     assert record["strip"] == "0,6,59,6"
     np.testing.assert_allclose(record["positions"]["thickness"], THICKNESS, atol=4)
     assert record["converged"] > 0.9

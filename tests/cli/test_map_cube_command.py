@@ -64,9 +64,7 @@ def photograph(tmp_path):
 
 
 def test_the_folder_of_a_map(pellicle, words, fits, tmp_path):
-    ran = pellicle(*words, "--json")
-    assert ran.code == 0, ran.err
-    [record] = ran.objects
+    [record] = pellicle(*words, "--json", code=0).objects
     assert record["status"] == {"converged": 479, "no-data": 1}
     assert record == json.loads((tmp_path / "out/result.json").read_text())
     assert "converged" in (tmp_path / "out/report.txt").read_text()
@@ -94,8 +92,7 @@ def test_the_same_command_goes_on_after_ctrl_c(pellicle, words, fits, tmp_path):
     assert (ran.code, ran.out) == (130, "")
     assert "interrupted after" in ran.err
     assert f"they are kept in {tmp_path / 'out'}, and the same command goes on" in ran.err
-    ran = pellicle(*words)
-    assert ran.code == 0
+    ran = pellicle(*words, code=0)
     assert "pixels are from an earlier run" in ran.err
     assert len(blocks) in (9, 10)  # 2 or 3 were in the store
     assert pellicle(*words).code == 0
@@ -175,8 +172,7 @@ def test_a_cube_that_cannot_be_read_leaves_no_folder(pellicle, words, fits, tmp_
 def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_path):
     with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
         lit = cube.R.values[2:8, 4:9]
-    ran = pellicle(*words, "--lamp-curve", "4,2,5,6", "--json")
-    assert ran.code == 0, ran.err
+    pellicle(*words, "--lamp-curve", "4,2,5,6", "--json", code=0)
     bare = (2.9**2 + 0.02**2) / (4.9**2 + 0.02**2)  # Fresnel, air on 3.9 + 0.02i
     with (
         xarray.open_dataset(tmp_path / "out/map.nc") as map,
@@ -185,9 +181,7 @@ def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_pa
         gain = lit[..., 0].mean() / bare
         np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0] / gain, rtol=1e-6)
         assert "lamp curve of region 4,2,5,6" in " ".join(map.attrs["notes"])
-    again = pellicle(*words)
-    assert again.code == 2
-    assert "another input" in again.err
+    pellicle(*words).refused(2, "another input")
 
 
 @pytest.mark.slow
@@ -195,8 +189,7 @@ def test_counts_with_a_white_of_a_material(pellicle, words, fits, tmp_path):
     np.save(tmp_path / "white.npy", np.full(30, 1.0))
     with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
         counts = cube.R.values
-    ran = pellicle(*words, "--white-frame", tmp_path / "white.npy", "--white-reflectance", "1.5+0.0j")
-    assert ran.code == 0, ran.err
+    pellicle(*words, "--white-frame", tmp_path / "white.npy", "--white-reflectance", "1.5+0.0j", code=0)
     with xarray.open_dataset(tmp_path / "out/map.nc") as map:
         np.testing.assert_allclose(map.thickness, 100 * 0.04 * counts[..., 0], rtol=1e-6)
 
@@ -208,9 +201,7 @@ def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):
         (("--lamp-curve", "0,0,4,4", "--lamp-reference", film), "--lamp-reference must be known"),
         (("--lamp-reference", film), "--lamp-curve, x,y,width,height"),
     ):
-        ran = pellicle(*words, *flags)
-        assert ran.code == 2
-        assert text in ran.err
+        pellicle(*words, *flags).refused(2, text)
 
 
 @pytest.mark.slow
@@ -222,8 +213,7 @@ def test_a_series_has_rates(pellicle, words, fits, tmp_path):
     }
     series = xarray.DataArray(values, coords, ("time", "y", "x", "wavelength")).to_dataset(name="R")
     series.to_netcdf(tmp_path / "series.nc")
-    ran = pellicle("map", tmp_path / "series.nc", *words[2:])
-    assert ran.code == 0, ran.err
+    ran = pellicle("map", tmp_path / "series.nc", *words[2:], code=0)
     assert "rate.nc" in ran.err
     with xarray.open_dataset(tmp_path / "out/rate.nc") as rate:
         np.testing.assert_allclose(rate.thickness_rate, np.full((4, 5), -0.5))  # of 1 nm in 2 s

@@ -2,28 +2,24 @@
 
 
 def test_the_catalogue(pellicle):
-    ran = pellicle("materials")
-    assert ran.code == 0
+    ran = pellicle("materials", code=0)
     for name in ("SiO2", "Au", "BK7", "Fe2O3"):
         assert name in ran.out
     assert ran.err == ""
 
 
 def test_one_material_with_its_citation(pellicle, tmp_path):
-    ran = pellicle("materials", "Au")
-    assert ran.code == 0
+    ran = pellicle("materials", "Au", code=0)
     assert "Johnson" in ran.out
     assert " nm" in ran.out
     figure = tmp_path / "gold.png"
-    drawn = pellicle("materials", "Au", "--out", figure)
-    assert drawn.code == 0
+    drawn = pellicle("materials", "Au", "--out", figure, code=0)
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert str(figure) in drawn.err
 
 
 def test_an_unknown_name_suggests(pellicle):
-    ran = pellicle("materials", "SiO3")
-    assert ran.code == 2
+    ran = pellicle("materials", "SiO3", code=2)
     assert ran.out == ""
     assert "SiO2" in ran.err
 

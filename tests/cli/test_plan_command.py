@@ -18,10 +18,8 @@ thickness = { lower = 10, upper = 800 }
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text(RECIPE)
-    return path
+def recipe(write):
+    return write(RECIPE, "film.toml")
 
 
 def test_table_and_record_say_the_same(pellicle, recipe):

@@ -11,8 +11,7 @@ WIDE = "Instrument: X-100\nY units: %R\nWavelength (nm),left,right\n" + "".join(
 
 def test_every_spectrum_is_described(pellicle, write):
     path = write(WIDE)
-    ran = pellicle("read", path)
-    assert ran.code == 0
+    ran = pellicle("read", path, code=0)
     assert ran.out.count(str(path)) == 2
     for words in ("left", "right", "400 to 490 nm", "10 points", "X-100", "signal unit: percent"):
         assert words in ran.out
@@ -36,20 +35,16 @@ def test_noise_is_the_scatter_of_neighbours(pellicle, write):
 
 def test_conversion(pellicle, write, tmp_path):
     folder = tmp_path / "converted"
-    ran = pellicle("read", write(WIDE), "--out", folder)
-    assert ran.code == 0
+    pellicle("read", write(WIDE), "--out", folder, code=0)
     assert sorted(path.name for path in folder.iterdir()) == [
         *("film-left.csv", "film-left.png", "film-right.csv", "film-right.png")
     ]
     np.testing.assert_allclose(read_spectrum(folder / "film-right.csv").values[0], 0.34, rtol=1e-15)
-    again = pellicle("read", write(WIDE), "--out", folder)
-    assert again.code == 2
-    assert "is not overwritten" in again.err
+    assert "is not overwritten" in pellicle("read", write(WIDE), "--out", folder, code=2).err
 
 
 def test_a_bad_file_does_not_stop_the_others(pellicle, write):
-    ran = pellicle("read", write("nothing", "bad.csv"), write(WIDE), "--json")
-    assert ran.code == 3
+    ran = pellicle("read", write("nothing", "bad.csv"), write(WIDE), "--json", code=3)
     assert [record["schema"] for record in ran.objects] == ["pellicle.error/1"] + ["pellicle.spectrum/1"] * 2
     assert "bad.csv" in ran.err
 
@@ -59,9 +54,7 @@ def test_an_angle_goes_into_the_copy(pellicle, write, tmp_path):
     assert pellicle("read", path, "--angle", "70", "--out", tmp_path / "out").code == 0
     copy = tmp_path / "out" / "film.csv"
     assert read_spectrum(copy).angle.tolist() == [70, 70, 70]
-    again = pellicle("read", copy, "--angle", "65")
-    assert again.code == 3
-    assert "leave --angle out" in again.err
+    pellicle("read", copy, "--angle", "65").refused(3, "leave --angle out")
 
 
 def test_wrong_usage(pellicle, write):

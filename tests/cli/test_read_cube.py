@@ -24,8 +24,7 @@ def netcdf(cube, tmp_path):
 
 
 def test_summary(pellicle, netcdf):
-    ran = pellicle("read", netcdf)
-    assert ran.code == 0
+    ran = pellicle("read", netcdf, code=0)
     for words in (
         "y 4, x 5",
         "400 to 800 nm, 9 bands",

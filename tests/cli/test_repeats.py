@@ -9,26 +9,13 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture
-def recipe(tmp_path):
-    def write(data=""):
-        path = tmp_path / "film.toml"
-        path.write_text(
-            f"[data]\n{data}\n[scene]\nsubstrate = '3.9+0.02j'\n"
-            "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 10, upper = 800 }\n"
-        )
-        return path
-
-    return write
-
-
 @pytest.mark.slow
 def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path):
     files = [spectrum_file(f"{seed}.csv", seed=seed) for seed in range(4)]
     out = tmp_path / "out"
-    ran = pellicle("fit", *files, *scene, "--repeats", "--json", "--out", out, "--jobs", "2")
-    assert ran.code == 0
-    *fits, found = ran.objects
+    *fits, found = pellicle(
+        "fit", *files, *scene, "--repeats", "--json", "--out", out, "--jobs", "2", code=0
+    ).objects
     assert [fit["schema"] for fit in fits] == ["pellicle.fit/1"] * 4
     assert found["schema"] == "pellicle.repeats/1"
     assert [each["path"] for each in found["data"]] == list(map(str, files))
@@ -50,28 +37,28 @@ def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path
     assert (out / "summary.csv").exists()
 
 
-def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, recipe):
+def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, scene_recipe):
     for name, thickness in zip("abc", (299.0, 300.0, 301.5), strict=True):
         spectrum_file(f"{name}.csv", thickness)
-    ran = pellicle("fit", "--recipe", recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true"))
-    assert ran.code == 0
+    ran = pellicle(
+        "fit", "--recipe", scene_recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true"), code=0
+    )
     assert ran.out.count("[[Verdict]]") == 3
     assert "the stated noise error is too small" in " ".join(ran.out.split())
 
 
 def test_a_file_that_cannot_be_read_is_not_waited_for(pellicle, spectrum_file, scene, tmp_path):
-    ran = pellicle("fit", spectrum_file(), tmp_path / "gone.csv", *scene, "--repeats", "--json")
-    assert ran.code == 3
+    ran = pellicle("fit", spectrum_file(), tmp_path / "gone.csv", *scene, "--repeats", "--json", code=3)
     assert "repeats need two usable fits" in ran.err
     failed = ran.objects[-1]
     assert (failed["schema"], failed["status"]) == ("pellicle.repeats/1", "failed")
 
 
-def test_what_repeats_are_not(pellicle, spectrum_file, scene, recipe):
+def test_what_repeats_are_not(pellicle, spectrum_file, scene, scene_recipe):
     file = spectrum_file()
     pellicle("fit", file, *scene, "--repeats").refused(2, "two files or more", "--repeats")
     pellicle("fit", file, file, *scene, "--repeats", "--joint").refused(2, "one by one", "choose one")
-    path = recipe("joint = true\nrepeats = true")
+    path = scene_recipe("joint = true\nrepeats = true")
     pellicle("fit", file, "--recipe", path).refused(3, "joint and repeats exclude each other")
 
 
@@ -89,9 +76,9 @@ def test_sweeps_of_one_file_are_repeats(pellicle, spectrum_file, scene, tmp_path
     assert [x["path"] for x in each[-1]["data"]] == [f"{together} ({i})" for i in (1, 2, 3)]
 
 
-def test_other_commands_ignore_the_key(pellicle, spectrum_file, recipe, tmp_path):
+def test_other_commands_ignore_the_key(pellicle, spectrum_file, scene_recipe, tmp_path):
     """A recipe of repeats still describes one scene: `compare` takes one file of it."""
-    path = recipe("repeats = true")
+    path = scene_recipe("repeats = true")
     other = tmp_path / "other.toml"
     other.write_text(path.read_text().replace("1.46", "1.5"))
     assert pellicle("compare", spectrum_file(), "--recipe", path, "--recipe", other).code in (0, 4)

@@ -70,9 +70,7 @@ def test_files_open_in_the_programs_they_are_for(sampled, folder):
 
 
 def test_a_chain_that_is_too_short_exits_5_without_an_interval(pellicle, spectrum_file, scene):
-    ran = pellicle("sample", spectrum_file(), *scene, "--steps", "20", "--json")
-    assert ran.code == 5
-    [found] = ran.objects
+    [found] = pellicle("sample", spectrum_file(), *scene, "--steps", "20", "--json", code=5).objects
     assert found["posterior"]["trusted"] is False
     at = found["posterior"]["parameters"]["thickness"]
     assert [at[name] for name in ("mean", "sd", "q025", "q50", "q975")] == [None] * 5
@@ -81,8 +79,7 @@ def test_a_chain_that_is_too_short_exits_5_without_an_interval(pellicle, spectru
 
 
 def test_fit_samples_on_demand(pellicle, spectrum_file, scene):
-    ran = pellicle("fit", spectrum_file(), *scene, "--posterior", "--json")
-    assert ran.code == 0
+    ran = pellicle("fit", spectrum_file(), *scene, "--posterior", "--json", code=0)
     assert ran.objects[0]["posterior"]["trusted"] is True
 
 

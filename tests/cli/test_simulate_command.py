@@ -25,10 +25,8 @@ thickness = { value = 321.5, lower = 10, upper = 800 }
 
 
 @pytest.fixture
-def recipe(tmp_path):
-    path = tmp_path / "film.toml"
-    path.write_text(RECIPE)
-    return path
+def recipe(write):
+    return write(RECIPE, "film.toml")
 
 
 def numbers(path):

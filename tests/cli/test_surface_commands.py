@@ -114,9 +114,9 @@ def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
     rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
     (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
     (tmp_path / "base.toml").write_text(DIFFUSE)
-    ran = pellicle("cost", tmp_path / "base.toml", "--json", "--out", tmp_path / "cost", "--tolerance", 1e-5)
-    assert ran.code == 0
-    (record,) = ran.objects
+    (record,) = pellicle(
+        "cost", tmp_path / "base.toml", "--json", "--out", tmp_path / "cost", "--tolerance", 1e-5, code=0
+    ).objects
     assert record == json.loads((tmp_path / "cost" / "result.json").read_text())
     assert (record["schema"], record["unit"], record["tolerance"]) == ("pellicle.cost/1", "relative", 1e-5)
     found = {rung["name"]: rung for rung in record["rungs"]}

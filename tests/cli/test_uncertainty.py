@@ -43,10 +43,9 @@ def test_none_leaves_the_noise(thickness, scene):
 
 
 @pytest.mark.slow
-def test_an_index_of_a_recipe_counts_as_one_that_is_fitted(thickness, tmp_path):
+def test_an_index_of_a_recipe_counts_as_one_that_is_fitted(thickness, write):
     """With a prior as wide; the value stays that of the given index, and its error includes the distance."""
-    recipe = tmp_path / "film.toml"
-    recipe.write_text(RECIPE.format(index="1.46\nindex_uncertainty = 0.01"))
+    recipe = write(RECIPE.format(index="1.46\nindex_uncertainty = 0.01"), "film.toml")
     found, rows = thickness("--recipe", recipe, "--noise", "0.002")
     assert rows == ["index of the layer"]
     n = "{ lower = 1.3, upper = 1.6, value = 1.46, prior = { mean = 1.46, sd = 0.0146 } }"
@@ -68,5 +67,6 @@ def test_the_budget_of_the_report_and_of_the_file(pellicle, spectrum_file, scene
 
 
 def test_another_word_is_refused(pellicle, spectrum_file, scene):
-    ran = pellicle("fit", spectrum_file(), *scene, "--uncertainty", "some")
-    ran.refused(2, "--uncertainty must be usual or none", "'some'")
+    pellicle("fit", spectrum_file(), *scene, "--uncertainty", "some").refused(
+        2, "--uncertainty must be usual or none", "'some'"
+    )

@@ -25,10 +25,9 @@ def test_folder(tmp_path, refused):
     refused(tmp_path, DataError, "is a folder", "name the file")
 
 
-def test_binary(tmp_path, refused):
+def test_binary(write, refused):
     for content in (b"spc\x00\x01\n\x00\x00", b"\xff\xfe\x00"):
-        path = tmp_path / "spectrum.spc"
-        path.write_bytes(content)
+        path = write(content, "spectrum.spc")
         refused(path, DataError, "binary", "export")
 
 

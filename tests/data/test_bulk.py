@@ -6,6 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.tabular import table as bulk
 from pellicle.errors import DataError
+from tests.data.comparison import assert_read
 
 NM = np.round(np.linspace(200, 2000, 500), 3)
 VALUES = np.round(0.3 + 0.1 * np.sin(NM / 10), 5)
@@ -44,9 +45,7 @@ def test_as_the_reader_of_lines(write, monkeypatch, large, with_pandas, delimite
     path = write(text(delimiter, decimal, end))
     spectrum = read_spectrum(path)
     assert large()
-    np.testing.assert_array_equal(spectrum.wavelength, NM)
-    np.testing.assert_array_equal(spectrum.values, VALUES)
-    np.testing.assert_array_equal(spectrum.lines, np.arange(2, 502))
+    assert_read(spectrum, wavelength=NM, values=VALUES, lines=np.arange(2, 502))
     monkeypatch.setattr(bulk, "SMALLEST", np.inf)
     assert read_spectrum(path).notes == spectrum.notes
 

@@ -42,9 +42,8 @@ def test_the_covariance_is_the_spread_of_many_fits(given):
     assert one[0, 1] / np.sqrt(one[0, 0] * one[1, 1]) == pytest.approx(correlation, abs=0.15)
 
 
-def test_charts_that_give_no_matrix(tmp_path, refusal):
-    path = tmp_path / "chart.csv"
-    path.write_text("R,G,B\n1,2,3\n")
+def test_charts_that_give_no_matrix(write, refusal):
+    path = write("R,G,B\n1,2,3\n", "chart.csv")
     refusal(read_chart, path, DataError, "X, Y, Z of the reference")
     path.write_text("R,G,B,X,Y,Z\n" + ".1,.1,.1,.1,.1,.1\n" * 5)
     refusal(read_chart, path, DataError, "5 patches")

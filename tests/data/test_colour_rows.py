@@ -5,6 +5,7 @@ import pytest
 
 from pellicle.data.colour_rows import is_colour_table, read_colour_rows
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 RGB = np.array([[0.2, 0.41, 0.83], [0.5, 0.35, 0.11]])
 
@@ -32,8 +33,7 @@ def test_every_naming_and_scale(write, text, space, note):
     assert film.space == space
     np.testing.assert_allclose(film.values, RGB, atol=1e-9)
     assert note in " ".join(film.notes)
-    assert film.sigma is None
-    assert film.angle is None
+    assert_read(film, sigma=None, angle=None)
     assert is_colour_table(film.path)
 
 
@@ -49,8 +49,7 @@ def test_films_by_name_with_angles_and_sigmas(write):
     text = header + "0,one,50,1,-2,.1,.2,.3,7\n0,two,60,3,4,.1,.2,.3,7\n45,one,55,2,-9,.4,.5,.6,7\n"
     one, two = read_colour_rows(write(text))
     assert (one.name, two.name) == ("one", "two")
-    assert one.angle.tolist() == [0, 45]
-    assert one.values.tolist() == [[50, 1, -2], [55, 2, -9]]
+    assert_read(one, angle=[0, 45], values=[[50, 1, -2], [55, 2, -9]])
     assert one.sigma[1].tolist() == [0.4, 0.5, 0.6]
     assert one.lines.tolist() == [2, 4]
     assert two.space == "lab"

@@ -8,6 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 
 @pytest.fixture
@@ -22,9 +23,7 @@ AXES = ["XUNITS=1/CM", "X-Axis: cm-1", "Wavelength unit; 1/cm", '"x unit","cm^-1
 @pytest.mark.parametrize("quantity", ["YUNITS=ABSORBANCE", "Data mode: Abs", "Y-axis mode\tA"])
 def test_axis_and_absorbance_of_a_preamble(write, axis, quantity):
     spectrum = read_spectrum(write(f"{axis}\n{quantity}\n25000,1.0\n20000,0.5\n12500,0\n"))
-    assert spectrum.signal == "T"
-    np.testing.assert_allclose(spectrum.wavelength, [400, 500, 800], rtol=1e-15)
-    np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5, 1], rtol=1e-15)
+    assert_read(spectrum, signal="T", wavelength=[400, 500, 800], values=[0.1, 10**-0.5, 1])
     assert any("absorbance A, converted to T" in note for note in spectrum.notes)
 
 
@@ -61,8 +60,7 @@ def test_a_flag_against_a_declaration(write, refused, flags, parts):
 def test_log_of_the_inverse_reflectance(write):
     path = write("XUNITS=1/CM\nYUNITS=ABSORBANCE\n25000,1\n20000,0.5\n")
     spectrum = read_spectrum(path, columns="wavelength,log(1/R)", wavelength_unit="cm-1")
-    assert spectrum.signal == "R"
-    np.testing.assert_allclose(spectrum.values, [0.1, 10**-0.5])
+    assert_read(spectrum, signal="R", values=[0.1, 10**-0.5])
 
 
 def test_error_of_an_absorbance(write):
@@ -140,12 +138,10 @@ def test_facts(write):
         ("Polarizer: none\nIncident angle: 0\n", 0, "unpolarised"),
     ],
 )
-def test_declared_angle_and_polarisation(tmp_path, head, angle, polarisation):
-    path = tmp_path / "oblique.csv"
-    path.write_text(f"{head}nm;R\n400;0,5\n500;0,6\n", encoding="utf-8")
+def test_declared_angle_and_polarisation(write, head, angle, polarisation):
+    path = write(f"{head}nm;R\n400;0,5\n500;0,6\n", "oblique.csv")
     spectrum = read_spectrum(path)
-    np.testing.assert_array_equal(spectrum.angle, [angle, angle])
-    assert spectrum.polarisation == polarisation
+    assert_read(spectrum, polarisation=polarisation, angle=[angle, angle])
     assert any("as the file declares" in note for note in spectrum.notes)
     other = "s" if polarisation == "p" else "p"
     with pytest.raises(UsageError, match=f"declares {polarisation} light"):
@@ -153,17 +149,11 @@ def test_declared_angle_and_polarisation(tmp_path, head, angle, polarisation):
 
 
 @pytest.mark.parametrize("line", ["Angle: front", "Polarizer angle: 45", "Polarization: 30", "AOI: 120-140"])
-def test_what_declares_neither_angle_nor_polarisation(tmp_path, line):
-    path = tmp_path / "plain.csv"
-    path.write_text(f"{line}\nnm;R\n400;0,5\n500;0,6\n")
-    spectrum = read_spectrum(path)
-    assert spectrum.angle is None
-    assert spectrum.polarisation == "unpolarised"
+def test_what_declares_neither_angle_nor_polarisation(write, line):
+    path = write(f"{line}\nnm;R\n400;0,5\n500;0,6\n", "plain.csv")
+    assert_read(read_spectrum(path), angle=None, polarisation="unpolarised")
 
 
-def test_columns_of_angles_and_polarisation_hold_against_the_text_above(tmp_path):
-    path = tmp_path / "columns.csv"
-    path.write_text("Angle: 10\nPolarization: p\nnm;angle;Rs\n400;45;0,5\n500;45;0,6\n")
-    spectrum = read_spectrum(path)
-    np.testing.assert_array_equal(spectrum.angle, [45, 45])
-    assert spectrum.polarisation == "s"
+def test_columns_of_angles_and_polarisation_hold_against_the_text_above(write):
+    path = write("Angle: 10\nPolarization: p\nnm;angle;Rs\n400;45;0,5\n500;45;0,6\n", "columns.csv")
+    assert_read(read_spectrum(path), polarisation="s", angle=[45, 45])

@@ -35,9 +35,8 @@ def packed(*names: str) -> bytes:
         (b"# a film\n[data]\nsignal = 'R'\n\n[scene]\nsubstrate = 'Si'\n", "a recipe; give it as `recipe`"),
     ],
 )
-def test_what_is_none_is_named(content, said, refusal, tmp_path):
-    path = tmp_path / "film.dat"
-    path.write_bytes(content)
+def test_what_is_none_is_named(content, said, refusal, write):
+    path = write(content, "film.dat")
     refusal(read_spectrum, path, DataError, f"is {said}", signal="R")
 
 

@@ -6,6 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.optics.ellipsometry import alpha_beta
+from tests.data.comparison import assert_read
 
 NM = np.array([400.0, 500.0, 600.0])
 PSI = np.array([20.0, 45.0, 80.0])
@@ -22,19 +23,12 @@ def seen(analyser):
 @pytest.mark.parametrize("header", ["wl,alpha,beta,analyser", "nm,α,β,Analyzer (deg)"])
 def test_alpha_and_beta_with_their_analyser(write_columns, header):
     spectrum = read_spectrum(write_columns(header, NM, *seen(ANALYSER), ANALYSER))
-    assert spectrum.signal == "psi-delta"
-    assert spectrum.folded
-    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
-    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
-    assert spectrum.sigma is None
+    assert_read(spectrum, signal="psi-delta", folded=True, sigma=None, values=PSI, delta=DELTA)
 
 
 def test_one_analyser_for_all(write_columns):
     path = write_columns("wl,aoi,alpha,beta", NM, np.full(3, 70.0), *seen(30.0))
-    spectrum = read_spectrum(path, analyser=30.0)
-    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
-    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
-    assert spectrum.angle.tolist() == [70.0] * 3
+    assert_read(read_spectrum(path, analyser=30.0), values=PSI, delta=DELTA, angle=[70.0] * 3)
 
 
 def test_noise_may_take_the_contrast_above_one(write_columns):
@@ -51,8 +45,7 @@ def test_a_folded_delta(write_columns):
     path = write_columns("wl,psi,delta", NM, PSI, DELTA)
     assert not read_spectrum(path).folded
     spectrum = read_spectrum(path, folded=True)
-    assert spectrum.folded
-    assert spectrum.delta.tolist() == DELTA.tolist()
+    assert_read(spectrum, folded=True, delta=DELTA)
     assert "delta is known in 0 to 180 only: cos(delta) is fitted" in spectrum.notes
 
 

@@ -9,6 +9,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.signals.folded_delta import can_be_folded, kinks
+from tests.data.comparison import assert_read
 
 NM = np.arange(300.0, 900.5, 2.0)
 
@@ -69,8 +70,7 @@ def test_a_spectrum(angle):
     assert "at 601 nm: taken as folded" in note
     assert "give `folded=False`" in note
     stated = pl.Spectrum(NM, psi, "psi-delta", folded=False, delta=delta, angle=angles)
-    assert stated.folded is False
-    assert not stated.notes
+    assert_read(stated, folded=False, notes=())
     whole = pl.Spectrum(NM, psi, "psi-delta", delta=180 + (NM - 601) / 3, angle=angles)
     assert whole.folded is False
     assert taken.cut(700, 900).folded is True  # where nothing shows it any more

@@ -8,6 +8,7 @@ from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, delta_sigma
+from tests.data.comparison import assert_read
 
 SIGNAL = "generalised-psi-delta"
 
@@ -25,10 +26,8 @@ def write(write_columns):
 
 def test_each_ratio_has_psi_and_delta(write):
     spectrum = read_spectrum(write(f"wavelength_nm,{NAMES},angle", *COLUMNS, 65.0))
-    assert spectrum.signal == SIGNAL
-    assert spectrum.ratios == RATIOS
-    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-8)
-    np.testing.assert_allclose(spectrum.delta, DELTA % 360, rtol=1e-8)
+    assert_read(spectrum, signal=SIGNAL, ratios=RATIOS)
+    assert_read(spectrum, rtol=1e-8, values=PSI, delta=DELTA % 360)
     assert spectrum.sigma is spectrum.delta_sigma is None
 
 

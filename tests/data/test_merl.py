@@ -8,6 +8,7 @@ import pytest
 from pellicle.data.half_angles import angles, from_half_difference, vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 SHAPE = (90, 90, 180)
 CELLS = 90 * 90 * 180
@@ -55,8 +56,7 @@ def numbered(tmp_path_factory):
 
 def test_each_value_has_the_directions_of_its_cell(numbered):
     read = read_brdf_samples(numbered, samples=2000)
-    assert read.channels == ("R", "G", "B")
-    np.testing.assert_allclose(read.values, read.values[:, :1] * [1, 2, 3], rtol=1e-12)
+    assert_read(read, channels=("R", "G", "B"), values=read.values[:, :1] * [1, 2, 3])
     number = np.round(read.values[:, 0]).astype(int)
     assert np.unique(number).size == len(read) == 2000
     expected = np.stack(np.unravel_index(number, SHAPE), axis=1)

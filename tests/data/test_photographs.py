@@ -14,6 +14,7 @@ from pellicle.data.photographs import (
     strip,
 )
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)
 
@@ -52,8 +53,7 @@ def test_pixels_of_every_layout(tmp_path, layout):
     path = LAYOUTS[layout](tmp_path)
     photograph = read_photograph(path)
     np.testing.assert_allclose(photograph.pixels, PIXELS / 255, atol=1e-7)
-    assert photograph.size == (20, 12)
-    assert photograph.profile == ""
+    assert_read(photograph, size=(20, 12), profile="")
     assert photograph.step == pytest.approx({"16 bits": 1 / 65535, "float": 1 / 65535}.get(layout, 1 / 255))
 
 

@@ -9,6 +9,7 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 NAMES = {
     "nm": "wavelength (nm)",
@@ -62,8 +63,7 @@ def test_round_trip(path, spectrum, separator, unit, percent, falling, header, c
     path.write_text(newline.join(names + rows) + newline, newline="")
     flags = {} if header else {"wavelength_unit": unit, "signal_unit": "percent" if percent else "fraction"}
     read = read_spectrum(path, signal="R", **flags)
-    np.testing.assert_allclose(read.wavelength, wavelength, rtol=1e-14)
-    np.testing.assert_allclose(read.values, values, rtol=1e-14)
+    assert_read(read, wavelength=wavelength, values=values)
     first = 1 + len(names)
     expected = np.arange(first, first + len(rows))
     np.testing.assert_array_equal(read.lines, expected[::-1] if falling else expected)

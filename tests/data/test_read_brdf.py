@@ -12,6 +12,7 @@ from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 HEADER = "theta_i,phi_i,theta_o,phi_o,R,G,B\n"
 ROW = "30,0,40,180,0.1,0.2,0.3\n"
@@ -65,8 +66,7 @@ def test_a_csv_says_what_was_read(write):
         "theta_i_deg;phi_i;theta_o (deg);phi_o;R (1/sr);G;B;value_cos;sigma\n30;0;40;180;1;2;3;9;0.5\n"
     )
     read = pl.read_brdf_samples(path)
-    np.testing.assert_array_equal(read.values, [[1, 2, 3]])
-    np.testing.assert_array_equal(read.sigma, [[0.5, 0.5, 0.5]])
+    assert_read(read, values=[[1, 2, 3]], sigma=[[0.5, 0.5, 0.5]])
     assert (read.theta_o[0], read.phi_o[0], read.lines[0]) == (40, 180, 2)
     assert "ignored: 'value_cos'" in read.notes
     assert str(read) == f"{path}: 1 samples of R, G, B"
@@ -76,8 +76,7 @@ def test_a_csv_says_what_was_read(write):
 def test_columns_by_flag_and_by_comment(write):
     path = write("30 0 7 40 180 0.1\n31 0 7 41 180 0.2\n")
     read = read_brdf_samples(path, columns="theta_i,phi_i,_,theta_o,phi_o,value")
-    np.testing.assert_array_equal(read.theta_o, [40, 41])
-    assert read.channels == ("value",)
+    assert_read(read, channels=("value",), theta_o=[40, 41])
     read = read_brdf_samples(write("# theta_i phi_i theta_o phi_o value\n30 0 40 180 0.1\n"))
     np.testing.assert_array_equal(read.values, [[0.1]])
 

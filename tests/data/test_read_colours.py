@@ -9,6 +9,7 @@ from PIL import Image, ImageCms
 import pellicle as pl
 from pellicle.data.read_colours import read_colours, read_colours_by_film
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 RNG = np.random.default_rng(3)
 PIXELS = RNG.integers(20, 200, (20, 30, 3), dtype=np.uint8)
@@ -42,8 +43,7 @@ def test_the_mean_of_a_region_is_that_of_linear_light(photo):
     assert abs(film.values[0] - inside.mean(axis=0) / 255).max() > 0.02  # it is not the mean of the codes
     rounding = 1 / 255 / np.sqrt(12)
     np.testing.assert_allclose(film.sigma[0], np.hypot(inside.std(axis=0, ddof=1) / 255, rounding), rtol=1e-5)
-    assert film.angle.tolist() == [45.0]
-    assert film.space == "srgb"
+    assert_read(film, angle=[45.0], space="srgb")
     assert "80 pixels in linear light" in " ".join(film.notes)
     assert "observer 1931 under D65" in film.notes
 
@@ -62,8 +62,7 @@ def test_division_by_a_white_in_linear_light(photo):
     inside = (pixels[8:13, 8:13].reshape(-1, 3) / 255.0) ** 2.2
     expected = (inside.mean(axis=0) / (WHITE / 255.0) ** 2.2) ** (1 / 2.2)
     np.testing.assert_allclose(film.values[0], expected, atol=1e-5)
-    assert film.sigma.tolist() == [[0.01] * 3]
-    assert film.gamma == 2.2
+    assert_read(film, sigma=[[0.01] * 3], gamma=2.2)
 
 
 def test_regions_are_films_or_angles_of_one(photo):
@@ -71,8 +70,7 @@ def test_regions_are_films_or_angles_of_one(photo):
     one, two = read_colours_by_film(path, points="10,10;20,15")
     assert (one.name, two.name) == ("8,8,5,5", "18,13,5,5")
     both = read_colours(path, points="10,10;20,15", angle=[0, 60])
-    assert both.angle.tolist() == [0, 60]
-    np.testing.assert_allclose(both.values, np.concatenate([one.values, two.values]))
+    assert_read(both, angle=[0, 60], values=np.concatenate([one.values, two.values]))
     assert read_colours(path, points="10,10;20,15", name="18,13,5,5").values.tolist() == two.values.tolist()
     with pytest.raises(UsageError, match="2 films"):
         read_colours(path, points="10,10;20,15")

@@ -6,6 +6,7 @@ import pytest
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 GRID = np.array([400.0, 500.0, 600.0, 700.0, 800.0])
 
@@ -16,19 +17,16 @@ def counts(values, wavelength=GRID, path="counts.csv"):
     )
 
 
-def test_counts_of_any_name_and_any_value(tmp_path):
-    path = tmp_path / "raw.csv"
-    path.write_text("wavelength_nm,counts_ratio_percent\n400,-370.6\n500,6700\n600,1\n")
+def test_counts_of_any_name_and_any_value(write):
+    path = write("wavelength_nm,counts_ratio_percent\n400,-370.6\n500,6700\n600,1\n", "raw.csv")
     read = read_counts(path)
-    assert (read.signal, read.calibrated) == ("counts", False)
-    np.testing.assert_array_equal(read.values, [-370.6, 6700, 1])
+    assert_read(read, signal="counts", calibrated=False, values=[-370.6, 6700, 1])
     path.write_text("400 -370.6\n500 6700\n600 1\n")
     np.testing.assert_array_equal(read_counts(path).values, read.values)
 
 
-def test_counts_of_several_columns_are_ambiguous(tmp_path):
-    path = tmp_path / "raw.csv"
-    path.write_text("wavelength,lamp,sample\n400,1,2\n500,1,2\n")
+def test_counts_of_several_columns_are_ambiguous(write):
+    path = write("wavelength,lamp,sample\n400,1,2\n500,1,2\n", "raw.csv")
     with pytest.raises(UsageError, match=r"raw\.csv.*'lamp', 'sample'.*`columns=\["):
         read_counts(path)
     assert read_counts(path, columns="wavelength,_,counts").values[0] == 2
@@ -40,9 +38,7 @@ def test_quotient_of_counts_less_the_dark():
     lamp, dark = np.array([50.0, 200, 400, 300, 90]), np.array([5.0, 6, 7, 6, 5])
     sample = counts(lamp * truth + dark, path="film.csv")
     spectrum = reflectance_from_counts(sample, counts(lamp * known + dark), known, counts(dark), noise=0.01)
-    np.testing.assert_allclose(spectrum.values, truth, rtol=1e-13)
-    np.testing.assert_array_equal(spectrum.sigma, 0.01)
-    assert (spectrum.signal, spectrum.calibrated, spectrum.path) == ("R", True, "film.csv")
+    assert_read(spectrum, values=truth, sigma=0.01, signal="R", calibrated=True, path="film.csv")
     assert any("counts.csv" in note for note in spectrum.notes)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 NM = np.array([400.0, 500.0, 600.0])
 PSI = np.array([20.0, 25.5, 31.0])
@@ -26,12 +27,10 @@ def rows(*columns, separator=","):
 
 
 def assert_film(spectrum):
-    assert spectrum.signal == "psi-delta"
-    assert spectrum.calibrated
-    assert spectrum.polarisation == "unpolarised"
-    np.testing.assert_allclose(spectrum.wavelength, NM, rtol=1e-11)
-    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-12)
-    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-12)
+    assert_read(
+        spectrum, rtol=1e-11, signal="psi-delta", calibrated=True, polarisation="unpolarised", wavelength=NM
+    )
+    assert_read(spectrum, values=PSI, delta=DELTA)
 
 
 @pytest.mark.parametrize(
@@ -41,8 +40,7 @@ def test_names(write, header):
     spectrum = read_spectrum(write(f"{header}\n{rows(NM, PSI, DELTA)}"))
     assert_film(spectrum)
     assert spectrum.angle is None  # then it is for the fit to ask
-    assert spectrum.sigma is None
-    assert spectrum.delta_sigma is None
+    assert_read(spectrum, sigma=None, delta_sigma=None)
     assert "psi and delta in degrees" in spectrum.notes
 
 
@@ -64,11 +62,9 @@ def test_errors_of_both(write):
     ):
         spectrum = read_spectrum(path)
         assert_film(spectrum)
-        np.testing.assert_array_equal(spectrum.sigma, [0.1, 0.2, 0.3])
-        np.testing.assert_array_equal(spectrum.delta_sigma, [1, 2, 3])
+        assert_read(spectrum, sigma=[0.1, 0.2, 0.3], delta_sigma=[1, 2, 3])
     spectrum = read_spectrum(path, noise=0.05)
-    np.testing.assert_array_equal(spectrum.sigma, [0.05] * 3)
-    np.testing.assert_array_equal(spectrum.delta_sigma, [0.05] * 3)
+    assert_read(spectrum, sigma=[0.05] * 3, delta_sigma=[0.05] * 3)
     assert "the given noise replaces the columns of errors" in spectrum.notes
 
 
@@ -94,8 +90,7 @@ def test_everything_is_sorted_and_cut_together(write):
 
 def test_one_wavelength_at_many_angles(write):
     spectrum = read_spectrum(write("wl,aoi,psi,delta\n658,70,10,160\n658,60,23,172\n658,50,31,176\n"))
-    np.testing.assert_array_equal(spectrum.angle, [50, 60, 70])
-    np.testing.assert_array_equal(spectrum.values, [31, 23, 10])
+    assert_read(spectrum, angle=[50, 60, 70], values=[31, 23, 10])
     assert str(spectrum).endswith("3 points of psi-delta, 658 nm")
 
 
@@ -103,8 +98,7 @@ def test_ncs_are_turned_into_psi_and_delta(write):
     psi, delta = np.deg2rad(2 * PSI), np.deg2rad(DELTA)
     n, c, s = 0.99 * np.array([np.cos(psi), np.sin(psi) * np.cos(delta), np.sin(psi) * np.sin(delta)])
     spectrum = read_spectrum(write(f"wavelength,N,C,S\n{rows(NM, n, c, s)}"))
-    np.testing.assert_allclose(spectrum.values, PSI, rtol=1e-9)
-    np.testing.assert_allclose(spectrum.delta, DELTA, rtol=1e-9)
+    assert_read(spectrum, rtol=1e-9, values=PSI, delta=DELTA)
     assert any("1 - N² - C² - S² read as the depolarisation" in note for note in spectrum.notes)
     np.testing.assert_allclose(spectrum.depolarisation, 1 - 0.99**2, rtol=1e-9)
 
@@ -230,8 +224,7 @@ def test_depolarisation(write, names, size):
     text = f"wl,psi,delta,{names}\n{rows(NM, PSI, DELTA, size * SHARE, size * SHARE**2)}"
     spectrum = read_spectrum(write(text))
     assert_film(spectrum)
-    np.testing.assert_allclose(spectrum.depolarisation, SHARE, rtol=1e-12)
-    np.testing.assert_allclose(spectrum.depolarisation_sigma, SHARE**2, rtol=1e-12)
+    assert_read(spectrum, depolarisation=SHARE, depolarisation_sigma=SHARE**2)
     unit = "in percent" if size == 100 else "a fraction"
     name = names.split(",")[0]
     assert f"'{name}' read as the depolarisation, {unit}" in spectrum.notes
@@ -264,12 +257,10 @@ def test_what_is_no_depolarisation(write, refused, names, cells, said):
 @pytest.mark.parametrize(
     "header", ["wavelength_nm,tan_psi,cos_delta", "lambda (nm),tan(psi),cos(delta)", "nm,TanPsi,CosDelta"]
 )
-def test_tan_psi_and_cos_delta(tmp_path, header):
-    path = tmp_path / "tan_cos.csv"
-    path.write_text(f"{header}\n500,1,0.5\n600,0.5773502691896258,-0.5\n700,0.5,1.04\n")
+def test_tan_psi_and_cos_delta(write, header):
+    path = write(f"{header}\n500,1,0.5\n600,0.5773502691896258,-0.5\n700,0.5,1.04\n", "tan_cos.csv")
     spectrum = read_spectrum(path)
-    assert spectrum.folded
-    np.testing.assert_allclose(spectrum.values, [45, 30, np.rad2deg(np.arctan(0.5))])
+    assert_read(spectrum, folded=True, values=[45, 30, np.rad2deg(np.arctan(0.5))])
     np.testing.assert_allclose(spectrum.delta, [60, 120, 0], atol=1e-12)
     assert any("delta is 0 or 180 at 1 points" in note for note in spectrum.notes)
     path.write_text(f"{header}\n500,1,0.5\n600,0.5,-1.06\n")
@@ -279,9 +270,8 @@ def test_tan_psi_and_cos_delta(tmp_path, header):
 
 @pytest.mark.parametrize("header", ["eV,Is,Ic", "nm,re(rho),im(rho)"])
 @pytest.mark.parametrize("words", [{}, {"signal": "R"}])
-def test_other_quantities_of_ellipsometers_are_named(tmp_path, header, words):
-    path = tmp_path / "other.csv"
-    path.write_text(f"{header}\n2,0.1,0.2\n3,0.3,0.4\n")
+def test_other_quantities_of_ellipsometers_are_named(write, header, words):
+    path = write(f"{header}\n2,0.1,0.2\n3,0.3,0.4\n", "other.csv")
     first, second = header.split(",")[1:]
     with pytest.raises(
         DataError, match=f"'{re.escape(first)}', '{re.escape(second)}' are neither .* psi and delta"

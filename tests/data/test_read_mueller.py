@@ -6,6 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 NM = np.linspace(400.0, 800.0, 6)
 M12, M33, M34 = np.linspace(-0.9, 0.8, 6), np.linspace(0.3, -0.4, 6), np.linspace(0.1, 0.5, 6)
@@ -19,8 +20,7 @@ def write(write_columns):
 @pytest.mark.parametrize("names", ["m12,m33,m34", "M12,M33,M34", "mm12,mm33,mm34", "m_12,M_33,m_{34}"])
 def test_names_of_elements(write, names):
     spectrum = read_spectrum(write(f"wavelength_nm,{names},angle", M12, M33, M34, 65.0))
-    assert spectrum.signal == "mueller"
-    assert spectrum.elements == ("m12", "m33", "m34")
+    assert_read(spectrum, signal="mueller", elements=("m12", "m33", "m34"))
     np.testing.assert_allclose(spectrum.values, np.stack([M12, M33, M34], axis=1), rtol=1e-8)
     assert np.all(spectrum.angle == 65)
 

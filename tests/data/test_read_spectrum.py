@@ -7,6 +7,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
+from tests.data.comparison import assert_read
 
 WAVELENGTH = [400.0, 450.5, 500.0, 600.0, 700.0, 800.0]
 VALUES = [0.1, 0.25, 0.3, 0.35, 0.2, 0.15]
@@ -17,8 +18,7 @@ def rows(separator=",", scale=1.0):
 
 
 def assert_film(spectrum):
-    np.testing.assert_array_equal(spectrum.wavelength, WAVELENGTH)
-    np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
+    assert_read(spectrum, wavelength=WAVELENGTH, values=VALUES)
 
 
 @pytest.mark.parametrize("quotes_in_header", [True, False])
@@ -36,19 +36,15 @@ def test_decimal_commas_in_quotes(write, quotes_in_header):
 
 def test_line_ends_of_windows_and_comments_keep_their_line_numbers(write):
     text = "# a film\r\nwavelength,R\r\n\r\n400,0.1 # lamp\r\n# gap\r\n500,0.2\r\n"
-    spectrum = read_spectrum(write(text))
-    np.testing.assert_array_equal(spectrum.lines, [4, 6])
-    np.testing.assert_array_equal(spectrum.values, [0.1, 0.2])
+    assert_read(read_spectrum(write(text)), lines=[4, 6], values=[0.1, 0.2])
 
 
 def test_what_a_spectrum_carries(write):
     path = write("wavelength,R\n" + rows())
     spectrum = read_spectrum(path)
-    assert spectrum.path == str(path)
-    assert spectrum.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert_read(spectrum, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
     assert (spectrum.signal, spectrum.polarisation, spectrum.calibrated) == ("R", "unpolarised", True)
-    assert spectrum.sigma is None
-    assert spectrum.angle is None
+    assert_read(spectrum, sigma=None, angle=None)
     assert len(spectrum) == 6
     assert spectrum.wavelength.dtype == spectrum.values.dtype == np.float64
     assert "6 points of R, 400 to 800 nm" in str(spectrum)
@@ -103,8 +99,7 @@ def test_sigma_is_in_the_unit_of_the_signal_unless_it_says_its_own(write):
 def test_columns_flag_overrides_the_header(write):
     path = write("a,b,c,d\n1,0.1,400,9\n2,0.2,500,9\n")
     spectrum = read_spectrum(path, columns="_,R,wavelength")
-    np.testing.assert_array_equal(spectrum.wavelength, [400, 500])
-    np.testing.assert_array_equal(spectrum.values, [0.1, 0.2])
+    assert_read(spectrum, wavelength=[400, 500], values=[0.1, 0.2])
     again = read_spectrum(path, columns=["_", "R", "wavelength"])
     np.testing.assert_array_equal(again.values, spectrum.values)
 
@@ -142,9 +137,7 @@ def test_an_angle_per_row(write):
 
 def test_uncalibrated_values_may_be_anything(write):
     path = write("wavelength,intensity\n400,-3\n500,20\n600,40\n")
-    spectrum = read_spectrum(path, signal="R")
-    assert not spectrum.calibrated
-    np.testing.assert_array_equal(spectrum.values, [-3, 20, 40])
+    assert_read(read_spectrum(path, signal="R"), calibrated=False, values=[-3, 20, 40])
     assert not read_spectrum(write("wl,R\n400,3\n500,4\n"), calibrated=False).calibrated
 
 

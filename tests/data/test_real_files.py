@@ -6,6 +6,7 @@ import pytest
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 CALIBRATED = {
     "regresspro_filmetrics_F20/quartz_reflectance.csv": ("R", 1341),
@@ -24,8 +25,7 @@ def test_calibrated_spectra(shared_data, name):
     assert (spectrum.signal, len(spectrum)) == CALIBRATED[name]
     assert spectrum.calibrated
     expected = np.loadtxt(shared_data / name, delimiter=",", skiprows=1, usecols=(0, 1))
-    np.testing.assert_array_equal(spectrum.wavelength, expected[:, 0])
-    np.testing.assert_array_equal(spectrum.values, expected[:, 1])
+    assert_read(spectrum, wavelength=expected[:, 0], values=expected[:, 1])
 
 
 def test_a_column_that_only_looks_like_sigma_is_ignored_and_said(shared_data):

@@ -31,9 +31,8 @@ ORDERS = {
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_the_mean_of_complete_sweeps(tmp_path, order):
-    path = tmp_path / "film.csv"
-    path.write_text("wavelength_nm,R\n" + ORDERS[order])
+def test_the_mean_of_complete_sweeps(write, order):
+    path = write("wavelength_nm,R\n" + ORDERS[order])
     found = pl.read_spectrum(path)
     np.testing.assert_array_equal(found.wavelength, NM)
     np.testing.assert_allclose(found.values, SWEEPS.mean(axis=0), atol=1e-9)
@@ -62,10 +61,9 @@ def test_standard_deviations_and_ranges_follow(tmp_path):
     assert [len(sweep) for sweep in again.sweeps] == [6, 6]
 
 
-def test_copies_are_left_out(tmp_path):
+def test_copies_are_left_out(write):
     """An export that holds one sweep twice is no better known for it."""
-    path = tmp_path / "film.csv"
-    path.write_text("wavelength_nm,R\n" + UP[0] + UP[0])
+    path = write("wavelength_nm,R\n" + UP[0] + UP[0])
     found = pl.read_spectrum(path, noise=0.004)
     assert found.sweeps == ()
     assert found.sigma is not None
@@ -118,9 +116,8 @@ def test_repeatability_of_psi_and_delta_is_that_of_psi():
     ],
     ids=["incomplete", "disorder", "short", "different"],
 )
-def test_other_repetitions_are_refused(tmp_path, text, words):
-    path = tmp_path / "film.csv"
-    path.write_text("wavelength_nm,R\n" + text)
+def test_other_repetitions_are_refused(write, text, words):
+    path = write("wavelength_nm,R\n" + text)
     with pytest.raises(DataError) as caught:
         pl.read_spectrum(path)
     assert [word for word in words if word not in str(caught.value)] == []
@@ -145,9 +142,10 @@ def test_noise_is_no_difference(tmp_path):
     assert drift.notes[-1].endswith("the sweeps drift")
 
 
-def test_sweeps_of_raw_counts(tmp_path):
-    path = tmp_path / "counts.csv"
-    path.write_text("wavelength_nm,counts\n" + rows(NM, 1000 * SWEEPS[0]) + rows(NM, 1000 * SWEEPS[1]))
+def test_sweeps_of_raw_counts(write):
+    path = write(
+        "wavelength_nm,counts\n" + rows(NM, 1000 * SWEEPS[0]) + rows(NM, 1000 * SWEEPS[1]), "counts.csv"
+    )
     reference = pl.Spectrum(NM, np.full(NM.size, 2000.0), "counts")
     found = reflectance_from_counts(read_counts(path), reference, np.full(NM.size, 0.5), noise=0.002)
     np.testing.assert_allclose(found.values, 0.25 * SWEEPS[:2].mean(axis=0), atol=1e-9)

@@ -8,6 +8,7 @@ from pellicle.data.settings import named, setting_numbers, settings
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError
+from tests.data.comparison import assert_read
 
 NM = np.tile(np.linspace(400.0, 800.0, 6), 4)
 ANGLE = np.repeat([60.0, 60.0, 70.0, 70.0], 6)
@@ -37,8 +38,7 @@ def test_several_azimuths_are_one_measurement(write_columns, names, tmp_path):
         own = spectrum.values.reshape(24, -1)[setting.rows, 0]
         np.testing.assert_allclose(own, SIGNALS[names][0][rows], rtol=1e-8)
     back = read_spectrum(write_spectrum(tmp_path / "again.csv", spectrum))
-    np.testing.assert_array_equal(back.values, spectrum.values)
-    np.testing.assert_array_equal(back.azimuth, spectrum.azimuth)
+    assert_read(back, values=spectrum.values, azimuth=spectrum.azimuth)
 
 
 def test_repeats_at_each_azimuth_are_averaged(write_columns):

@@ -69,8 +69,7 @@ def test_delimiters_decimals_and_quotes(tmp_path_factory, rows, delimiter, comma
         np.testing.assert_array_equal(own, other)
 
 
-def test_a_first_row_that_is_faulty_is_not_text_below_the_rows(tmp_path):
-    path = tmp_path / "faulty.dat"
-    path.write_text("SE # BETA\n\nAOI 71.5\nSE 241.5 +0.5 0.43\nSE 240.5 0 -.5\n")
+def test_a_first_row_that_is_faulty_is_not_text_below_the_rows(write):
+    path = write("SE # BETA\n\nAOI 71.5\nSE 241.5 +0.5 0.43\nSE 240.5 0 -.5\n", "faulty.dat")
     with pytest.raises(DataError, match=r"line 4, column 1: expected a number.*'SE'"):
         read_spectrum(path, signal="R")

@@ -166,10 +166,9 @@ thickness = 100.0
 """
 
 
-def test_a_recipe(tmp_path):
+def test_a_recipe(write):
     def substrate(back: str, signal: str = "R") -> pl.Substrate:
-        path = tmp_path / "film.toml"
-        path.write_text(RECIPE.format(signal=signal, back=back))
+        path = write(RECIPE.format(signal=signal, back=back), "film.toml")
         return read_recipe(path).scene().substrate
 
     some = substrate(

@@ -28,10 +28,9 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def start(cube, scene, fake_fits, tmp_path):
+def start(cube, scene, fake_fits, tmp_path, write):
     """Starts a process that maps the cube into a store, 20 ms a block."""
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
+    program = write(PROGRAM, "program.py")
 
     def start(store, workers=1):
         fake_fits.save(tmp_path / "job", (cube, scene, store, workers))

@@ -251,15 +251,15 @@ def test_layers_that_make_no_sense(refused, layer, said):
     refused(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\n{layer}\n', said)
 
 
-def test_a_file_has_its_own_words(tmp_path):
+def test_a_file_has_its_own_words(tmp_path, write):
     """What a file does not say is that of the recipe; `back = false` makes the plate a half space."""
-    path = tmp_path / "film.toml"
-    path.write_text(
+    path = write(
         "[data]\nangle = 10.0\nnoise = 0.01\n[[data.file]]\npath = 'r.csv'\n"
         "[[data.file]]\npath = 'e.csv'\nsignal = 'psi-delta'\nangle = 70.0\nback = false\n"
         "instrument = { bandwidth = 2.0, scale = 1.0 }\n"
         "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 2.0 }\n"
-        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n"
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n",
+        "film.toml",
     )
     found = read_recipe(path)
     assert found.files == [str(tmp_path / name) for name in ("r.csv", "e.csv")]
@@ -273,12 +273,12 @@ def test_a_file_has_its_own_words(tmp_path):
     assert second.scene().substrate.plate_mm == 2.0
 
 
-def test_how_files_are_read(tmp_path):
+def test_how_files_are_read(write):
     """The words of the flags, of all files or of one."""
-    path = tmp_path / "film.toml"
-    path.write_text(
+    path = write(
         "[data]\ncolumns = 'wavelength,R,_'\nwavelength_unit = 'µm'\n[[data.file]]\npath = 'a.csv'\n"
-        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE
+        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE,
+        "film.toml",
     )
     first, second = (found.tables.data for found in read_recipe(path).each)
     assert (first.columns, second.columns) == ("wavelength,R,_", ["energy", "T"])

@@ -57,11 +57,10 @@ def test_impossible_indices(text):
         media_words.medium(text)
 
 
-def test_names_and_tables(tmp_path):
+def test_names_and_tables(write):
     np.testing.assert_allclose(media_words.medium("SiO2")(np.array([633.0])), 1.457, atol=1e-3)
     np.testing.assert_allclose(media_words.medium("air")(AT), 1.0)
-    table = tmp_path / "resin.csv"
-    table.write_text("wavelength_nm,n,k\n400,1.6,0.02\n600,1.5,0.0\n900,1.5,0.0\n")
+    table = write("wavelength_nm,n,k\n400,1.6,0.02\n600,1.5,0.0\n900,1.5,0.0\n", "resin.csv")
     np.testing.assert_allclose(
         media_words.medium(str(table))(np.array([400.0, 500.0])), [1.6 + 0.02j, 1.55 + 0.01j]
     )

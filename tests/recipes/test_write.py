@@ -98,11 +98,10 @@ def test_medium_reads_back(name, tmp_path):
     assert recipe_text(eval(python_text(scene), {"pl": pl}), tmp_path) == path.read_text()
 
 
-def test_several_angles_read_back(tmp_path):
+def test_several_angles_read_back(tmp_path, write):
     light = pl.Light(angle=[65, 70, 75], signal="psi-delta", azimuth=[0, 45])
     scene = pl.Scene(pl.Layer("SiO2", 100.0), "Si", light=light)
-    path = tmp_path / "film.toml"
-    path.write_text(recipe_text(scene, tmp_path, wavelength=np.array([400.0, 500.0, 633.0])))
+    path = write(recipe_text(scene, tmp_path, wavelength=np.array([400.0, 500.0, 633.0])), "film.toml")
     recipe = pl.read_recipe(path)
     assert eqx.tree_equal(recipe.scene(), scene)
     seen, nm = measured_scene(recipe)

@@ -33,12 +33,11 @@ def birefringent(fit, with_part):
     return with_part(fit, curve=curve)
 
 
-def test_each_principal_index_is_a_material(birefringent, tmp_path):
+def test_each_principal_index_is_a_material(birefringent, tmp_path, write):
     tables = nk_csvs(birefringent)
     assert list(tables) == ["nk_ordinary.csv", "nk_extraordinary.csv"]
     for name, n in (("nk_ordinary.csv", 1.33), ("nk_extraordinary.csv", 1.48)):
-        path = tmp_path / name
-        path.write_text(tables[name], encoding="utf-8")
+        path = write(tables[name], name)
         np.testing.assert_allclose(np.real(material(str(path))(NM)), n + 1e-4 * (NM - 400.0), rtol=1e-9)
     frame = pd.read_csv(tmp_path / "nk_extraordinary.csv", comment="#")
     np.testing.assert_allclose(frame["birefringence"], np.linspace(0.15, 0.19, 41))

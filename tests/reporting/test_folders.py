@@ -158,9 +158,8 @@ def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
     assert (tmp_path / name).read_text() == "mine"
 
 
-def test_fit_csv_says_what_it_is_and_is_read_again(fit, tmp_path):
-    path = tmp_path / "fit.csv"
-    path.write_text(fit_csv(fit), encoding="utf-8")
+def test_fit_csv_says_what_it_is_and_is_read_again(fit, write):
+    path = write(fit_csv(fit), "fit.csv")
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
     assert any("/data/film.csv" in line and "ab" * 32 in line for line in comments)
     assert any("pellicle 0." in line for line in comments)
@@ -187,9 +186,8 @@ def test_uncalibrated_data_at_angles_are_read_again_as_such(fit, with_part, tmp_
     np.testing.assert_array_equal(again.angle, 30.0)
 
 
-def test_nk_csv_is_a_material(fit, tmp_path):
-    path = tmp_path / "nk.csv"
-    path.write_text(nk_csvs(fit)["nk.csv"], encoding="utf-8")
+def test_nk_csv_is_a_material(fit, write):
+    path = write(nk_csvs(fit)["nk.csv"], "nk.csv")
     frame = pd.read_csv(path, comment="#")
     assert list(frame) == ["wavelength_nm", "n", "k", "n_stderr", "k_stderr"]
     assert frame["k_stderr"].isna().sum() == 20  # infinite below 600 nm

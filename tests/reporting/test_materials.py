@@ -36,9 +36,8 @@ def test_a_description_gives_page_reason_citation_and_the_other_pages():
         describe("unobtainium")
 
 
-def test_a_file_is_described_as_it_was_understood(tmp_path):
-    path = tmp_path / "si.mat"
-    path.write_text("Silicon of 1992\nmicrons\nNK\n0.5 4.4 0.05\n0.7 3.8 0.01\n")
+def test_a_file_is_described_as_it_was_understood(write):
+    path = write("Silicon of 1992\nmicrons\nNK\n0.5 4.4 0.05\n0.7 3.8 0.01\n", "si.mat")
     text = describe(str(path))
     for words in (
         "WVASE",
@@ -48,8 +47,7 @@ def test_a_file_is_described_as_it_was_understood(tmp_path):
         "n = 4.1321, k = 0.03214 at 589.3 nm",
     ):
         assert words in text
-    path = tmp_path / "si.txt"
-    path.write_text("500 4.3 0.05\n700 3.8 0.01\n")
+    path = write("500 4.3 0.05\n700 3.8 0.01\n", "si.txt")
     assert "read as nm" in describe(str(path))
 
 

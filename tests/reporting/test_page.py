@@ -152,9 +152,8 @@ def test_a_figure_of_many_points_is_thinned_and_says_so(fit, with_part):
     assert len(text.encode()) < 5_000_000
 
 
-def test_the_page_has_what_repeats_the_fit(fit, tmp_path):
-    recipe = tmp_path / "film.toml"
-    recipe.write_text('[data]\nsignal = "R"\n')
+def test_the_page_has_what_repeats_the_fit(fit, write):
+    recipe = write('[data]\nsignal = "R"\n', "film.toml")
     again = dict(repetition(fit, {"recipe": str(recipe), "reading": {"range": (400.0, 900.0)}}))
     assert again["Command"].endswith("--range 400.0:900.0")
     assert again["Recipe film.toml"] == '[data]\nsignal = "R"\n'

@@ -88,9 +88,8 @@ def test_a_chain_of_other_walkers_is_refused(bands, film, kept):
         pl.sample(bands(), film(), walkers=40, chain=kept)
 
 
-def test_what_is_no_chain_is_refused(bands, film, tmp_path):
-    path = tmp_path / "chain.h5"
-    path.write_text("notes of mine")
+def test_what_is_no_chain_is_refused(bands, film, write):
+    path = write("notes of mine", "chain.h5")
     with pytest.raises(DataError, match="is no chain that pellicle wrote"):
         pl.sample(bands(), film(), chain=path)
     assert path.read_text() == "notes of mine"

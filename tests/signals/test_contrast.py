@@ -120,14 +120,13 @@ def test_files(tmp_path):
     assert draw_spectrum(back).axes[0].get_ylabel() == "contrast"
 
 
-def test_a_recipe_both_ways(tmp_path):
+def test_a_recipe_both_ways(tmp_path, write):
     path = tmp_path / "flake.toml"
     for form in ("", 'form = "normalised"\n'):
         path.write_text(RECIPE.format(form=form), encoding="utf-8")
         read = read_recipe(path).scene()
         assert read.reference == scene("normalised" if form else "relative").reference
-        again = tmp_path / "again.toml"
-        again.write_text(recipe_text(read, tmp_path), encoding="utf-8")
+        again = write(recipe_text(read, tmp_path), "again.toml")
         assert read_recipe(again).scene().reference == read.reference
         assert "reference=pl.Reference(" in python_text(with_wavelength(read, None))
 

@@ -101,7 +101,7 @@ def test_words():
         pl.Spectrum(NM, np.full(64, 0.2), "R", transmission=True)
 
 
-def test_files(tmp_path):
+def test_files(tmp_path, write):
     written = pl.simulate(scene(), NM, noise=0.02)
     write_spectrum(tmp_path / "t.csv", written)
     assert read_spectrum(tmp_path / "t.csv").transmission
@@ -114,8 +114,7 @@ def test_files(tmp_path):
     woollam = read_spectrum(tmp_path / "woollam.dat")
     assert woollam.transmission
     assert "transmitted light" in " ".join(woollam.notes)
-    reflected = tmp_path / "r.csv"
-    reflected.write_text("wavelength_nm,R\n" + "\n".join(f"{nm},0.2" for nm in NM), encoding="utf-8")
+    reflected = write("wavelength_nm,R\n" + "\n".join(f"{nm},0.2" for nm in NM), "r.csv")
     with pytest.raises(UsageError, match=r"r\.csv: `transmission` is for ellipsometry"):
         read_spectrum(reflected, transmission=True)
 

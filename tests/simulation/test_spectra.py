@@ -54,10 +54,9 @@ def test_a_spectrum_of_angles():
     np.testing.assert_allclose(seen.delta, delta, rtol=1e-9)
 
 
-def test_default_wavelengths_stay_where_every_material_has_data(tmp_path):
+def test_default_wavelengths_stay_where_every_material_has_data(write):
     np.testing.assert_array_equal(default_wavelengths(pl.Scene(FILM, 3.9)), np.arange(380.0, 781.0, 2.0))
-    table = tmp_path / "resin.csv"
-    table.write_text("wavelength_nm,n\n501,1.6\n601,1.5\n")
+    table = write("wavelength_nm,n\n501,1.6\n601,1.5\n", "resin.csv")
     grid = default_wavelengths(pl.Scene(pl.Layer(str(table), 100.0), "Si"))
     assert (grid[0], grid[-1], len(grid)) == (502, 600, 50)
 

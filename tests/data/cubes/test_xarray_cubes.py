@@ -6,6 +6,7 @@ import xarray as xr
 
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import DataError, UsageError
+from tests.data.comparison import assert_read
 
 NM = np.linspace(400.0, 800.0, 9)
 
@@ -41,9 +42,7 @@ def test_units_of_the_axis(array, same, unit, convert):
 
 
 def test_scalar_and_axis_of_angles(array, values):
-    one = read_cube(array.assign_coords(angle=60.0))
-    np.testing.assert_array_equal(one.angle, [60.0])
-    assert one.points == 9
+    assert_read(read_cube(array.assign_coords(angle=60.0)), points=9, angle=[60.0])
     two = xr.concat([array, 2 * array], xr.IndexVariable("aoi", [60.0, 70.0]))
     cube = read_cube(two.transpose("aoi", "y", "x", "wavelength"), calibrated=False)
     np.testing.assert_array_equal(cube.angle, [60.0, 70.0])
@@ -95,8 +94,7 @@ def test_time_comes_first_and_dates_become_seconds(array, values):
     dates = np.array(["2026-01-01T00:00:00", "2026-01-01T00:00:30"], "M8[ns]")
     series = xr.concat([array, array / 2], xr.IndexVariable("time", dates)).transpose("y", "x", "time", ...)
     cube = read_cube(series)
-    assert cube.dims == ("time", "y", "x")
-    assert cube.shape == (2, 7, 5)
+    assert_read(cube, dims=("time", "y", "x"), shape=(2, 7, 5))
     np.testing.assert_array_equal(cube.coords["time"], [0.0, 30.0])
     np.testing.assert_allclose(np.asarray(cube.arrays["values"])[1], values / 2, rtol=1e-6)
     assert cube.coarse(2).shape == (2, 3, 2)

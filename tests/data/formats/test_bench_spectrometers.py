@@ -7,6 +7,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
+from tests.data.comparison import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 
@@ -15,10 +16,9 @@ PEDS = (SAMPLES / "perkin_elmer/peds.txt").read_text(encoding="utf-8")
 
 def test_transmittance_in_percent(write):
     spectrum = read_spectrum(write(PEDS))
-    assert spectrum.signal == "T"
-    np.testing.assert_array_equal(spectrum.wavelength, [780, 790, 800])
-    np.testing.assert_allclose(spectrum.values, [0.855, 0.845, 0.835], rtol=1e-15)
-    np.testing.assert_array_equal(spectrum.lines, [33, 32, 31])
+    assert_read(
+        spectrum, signal="T", wavelength=[780, 790, 800], values=[0.855, 0.845, 0.835], lines=[33, 32, 31]
+    )
     assert dict(spectrum.declared) == {
         "format": "PerkinElmer PEDS text",
         "date": "24/03/05",
@@ -70,9 +70,7 @@ JASCO = (SAMPLES / "jasco/absorbance.txt").read_text(encoding="utf-8")
 
 def test_absorbance(write):
     spectrum = read_spectrum(write(JASCO))
-    assert spectrum.signal == "T"
-    np.testing.assert_array_equal(spectrum.wavelength, [798, 799, 800])
-    np.testing.assert_allclose(spectrum.values, 10.0 ** -np.array([0.25, 0.5, 1.0]))
+    assert_read(spectrum, signal="T", wavelength=[798, 799, 800], values=10.0 ** -np.array([0.25, 0.5, 1.0]))
     facts = dict(spectrum.declared)
     assert (facts["sample"], facts["date"], facts["instrument"]) == ("film 7", "24/03/05", "V-770")
 
@@ -80,8 +78,7 @@ def test_absorbance(write):
 @pytest.mark.parametrize(("units", "signal"), [("%T", "T"), ("%R", "R"), ("Reflectance [%]", "R")])
 def test_percent(write, units, signal):
     spectrum = read_spectrum(write(JASCO.replace("ABSORBANCE", units)))
-    assert spectrum.signal == signal
-    np.testing.assert_allclose(spectrum.values, [0.0025, 0.005, 0.01])
+    assert_read(spectrum, signal=signal, values=[0.0025, 0.005, 0.01])
 
 
 def test_an_undeclared_unit_is_asked_for(write, refused):
@@ -124,8 +121,7 @@ def test_a_dpt_states_nothing(write):
         with pytest.raises(ValueError, match="state"):
             read_spectrum(path, **asked)
     spectrum = read_spectrum(path, signal="R", wavelength_unit="cm-1", signal_unit="fraction")
-    np.testing.assert_allclose(spectrum.wavelength, 1e7 / np.array([3999.5, 2000, 1000]))
-    np.testing.assert_array_equal(spectrum.values, [0.25, 0.5, 0.75])
+    assert_read(spectrum, wavelength=1e7 / np.array([3999.5, 2000, 1000]), values=[0.25, 0.5, 0.75])
 
 
 def test_a_dpt_in_nm(write):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from tests.data.comparison import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 
@@ -18,10 +19,9 @@ HORIBA = (SAMPLES / "horiba/psi_delta.txt").read_text(encoding="utf-8")
 @pytest.mark.parametrize("text", [HORIBA, HORIBA.replace("# COMMENT:\n", "").replace("\n\n", "\n")])
 def test_psi_and_delta(write, text):
     spectrum = read_spectrum(write(text))
-    np.testing.assert_array_equal(spectrum.wavelength, [400.5, 410.5])
-    np.testing.assert_array_equal(spectrum.angle, [70, 70])
-    np.testing.assert_array_equal(spectrum.values, [20.5, 21.5])
-    np.testing.assert_array_equal(spectrum.delta, [170.25, 169.5])
+    assert_read(
+        spectrum, wavelength=[400.5, 410.5], angle=[70, 70], values=[20.5, 21.5], delta=[170.25, 169.5]
+    )
     assert dict(spectrum.declared)["sample"] == "oxide, centre"
     assert "columns ignored: eV, Is, Ic" in spectrum.notes
 
@@ -41,12 +41,6 @@ def test_horiba_refused(refused):
 
 
 SPECTRARAY = (SAMPLES / "spectraray/two_angles.txt").read_text(encoding="utf-8")
-
-
-def assert_read(spectrum, **expected):
-    assert spectrum.signal == "psi-delta"
-    for name, values in expected.items():
-        np.testing.assert_allclose(getattr(spectrum, name), values, rtol=1e-12, err_msg=name)
 
 
 def test_spectraray(write):
@@ -126,18 +120,15 @@ def test_three_codings_of_one_measurement(write, text):
     spectrum = read_spectrum(write(text))
     assert spectrum.signal == "psi-delta"
     assert spectrum.folded
-    np.testing.assert_array_equal(spectrum.wavelength, [240.5, 241.5])
-    np.testing.assert_array_equal(spectrum.angle, [71.5, 71.5])
-    np.testing.assert_allclose(spectrum.values, [30.0, 45.0])
-    np.testing.assert_allclose(spectrum.delta, [60.0, 120.0])
+    assert_read(
+        spectrum, wavelength=[240.5, 241.5], angle=[71.5, 71.5], values=[30.0, 45.0], delta=[60.0, 120.0]
+    )
 
 
 def test_angles_that_the_file_does_not_give(write, refused):
     bare = "".join(line for line in AT_45.splitlines(keepends=True) if not line.startswith("A"))
     refused(bare, "need the analyser's angle", "`analyser=45`")
-    spectrum = read_spectrum(write(bare), analyser=45)
-    np.testing.assert_allclose(spectrum.values, [30.0, 45.0])
-    assert spectrum.angle is None
+    assert_read(read_spectrum(write(bare), analyser=45), angle=None, values=[30.0, 45.0])
     refused(AT_45, "leave `analyser` out", analyser=45)
 
 
@@ -163,14 +154,10 @@ TIMES = (SAMPLES / "film_sense/dynamic.txt").read_text(encoding="utf-8")
 
 def test_static(write):
     spectrum = read_spectrum(write(FILM_SENSE))
-    assert spectrum.signal == "psi-delta"
-    np.testing.assert_array_equal(spectrum.wavelength, [450.25, 525.5])
-    np.testing.assert_array_equal(spectrum.angle, [65.012, 65.012])
+    assert_read(spectrum, signal="psi-delta", wavelength=[450.25, 525.5], angle=[65.012, 65.012])
     np.testing.assert_allclose(spectrum.values, [30.0, 45.0], atol=1e-3)
     np.testing.assert_allclose(spectrum.delta, [150.0, 270.0], atol=1e-3)
-    np.testing.assert_allclose(spectrum.depolarisation, [1 - 0.99845**2, 1 - 1.0002**2])
-    np.testing.assert_array_equal(spectrum.lines, [5, 6])
-    assert not spectrum.folded
+    assert_read(spectrum, depolarisation=[1 - 0.99845**2, 1 - 1.0002**2], lines=[5, 6], folded=False)
     assert dict(spectrum.declared) == {"format": "Film Sense text", "date": "2024-07-19 16:35"}
 
 

@@ -8,6 +8,7 @@ import pytest
 from pellicle.data.read_counts import read_counts, read_counts_beside
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
+from tests.data.comparison import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 
@@ -27,9 +28,7 @@ for column in (";50.00000", ";25.00000", ";12.50000"):
 @pytest.mark.parametrize(("text", "signal"), [(AVASOFT_7, "R"), (AVASOFT_6, "T")])
 def test_the_computed_column(write, text, signal):
     spectrum = read_spectrum(write(text))
-    assert spectrum.signal == signal
-    np.testing.assert_array_equal(spectrum.wavelength, [400.78, 401.38, 401.98])
-    np.testing.assert_array_equal(spectrum.values, [0.5, 0.25, 0.125])
+    assert_read(spectrum, signal=signal, wavelength=[400.78, 401.38, 401.98], values=[0.5, 0.25, 0.125])
     assert any("ignored" in note and "'dark counts'" in note for note in spectrum.notes)
 
 
@@ -53,9 +52,7 @@ def test_absorbance(write):
 )
 def test_names_of_other_languages(write, names):
     text = AVASOFT_7.replace("Wave   ;Sample   ;Dark     ;Reference;Reflectance", names)
-    spectrum = read_spectrum(write(text))
-    assert spectrum.signal == "R"
-    np.testing.assert_array_equal(spectrum.values, [0.5, 0.25, 0.125])
+    assert_read(read_spectrum(write(text)), signal="R", values=[0.5, 0.25, 0.125])
 
 
 def test_counts_alone(write, refused):
@@ -112,9 +109,7 @@ R = {"signal": "R", "signal_unit": "percent"}
 @pytest.mark.parametrize("text", [OCEANVIEW, SPECTRASUITE, JAZ])
 def test_the_processed_value(write, text):
     spectrum = read_spectrum(write(text), **R)
-    np.testing.assert_array_equal(spectrum.wavelength, [400.1, 400.5, 400.9])
-    np.testing.assert_array_equal(spectrum.values, [0.125, 0.25, 0.5])
-    assert spectrum.signal == "R"
+    assert_read(spectrum, signal="R", wavelength=[400.1, 400.5, 400.9], values=[0.125, 0.25, 0.5])
     assert dict(spectrum.declared)["date"] == "Tue Mar 05 10:11:12 CET 2024"
 
 

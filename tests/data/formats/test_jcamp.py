@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from tests.data.comparison import assert_read
 
 # the ordinates of every form below, and their even axis
 VALUES = [100, 101, 104, 104, 104, 104, 99, 45, 5, -3, 12, 500]
@@ -47,9 +48,7 @@ SAMPLES = {form: jcamp(table) for form, table in FORMS.items()}  # for `make fuz
 @pytest.mark.parametrize("form", FORMS)
 def test_the_forms_of_a_table_are_decoded(form, write):
     found = read_spectrum(write(jcamp(FORMS[form])), calibrated=False)
-    assert found.signal == "R"
-    np.testing.assert_allclose(found.wavelength, AXIS)
-    np.testing.assert_allclose(found.values, np.array(VALUES) / 1000, rtol=1e-12)
+    assert_read(found, signal="R", wavelength=AXIS, values=np.array(VALUES) / 1000)
 
 
 def test_the_example_of_the_standard(write):
@@ -81,16 +80,14 @@ UNITS = [
 @pytest.mark.parametrize(("axis", "quantity", "signal", "wavelength", "factor"), UNITS)
 def test_units(axis, quantity, signal, wavelength, factor, write):
     found = read_spectrum(write(jcamp(AFFN, XUNITS=axis, YUNITS=quantity)), calibrated=False)
-    assert found.signal == signal
-    np.testing.assert_allclose(found.wavelength, wavelength)
+    assert_read(found, signal=signal, wavelength=wavelength)
     values = np.array(VALUES[::-1] if axis == "1/CM" else VALUES) * factor
     np.testing.assert_allclose(found.values, values)
 
 
 def test_absorbance_becomes_transmittance(write):
     found = read_spectrum(write(jcamp(AFFN, YUNITS="ABSORBANCE")))
-    assert found.signal == "T"
-    np.testing.assert_allclose(found.values, 10.0 ** -(np.array(VALUES) / 1000))
+    assert_read(found, signal="T", values=10.0 ** -(np.array(VALUES) / 1000))
 
 
 @pytest.mark.parametrize(
@@ -135,8 +132,7 @@ DARK = PAIRS.format("DARK", "INTENSITY (COUNTS)", LIMITS, "400,36, 1032,7\n400,6
 def test_decimal_commas_and_a_dark_spectrum(write):
     """The structure of exports of SpectraSuite: a LINK block of processed, dark and reference spectra."""
     found = read_spectrum(write(link(PROCESSED, DARK, DARK.replace("DARK", "REFERENCE"))))
-    np.testing.assert_allclose(found.wavelength, [400.36, 400.69, 401.02])
-    np.testing.assert_allclose(found.values, [0.32795, 0.335, 0.3425])
+    assert_read(found, wavelength=[400.36, 400.69, 401.02], values=[0.32795, 0.335, 0.3425])
     assert any("INTENSITY (COUNTS)" in note for note in found.notes)
 
 
@@ -169,8 +165,7 @@ def test_pages_of_ntuples(write):
         "##PAGE= N=2\n##DATA TABLE= (X++(R..R)), XYDATA\n400 4 3 2 1\n##END NTUPLES=\n##END=\n"
     )
     first, second = read_spectra(write(text), spectrum="all")
-    np.testing.assert_allclose(first.wavelength, [400, 410, 420, 430])
-    np.testing.assert_allclose(first.values, [0.1, 0.2, 0.3, 0.4])
+    assert_read(first, wavelength=[400, 410, 420, 430], values=[0.1, 0.2, 0.3, 0.4])
     np.testing.assert_allclose(second.values, [0.4, 0.3, 0.2, 0.1])
 
 

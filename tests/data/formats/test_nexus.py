@@ -10,6 +10,7 @@ from pellicle.data.formats import hdf5_reading, isolated
 from pellicle.data.formats import nexus as nexus_reader
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
+from tests.data.comparison import assert_read
 
 h5py = pytest.importorskip("h5py")
 
@@ -87,9 +88,7 @@ SAMPLES = {fill.__name__: nexus(fill) for fill in (nxdata, nxellipsometry)}  # f
 def test_nxdata(axis, signal, wavelength, kind, factor, write):
     found = read_spectrum(write(nexus(lambda file: nxdata(file, axis, signal))))
     order = np.argsort(wavelength)
-    assert found.signal == kind
-    np.testing.assert_allclose(found.wavelength, wavelength[order])
-    np.testing.assert_allclose(found.values, factor * R[order])
+    assert_read(found, signal=kind, wavelength=wavelength[order], values=factor * R[order])
 
 
 def test_errors_and_an_absorbance(write):
@@ -97,9 +96,7 @@ def test_errors_and_an_absorbance(write):
         data = nxdata(file, signal=("absorbance", ""), axis=("wavelength", "um"))
         data["absorbance_errors"] = [0.01, 0.02, 0.03]
 
-    found = read_spectrum(write(nexus(fill)))
-    assert found.signal == "T"
-    np.testing.assert_allclose(found.values, 10**-R)
+    assert_read(read_spectrum(write(nexus(fill))), signal="T", values=10**-R)
 
 
 def test_a_unit_that_is_missing_is_asked_for(refused):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from tests.data.comparison import assert_read
 
 PERCENT = "400{c}10{d}5{n}500{c}20{d}5{n}"
 
@@ -44,10 +45,7 @@ def rows(delimiter, decimal=".", end="\n"):
     ],
 )
 def test_read_without_flags(write, text, signal):
-    spectrum = read_spectrum(write(text))
-    assert spectrum.signal == signal
-    np.testing.assert_allclose(spectrum.wavelength, [400, 500], rtol=1e-14)
-    np.testing.assert_allclose(spectrum.values, [0.105, 0.205], rtol=1e-14)
+    assert_read(read_spectrum(write(text)), signal=signal, wavelength=[400, 500], values=[0.105, 0.205])
 
 
 @pytest.mark.parametrize(
@@ -162,9 +160,7 @@ Pixel,Wavelength,Processed,Raw,Dark,Reference
 
 
 def test_a_technique_is_the_quantity_of_the_processed_column(write, refused):
-    spectrum = read_spectrum(write(PROCESSED.format("Absorbance", 1, 2)))
-    assert spectrum.signal == "T"
-    np.testing.assert_allclose(spectrum.values, [0.1, 0.01])
+    assert_read(read_spectrum(write(PROCESSED.format("Absorbance", 1, 2))), signal="T", values=[0.1, 0.01])
     percent = read_spectrum(write(PROCESSED.format("Transmission", 60, 70)), signal_unit="percent")
     np.testing.assert_allclose(percent.values, [0.6, 0.7])
     refused(PROCESSED.format("Absorbance", 1, 2), "absorbance", signal="R")
@@ -188,8 +184,7 @@ def test_declared_intensities_are_no_transmittance(refused):
 )
 def test_tables_as_sheets_and_programs_save_them(write, text):
     spectrum = read_spectrum(write(text))
-    np.testing.assert_array_equal(spectrum.wavelength, [400, 500])
-    np.testing.assert_allclose(spectrum.values, [0.815, 0.825])
+    assert_read(spectrum, wavelength=[400, 500], values=[0.815, 0.825])
     assert ("sample", "sep=") not in spectrum.declared
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
+from tests.data.comparison import assert_read
 
 pytest.importorskip("defusedxml")
 
@@ -49,9 +50,7 @@ def procspec(*documents, names=None):
 
 def test_the_processed_spectrum_is_read(write):
     found = read_spectrum(write(procspec(document())), signal_unit="percent")
-    assert found.signal == "R"
-    np.testing.assert_allclose(found.wavelength, WAVELENGTH)
-    np.testing.assert_allclose(found.values, np.array(PERCENT) / 100)
+    assert_read(found, signal="R", wavelength=WAVELENGTH, values=np.array(PERCENT) / 100)
     facts = dict(found.declared)
     assert facts["instrument"] == "USB2000Plus U12"
     assert facts["date"] == "2020-01-01 00:00:00 UTC"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from tests.data.comparison import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 
@@ -39,9 +40,7 @@ def test_static(write):
 
 def test_rows_without_errors(write):
     spectrum = read_spectrum(write(re.sub(r"(?m)^(4.*)\t[\d.]+\t[\d.]+$", r"\1", WVASE)))
-    np.testing.assert_array_equal(spectrum.values, [20.5, 12.5, 21.5])
-    assert spectrum.sigma is None
-    assert spectrum.delta_sigma is None
+    assert_read(spectrum, sigma=None, delta_sigma=None, values=[20.5, 12.5, 21.5])
 
 
 @pytest.mark.parametrize(
@@ -57,8 +56,7 @@ def test_a_file_for_wvase_whose_angle_has_no_name(write):
     spectrum = read_spectrum(
         write("brush\nnm\t\tPsi\tDelta\n658.0\t55.0\t27.7\t170.2\n658.0\t60.0\t23.25\t166.5\n")
     )
-    np.testing.assert_array_equal(spectrum.angle, [55, 60])
-    np.testing.assert_array_equal(spectrum.delta, [170.2, 166.5])
+    assert_read(spectrum, angle=[55, 60], delta=[170.2, 166.5])
 
 
 def test_an_axis_in_energies(write):
@@ -70,8 +68,7 @@ def test_an_axis_in_energies(write):
 
 def test_depolarisation_in_percent(write):
     spectrum = read_spectrum(write(COMPLETE_EASE))
-    np.testing.assert_allclose(spectrum.depolarisation, [0.015, -0.0025])
-    np.testing.assert_allclose(spectrum.depolarisation_sigma, [0.001, 0.002])
+    assert_read(spectrum, depolarisation=[0.015, -0.0025], depolarisation_sigma=[0.001, 0.002])
 
 
 def test_depolarisation_of_some_points_only_is_left_out(write):
@@ -91,9 +88,7 @@ def test_depolarisation_of_some_points_only_is_left_out(write):
 def test_in_situ_rows_whose_angle_is_zero_beside_the_depolarisation(write):
     """CompleteEASE writes the intensity as `uR` with an error of 1: it is no reflectance."""
     [spectrum] = read_spectra(write(IN_SITU))
-    np.testing.assert_array_equal(spectrum.angle, [70, 70])
-    np.testing.assert_allclose(spectrum.depolarisation, [-0.0525, -0.045])
-    assert spectrum.depolarisation_sigma is None
+    assert_read(spectrum, depolarisation_sigma=None, angle=[70, 70], depolarisation=[-0.0525, -0.045])
     assert "errors of dPolE that are all 1 ignored" in spectrum.notes
     assert "rows of other quantities ignored: intensities, with errors of 1 (uR)" in spectrum.notes
 
@@ -101,9 +96,7 @@ def test_in_situ_rows_whose_angle_is_zero_beside_the_depolarisation(write):
 def test_dynamic_data_are_a_spectrum_for_each_time(write, refused):
     refused(DYNAMIC, "has 2 spectra: '0.0232 min', '0.1071 min'; choose one", '`spectrum="0.0232 min"`')
     spectrum = read_spectrum(write(DYNAMIC), spectrum="0.1071 min")
-    np.testing.assert_array_equal(spectrum.values, [30.25, 29.25])
-    np.testing.assert_array_equal(spectrum.sigma, [0.07, 0.08])
-    np.testing.assert_array_equal(spectrum.lines, [7, 8])
+    assert_read(spectrum, values=[30.25, 29.25], sigma=[0.07, 0.08], lines=[7, 8])
     assert [one.name for one in read_spectra(write(DYNAMIC), spectrum="all")] == ["0.0232 min", "0.1071 min"]
     refused(DYNAMIC.replace("\t\t0.1071", "", 1), "line 7 of dynamic data", "6 values")
 
@@ -123,8 +116,7 @@ def test_reflectances_beside_psi_and_delta(write):
     assert (psi.signal, p.signal, s.signal, t.signal) == ("psi-delta", "R", "R", "T")
     assert (p.polarisation, s.polarisation, t.polarisation) == ("p", "s", "unpolarised")
     np.testing.assert_array_equal(psi.angle, [65, 65])
-    np.testing.assert_array_equal(p.angle, [25, 25])
-    np.testing.assert_array_equal(p.values, [0.45, 0.44])
+    assert_read(p, angle=[25, 25], values=[0.45, 0.44])
     np.testing.assert_array_equal(s.sigma, [0.004, 0.005])
     np.testing.assert_array_equal(t.angle, [0])
 
@@ -170,9 +162,7 @@ def test_trigonometric_tables_leave_the_sign_of_delta_open(write, refused):
     spectrum = read_spectrum(write(TRIGONOMETRIC))
     assert spectrum.signal == "psi-delta"
     assert spectrum.folded
-    np.testing.assert_allclose(spectrum.values, [45.0, np.rad2deg(np.arctan(0.5))])
-    np.testing.assert_allclose(spectrum.delta, [60.0, 120.0])
-    np.testing.assert_array_equal(spectrum.angle, [70, 70])
+    assert_read(spectrum, values=[45.0, np.rad2deg(np.arctan(0.5))], delta=[60.0, 120.0], angle=[70, 70])
     refused(TRIGONOMETRIC.replace("-.5", "-1.2"), "line 3, column 'cos_delta': -1.2 is no cos(delta)")
     refused(TRIGONOMETRIC.replace(".5 ", "-.5 "), "line 3, column 'tan_psi': -0.5 is no tan(psi)")
     refused(TRIGONOMETRIC.replace("-.5", ""), "line 3 has 3 values")
@@ -236,8 +226,7 @@ def test_generalised_rows(write, refused):
     np.testing.assert_array_equal(some.sigma, [[0.1, 0.05], [0.1, 0.06]])
     np.testing.assert_array_equal(some.delta_sigma, [[0.2, 0.5], [0.3, 0.6]])
     every = read_spectrum(write(heading + GENERALISED))
-    assert every.ratios == ("ane", "aps", "asp")
-    assert every.wavelength.tolist() == [600.0]
+    assert_read(every, ratios=("ane", "aps", "asp"), wavelength=[600.0])
     assert "1 points that AnE, Aps, Asp have in common" in every.notes
     without = re.sub(r"(?m)^(Aps.*)\t[\d.]+\t[\d.]+$", r"\1", GENERALISED)
     assert read_spectrum(write(heading + without)).sigma is None
@@ -263,8 +252,7 @@ def test_generalised_rows_beside_psi_and_delta(write):
 def test_ellipsometry_in_transmission(write):
     text = JOINT.replace("WVASE=3.688", "WVASE=3.688, TransmissionMeas=1")
     first, *others = read_spectra(write(text), spectrum="all")
-    assert first.signal == "psi-delta"
-    assert first.transmission
+    assert_read(first, signal="psi-delta", transmission=True)
     assert [one.name for one in others] == ["Rp", "Rs", "T"]
 
 

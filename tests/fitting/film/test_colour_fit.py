@@ -164,9 +164,8 @@ def test_different_colours_at_one_angle_are_refused():
         pl.fit(Colours(values, SENSOR), scene())
 
 
-def test_an_ignored_column_is_named_where_the_angles_are_missing(tmp_path):
-    path = tmp_path / "film.csv"
-    path.write_text("Winkel,R,G,B\n0,0.5,0.4,0.3\n60,0.3,0.4,0.5\n")
+def test_an_ignored_column_is_named_where_the_angles_are_missing(write):
+    path = write("Winkel,R,G,B\n0,0.5,0.4,0.3\n60,0.3,0.4,0.5\n")
     with pytest.raises(DataError, match=r"deviations \(ignored: Winkel\): .* a column angle_deg"):
         pl.fit(pl.read_colours(path), scene())
 

@@ -86,13 +86,12 @@ def test_the_thickness_is_found_with_its_error(fit):
 
 
 @SLOW
-def test_records(fit, tmp_path):
+def test_records(fit, write):
     about = to_json(fit)["data"]
     assert about["points"] == 64
     assert about["ratios"] == list(RATIOS)
     assert "generalised-psi-delta (ane, aps, asp), 64 points from 400 to 800 nm" in report(fit)
-    path = tmp_path / "fit.csv"
-    path.write_text(fit_csv(fit))
+    path = write(fit_csv(fit), "fit.csv")
     back = read_spectrum(path)
     for name in ("values", "delta", "sigma", "delta_sigma"):
         np.testing.assert_allclose(getattr(back, name), getattr(fit.parts[0].data, name), rtol=1e-8)

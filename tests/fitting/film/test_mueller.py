@@ -65,13 +65,12 @@ def test_each_element_has_its_own_noise(fit):
     assert fit.rms == pytest.approx(np.sqrt(np.mean(NOISE**2)), rel=0.15)
 
 
-def test_records(fit, tmp_path):
+def test_records(fit, write):
     record = to_json(fit)
     assert record["data"]["signal"] == "mueller"
     assert record["data"]["points"] == 128
     assert "mueller (m12, m22, m33, m34, m43), 128 points from 400 to 800 nm" in report(fit)
-    path = tmp_path / "fit.csv"
-    path.write_text(fit_csv(fit))
+    path = write(fit_csv(fit), "fit.csv")
     back = read_spectrum(path)
     assert back.elements == ELEMENTS
     np.testing.assert_allclose(back.values, fit.parts[0].data.values, rtol=1e-9)
