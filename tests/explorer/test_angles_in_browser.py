@@ -1,14 +1,10 @@
 """Several angles of incidence in the explorer's page, by real events: `make browser-tests`."""
 
-import base64
-import signal
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
 import pellicle as pl
+from tests.explorer.page import drop, explorer, number, opening, settle, slider
 
 pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
 pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
@@ -28,43 +24,16 @@ thickness = { lower = 50, upper = 600, value = 250 }
 """
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("angles")
-    (folder / "film.toml").write_text(RECIPE)
-    code = "from pellicle.cli import process; process()"
-    command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    yield server.stdout.readline().strip()
-    server.send_signal(signal.SIGINT)
-    server.communicate(timeout=20)
-
-
 @pytest.fixture
 def opened(browser, address):
-    """Function that opens the page; script errors and messages fail the test."""
-    pages, troubles = [], []
-
-    def open_page(query="", width=1400, scheme="light"):
-        page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        pages.append(page)
-        page.on("pageerror", lambda error: troubles.append(str(error)))
-        page.on("console", lambda said: troubles.append(said.text))
-        page.goto(address + query)
-        settle(page)
-        return page
-
-    yield open_page
-    for page in pages:
-        page.close()
-    assert troubles == []
+    with opening(browser, address) as open_page:
+        yield open_page
 
 
-def settle(page):
-    page.wait_for_selector(".plot[data-ready]")
-    page.wait_for_selector(".plan li")
-    page.wait_for_selector("main:not([data-busy])", timeout=60_000)
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    with explorer(tmp_path_factory.mktemp("angles"), RECIPE) as (_, address):
+        yield address
 
 
 def traces(page, mode="lines"):
@@ -92,10 +61,6 @@ def agrees(page, angles, thickness, atol=2e-3):
 def nm(page):
     ends = traces(page)["Ψ 70°"]["x"]
     return np.array(ends)
-
-
-def slider(page):
-    return page.get_by_role("slider", name="thickness in nm")
 
 
 def angle_list(page):
@@ -130,7 +95,7 @@ def test_a_slider_moves_every_curve_and_the_list_is_edited_by_keys(opened):
     for _ in range(3):
         page.keyboard.press("PageUp")
     settle(page)
-    value = float(page.get_by_role("spinbutton", name="thickness (nm)").input_value())
+    value = float(number(page).input_value())
     assert value > 250
     assert agrees(page, (65, 70, 75), value)
     box = angle_list(page)
@@ -198,20 +163,13 @@ def test_recipe_and_python_state_the_angles(opened):
         page.keyboard.press("Escape")
 
 
-def drop(page, name, spectrum):
-    """Drop a file of Ψ and Δ on the page, as a browser does."""
-    script = """([name, content]) => {
-      const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
-      const data = new DataTransfer();
-      data.items.add(new File([bytes], name));
-      document.querySelector("main").dispatchEvent(
-        new DragEvent("drop", { bubbles: true, cancelable: true, dataTransfer: data }));
-    }"""
+def drop_spectrum(page, name, spectrum):
+    """Drop a file of Ψ and Δ on the page."""
     rows = np.transpose([spectrum.wavelength, spectrum.angle, spectrum.values, spectrum.delta])
     text = "\n".join(
         ["wavelength_nm,angle_deg,psi_deg,delta_deg", *(",".join(map(str, row)) for row in rows)]
     )
-    page.evaluate(script, [name, base64.b64encode(text.encode()).decode()])
+    drop(page, name, text.encode())
     page.locator(".notes").get_by_text(name).first.wait_for()
     both = """() => {
       const { data } = document.querySelector(".plot");
@@ -230,7 +188,7 @@ def measured(angles, wavelength):
 
 def test_a_dropped_file_of_several_angles_is_fitted_and_one_wavelength_is_drawn_against_them(opened):
     page = opened()
-    drop(page, "wafer.csv", measured((55.0, 65.0), np.arange(400.0, 800.0, 20.0)))
+    drop_spectrum(page, "wafer.csv", measured((55.0, 65.0), np.arange(400.0, 800.0, 20.0)))
     assert angle_list(page).input_value() == "55, 65"
     data = traces(page, "markers")
     assert {label: len(trace["x"]) for label, trace in data.items()} == dict.fromkeys(
@@ -240,9 +198,9 @@ def test_a_dropped_file_of_several_angles_is_fitted_and_one_wavelength_is_drawn_
     page.get_by_role("button", name="Fit", exact=True).click()
     page.wait_for_selector(".fitted p", timeout=120_000)
     settle(page)
-    thickness = page.get_by_role("spinbutton", name="thickness (nm)")
+    thickness = number(page)
     assert float(thickness.input_value()) == pytest.approx(320.0, abs=0.3)
-    drop(page, "laser.csv", measured(np.arange(50.0, 71.0, 2.0), np.array([633.0])))
+    drop_spectrum(page, "laser.csv", measured(np.arange(50.0, 71.0, 2.0), np.array([633.0])))
     title = "document.querySelector('.plot').layout.xaxis.title.text"
     assert page.evaluate(title) == "angle of incidence (°)"
     assert traces(page, "markers")["Ψ"]["x"] == np.arange(50.0, 71.0, 2.0).tolist()

@@ -99,9 +99,8 @@ def test_names_lead_to_no_other_folder(session, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
-def test_only_files_of_the_folder_are_read(session, tmp_path):
-    secret = tmp_path / "secret.csv"
-    secret.write_text(GOOD)
+def test_only_files_of_the_folder_are_read(session, tmp_path, write):
+    secret = write(GOOD, "secret.csv")
     folder = tmp_path / "recipe"
     (folder / "own.csv").write_text(GOOD)
     (folder / "link.csv").symlink_to(secret)

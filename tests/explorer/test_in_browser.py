@@ -3,7 +3,6 @@
 Skipped where Playwright, a browser or packages of the server are absent. PELLICLE_BROWSER names a Chromium.
 """
 
-import base64
 import json
 import signal
 import subprocess
@@ -14,6 +13,7 @@ import pytest
 
 import pellicle as pl
 from tests.browser import wait_for
+from tests.explorer.page import drop, explorer, number, opening, settle, slider
 
 pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
 pytest.importorskip("starlette", reason="Starlette is absent: make browser-tests")
@@ -45,59 +45,16 @@ base_k = 3.0
 """
 
 
-def start(folder, recipe=RECIPE):
-    """A running `pellicle explore`, and the address that it prints."""
-    (folder / "film.toml").write_text(recipe)
-    code = "import sys; from pellicle.cli import process; process()"
-    command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    return server, server.stdout.readline().strip()
-
-
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    server, address = start(tmp_path_factory.mktemp("explorer"))
-    yield address
-    server.send_signal(signal.SIGINT)
-    server.communicate(timeout=20)
-    assert server.returncode == 0
+    with explorer(tmp_path_factory.mktemp("explorer"), RECIPE) as (_, address):
+        yield address
 
 
 @pytest.fixture
 def opened(browser, address):
-    """Function that opens the page; script errors, messages and requests to others fail the test."""
-    pages, troubles = [], []
-    origin = address.split("/?")[0]
-
-    def open_page(query="", width=1400, scheme="light"):
-        page = browser.new_page(
-            viewport={"width": width, "height": 900}, color_scheme=scheme, accept_downloads=True
-        )
-        pages.append(page)
-        page.on("pageerror", lambda error: troubles.append(str(error)))
-        page.on("console", lambda said: troubles.append(said.text))
-        page.on("dialog", lambda dialog: troubles.append(dialog.message))
-        page.on("request", lambda request: _ours(request.url, origin) or troubles.append(request.url))
-        page.goto(address + query)
-        settle(page)
-        return page
-
-    yield open_page
-    for page in pages:
-        page.close()
-    assert troubles == []
-
-
-def _ours(url, origin):
-    return url.startswith((origin, "data:", f"blob:{origin}"))
-
-
-def settle(page):
-    """Wait until everything is compiled, drawn and listed."""
-    page.wait_for_selector(".plot[data-ready]")
-    page.wait_for_selector(".plan li")
-    page.wait_for_selector(".sphere:not([hidden])")
-    page.wait_for_selector("main:not([data-busy])")
+    with opening(browser, address) as open_page:
+        yield open_page
 
 
 def curve(page, name="R", axis="y"):
@@ -112,6 +69,7 @@ def agrees(page, thickness, atol=2e-6):
 
 def shown(page):
     """What follows the sliders: the curve, the colour, the sphere, the address."""
+    page.wait_for_selector(".sphere:not([hidden])")
     style = "getComputedStyle(document.querySelector('.patch')).backgroundColor"
     return {
         "curve": curve(page),
@@ -121,31 +79,9 @@ def shown(page):
     }
 
 
-def slider(page):
-    return page.get_by_role("slider", name="thickness in nm")
-
-
-def number(page):
-    return page.get_by_role("spinbutton", name="thickness (nm)")
-
-
 def reflectance(thickness, wavelength=None):
     wavelength = np.arange(400.0, 801.0, 2.0) if wavelength is None else np.asarray(wavelength)
     return pl.reflectance(wavelength, thickness, pl.material("SiO2"), pl.material("Si"))
-
-
-def drop(page, name, content):
-    """Drop a file on the page, as a browser does."""
-    script = """([name, content]) => {
-      const bytes = Uint8Array.from(atob(content), (letter) => letter.charCodeAt(0));
-      const data = new DataTransfer();
-      data.items.add(new File([bytes], name));
-      for (const kind of ["dragenter", "dragover", "drop"]) {
-        document.querySelector("main").dispatchEvent(
-          new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
-      }
-    }"""
-    page.evaluate(script, [name, base64.b64encode(content).decode()])
 
 
 def csv(thickness=320.0, noise=0.002):
@@ -345,12 +281,12 @@ def test_one_request_is_sent_at_a_time_and_the_newest_next(browser, address):
 
 
 def test_a_server_that_ended_is_said_in_one_sentence(browser, tmp_path):
-    server, address = start(tmp_path)
-    page = browser.new_page()
-    page.goto(address)
-    settle(page)
-    server.send_signal(signal.SIGINT)
-    server.communicate(timeout=20)
+    with explorer(tmp_path, RECIPE) as (server, address):
+        page = browser.new_page()
+        page.goto(address)
+        settle(page)
+        server.send_signal(signal.SIGINT)
+        server.wait(timeout=20)
     slider(page).press("PageUp")
     page.wait_for_selector(".trouble:not([hidden])")
     assert "does not answer" in page.get_by_role("alert").inner_text()
@@ -358,18 +294,13 @@ def test_a_server_that_ended_is_said_in_one_sentence(browser, tmp_path):
 
 
 def test_a_surface_shows_its_lobes_in_one_panel_and_takes_no_data(browser, tmp_path):
-    server, address = start(tmp_path, SURFACE)
-    page = browser.new_page()
-    page.goto(address)
-    settle(page)
-    lobes = [curve(page, name) for name in ("645 nm", "525 nm", "445 nm")]
-    assert page.evaluate("document.querySelector('.plot').data.map((t) => t.yaxis)") == ["y"] * 3
-    assert min(map(min, lobes)) >= 0
-    slider(page).press("PageUp")
-    settle(page)
-    assert curve(page, "645 nm") != lobes[0]
-    assert page.locator(".patch").is_hidden()
-    assert page.get_by_role("button", name="Open data").is_hidden()
-    page.close()
-    server.send_signal(signal.SIGINT)
-    server.communicate(timeout=20)
+    with explorer(tmp_path, SURFACE) as (_, address), opening(browser, address) as open_page:
+        page = open_page()
+        lobes = [curve(page, name) for name in ("645 nm", "525 nm", "445 nm")]
+        assert page.evaluate("document.querySelector('.plot').data.map((t) => t.yaxis)") == ["y"] * 3
+        assert min(map(min, lobes)) >= 0
+        slider(page).press("PageUp")
+        settle(page)
+        assert curve(page, "645 nm") != lobes[0]
+        assert page.locator(".patch").is_hidden()
+        assert page.get_by_role("button", name="Open data").is_hidden()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from tests.browser import wait_for
+from tests.browser import pages, wait_for
 
 pytest.importorskip("anywidget", reason="anywidget is absent: pip install 'pellicle[explore]'")
 
@@ -128,20 +128,16 @@ def cell(browser, widget):
     def answer(request, body):
         return defaults if request == "defaults" else widget._session.answer(request, body)
 
-    page = browser.new_page(viewport={"width": 700, "height": 900})
-    troubles = []
-    page.on("pageerror", lambda error: troubles.append(str(error)))
-    page.on("console", lambda said: troubles.append(said.text))
-    page.expose_function("ask", answer)
-    page.set_content("<!doctype html><body data-jp-theme-light='false'><div id='cell'></div></body>")
-    page.route("**/*", lambda route: (troubles.append(route.request.url), route.abort()))
-    page.add_style_tag(content=widget._css)
-    page.evaluate(MODEL, widget._esm)
-    page.wait_for_selector(".plot[data-ready]")
-    page.wait_for_selector(".pellicle-explorer:not(.compiling)")
-    yield page
-    page.close()
-    assert troubles == []
+    with pages(browser) as new_page:
+        page = new_page(700)
+        page.expose_function("ask", answer)
+        page.set_content("<!doctype html><body data-jp-theme-light='false'><div id='cell'></div></body>")
+        page.route("**/*", lambda route: route.abort())
+        page.add_style_tag(content=widget._css)
+        page.evaluate(MODEL, widget._esm)
+        page.wait_for_selector(".plot[data-ready]")
+        page.wait_for_selector(".pellicle-explorer:not(.compiling)")
+        yield page
 
 
 def test_the_widget_follows_its_slider_and_its_model(cell):

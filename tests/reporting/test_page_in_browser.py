@@ -12,7 +12,7 @@ from pellicle.fitting.result import Profile
 from pellicle.reporting.folders import write_fit, write_index
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.page.fit_page import fit_page
-from tests.browser import wait_for
+from tests.browser import pages, wait_for
 
 IMAGE = b"\x89PNG\r\n"
 HOVER = ":is(.hoverlayer .hovertext, .hoverlayer .legend)"
@@ -27,29 +27,20 @@ def curved(curved):
 
 @pytest.fixture
 def opened(browser, tmp_path):
-    """Function that opens a page from disk at a width; errors and requests end the test with a failure."""
-    pages, troubles = [], []
+    """Function that opens a page from disk at a width."""
+    path = tmp_path / "report.html"
+    with pages(browser, path.as_uri()) as new_page:
 
-    def open_page(text, width=1400, scheme="light"):
-        path = tmp_path / "report.html"
-        path.write_text(text, encoding="utf-8")
-        page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        pages.append(page)
-        page.on("pageerror", lambda error: troubles.append(str(error)))
-        page.on("console", lambda said: troubles.append(said.text))
-        page.on("dialog", lambda dialog: troubles.append(dialog.message))
-        page.on("request", lambda request: troubles.append(request.url))
-        page.goto(path.as_uri())
-        assert troubles.pop(0) == path.as_uri()
-        page.set_viewport_size({"width": width, "height": 5000})  # figures are drawn when they are near
-        for plot in page.query_selector_all(".plot"):
-            page.wait_for_selector(f"#{plot.get_attribute('id')}[data-ready]")
-        return page
+        def open_page(text, width=1400, scheme="light"):
+            path.write_text(text, encoding="utf-8")
+            page = new_page(width, scheme)
+            page.goto(path.as_uri())
+            page.set_viewport_size({"width": width, "height": 5000})  # figures are drawn when they are near
+            for plot in page.query_selector_all(".plot"):
+                page.wait_for_selector(f"#{plot.get_attribute('id')}[data-ready]")
+            return page
 
-    yield open_page
-    for page in pages:
-        page.close()
-    assert troubles == []
+        yield open_page
 
 
 def drawn(page, name, figure="data-0"):
