@@ -95,22 +95,24 @@ def write(tmp_path):
 
 @pytest.fixture
 def refusal():
-    """Return `refusal(read, path, error, *parts)`, which expects `error` from `read(path)`.
+    """Return `refusal(read, path, error, *parts)`, which expects `error` (or one of several) of `read(path)`.
 
-    Its message must be one sentence that begins with the file's name and contains every one of `parts`.
+    Its message, which is returned, must be one sentence that begins with the file's name and contains every
+    one of `parts`.
     """
 
     def refusal(read, path, error, *parts, **kwargs):
         with pytest.raises(error) as caught:
             read(path, **kwargs)
         message = str(caught.value)
-        assert type(caught.value) is error
+        assert type(caught.value) in (error if isinstance(error, tuple) else (error,))
         assert message.startswith(str(path))
         sentence = message.removeprefix(str(path))  # the path must not supply the words
         for part in parts:
             assert part in sentence, message
         assert "\n" not in message
         assert not message.endswith(".")
+        return message
 
     return refusal
 

@@ -7,13 +7,8 @@ from pellicle.recipes import read_recipe
 
 
 @pytest.fixture
-def read(tmp_path):
-    def read(text: str):
-        path = tmp_path / "film.toml"
-        path.write_text(text)
-        return read_recipe(path)
-
-    return read
+def read(write):
+    return lambda text: read_recipe(write(text, "film.toml"))
 
 
 @pytest.fixture
@@ -22,14 +17,17 @@ def scene(read):
 
 
 @pytest.fixture
-def refused(read, tmp_path):
+def scene_of(scene):
+    """The scene of 100 nm of a material on silicon, with more lines of its layer."""
+    head = "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nthickness = 100\n"
+    return lambda material, more="": scene(f"{head}material = {material}\n{more}")
+
+
+@pytest.fixture
+def refused(write, refusal):
+    """Check that a recipe, or its scene, is refused by one sentence with these words."""
+
     def refused(text: str, *said: str):
-        with pytest.raises(DataError) as caught:
-            read(text).scene()
-        message = str(caught.value)
-        assert message.startswith(f"{tmp_path / 'film.toml'}: ")
-        assert "\n" not in message
-        for words in said:
-            assert words in message, message
+        refusal(lambda path: read_recipe(path).scene(), write(text, "film.toml"), DataError, *said)
 
     return refused

@@ -5,30 +5,21 @@ import pytest
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.errors import DataError
 from pellicle.fitting.film.parameters import parameters
-from pellicle.recipes.read import read_recipe
 
 FREE = "{ model = 'constant', n = { lower = 1.5, upper = 2 } }"
 LAYER = f"{{ ordinary = 1.5, extraordinary = {FREE}, axis = AXIS }}"
 BIREFRINGENT = "{ ordinary = 1.5, extraordinary = 1.6 }"
 
 
-def scene(tmp_path, material: str, more: str = ""):
-    path = tmp_path / "recipe.toml"
-    path.write_text(
-        f"[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = {material}\nthickness = 100\n{more}"
-    )
-    return read_recipe(str(path)).scene()
-
-
-def test_uniaxial_layer_with_a_free_index_and_a_free_angle(tmp_path):
-    own = scene(tmp_path, LAYER.replace("AXIS", "[{ lower = 0, upper = 90 }, 20]"))
+def test_uniaxial_layer_with_a_free_index_and_a_free_angle(scene_of):
+    own = scene_of(LAYER.replace("AXIS", "[{ lower = 0, upper = 90 }, 20]"))
     found = [(p.name, p.unit, p.lower, p.upper) for p in parameters(own)]
     assert found == [("extraordinary.n", "", 1.5, 2.0), ("axis_theta", "deg", 0.0, 90.0)]
     assert own.layers[0].material.order is None
 
 
-def test_biaxial_layer_of_named_media_along_the_laboratory_axes(tmp_path):
-    own = scene(tmp_path, "{ x = 'SiO2', y = 1.6, z = 1.5, axis = [90, 0, 0] }").layers[0].material
+def test_biaxial_layer_of_named_media_along_the_laboratory_axes(scene_of):
+    own = scene_of("{ x = 'SiO2', y = 1.6, z = 1.5, axis = [90, 0, 0] }").layers[0].material
     assert isinstance(own, Anisotropic)
     assert own.order == (2, 1, 0)
     assert own.x.name == "SiO2"
@@ -47,12 +38,12 @@ def test_biaxial_layer_of_named_media_along_the_laboratory_axes(tmp_path):
         (f"{{ mix = 'linear', host = {BIREFRINGENT}, inclusion = 1, fraction = 0.5 }}", "isotropic media"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path, material, message):
+def test_what_is_wrong_is_named(scene_of, material, message):
     with pytest.raises(DataError, match=message):
-        scene(tmp_path, material)
+        scene_of(material)
 
 
 @pytest.mark.parametrize("free", ["n", "axis_theta"])
-def test_free_numbers_that_need_bounds_are_refused(tmp_path, free):
+def test_free_numbers_that_need_bounds_are_refused(scene_of, free):
     with pytest.raises(DataError, match="birefringent layer"):
-        scene(tmp_path, LAYER.replace("AXIS", "[0, 0]"), f"free = ['{free}']")
+        scene_of(LAYER.replace("AXIS", "[0, 0]"), f"free = ['{free}']")

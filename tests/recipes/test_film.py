@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.dispersion.empirical import Cauchy, Constant
-from pellicle.errors import DataError
 from pellicle.fitting.film.parameters import parameters
-from pellicle.recipes import read_recipe
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
 
@@ -251,17 +249,15 @@ def test_layers_that_make_no_sense(refused, layer, said):
     refused(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\n{layer}\n', said)
 
 
-def test_a_file_has_its_own_words(tmp_path, write):
+def test_a_file_has_its_own_words(tmp_path, read):
     """What a file does not say is that of the recipe; `back = false` makes the plate a half space."""
-    path = write(
+    found = read(
         "[data]\nangle = 10.0\nnoise = 0.01\n[[data.file]]\npath = 'r.csv'\n"
         "[[data.file]]\npath = 'e.csv'\nsignal = 'psi-delta'\nangle = 70.0\nback = false\n"
         "instrument = { bandwidth = 2.0, scale = 1.0 }\n"
         "[scene]\nsubstrate = { material = 'SiO2', back = 'air', plate_mm = 2.0 }\n"
-        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n",
-        "film.toml",
+        "[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n[instrument]\nscale = 'free'\nbandwidth = 3.0\n"
     )
-    found = read_recipe(path)
     assert found.files == [str(tmp_path / name) for name in ("r.csv", "e.csv")]
     first, second = found.each
     assert (first.tables.data.angle, second.tables.data.angle) == (10.0, 70.0)
@@ -273,58 +269,40 @@ def test_a_file_has_its_own_words(tmp_path, write):
     assert second.scene().substrate.plate_mm == 2.0
 
 
-def test_how_files_are_read(write):
+def test_how_files_are_read(read):
     """The words of the flags, of all files or of one."""
-    path = write(
+    recipe = read(
         "[data]\ncolumns = 'wavelength,R,_'\nwavelength_unit = 'µm'\n[[data.file]]\npath = 'a.csv'\n"
-        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE,
-        "film.toml",
+        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE
     )
-    first, second = (found.tables.data for found in read_recipe(path).each)
+    first, second = (found.tables.data for found in recipe.each)
     assert (first.columns, second.columns) == ("wavelength,R,_", ["energy", "T"])
     assert (first.wavelength_unit, second.wavelength_unit) == ("µm", "µm")
     assert (first.signal_unit, second.signal_unit, first.spot, second.spot) == (None, "%", None, 2)
 
 
-def test_bad_words_of_a_file(tmp_path):
-    path = tmp_path / "film.toml"
-    for words, said in (
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
         ("files = ['b.csv']\n[[data.file]]\npath = 'a.csv'", "exclude each other"),
         ("[[data.file]]\npath = 'a.csv'\nnoize = 1", "did you mean 'noise'"),
         ("[[data.file]]\nsignal = 'R'", "data.file.0.path is missing"),
         ("[[data.file]]\npath = 'a.csv'\ninstrument = { scal = 1 }", "scale"),
-    ):
-        path.write_text(
-            f"[data]\n{words}\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 10\n"
-        )
-        with pytest.raises(DataError, match=said):
-            read_recipe(path)
+    ],
+)
+def test_bad_words_of_a_file(refused, words, said):
+    refused(f"[data]\n{words}\n{BASE}", said)
 
 
-def test_calibration_errors_as_parameters(tmp_path):
+def test_calibration_errors_as_parameters(scene, refused):
     """The angle of incidence and the wavelengths of an instrument that is off."""
-    path = tmp_path / "off.toml"
-    text = """[data]
-signal = "psi-delta"
-angle = {angle}
-[scene]
-substrate = "Si"
-[[scene.layer]]
-material = "SiO2"
-thickness = {{ lower = 10, upper = 300 }}
-[instrument]
-wavelength_shift = {{ lower = -2, upper = 2 }}
-"""
-    path.write_text(text.format(angle="{ lower = 69, upper = 71 }"))
-    scene = read_recipe(path).scene()
-    assert (scene.light.angle.lower, scene.light.angle.upper) == (69, 71)
-    assert scene.instrument.wavelength_shift.start == 0
-    path.write_text(text.format(angle="{ lower = 69, upper = 91 }"))
-    with pytest.raises(DataError, match="must lie in 0 to 90 degrees, got 91"):
-        read_recipe(path).scene()
-    path.write_text(text.format(angle="91"))
-    with pytest.raises(DataError, match="angle"):
-        read_recipe(path)
+    end = f"{BASE}[instrument]\nwavelength_shift = {{ lower = -2, upper = 2 }}\n"
+    head = "[data]\nsignal = 'psi-delta'\nangle = "
+    found = scene(f"{head}{{ lower = 69, upper = 71 }}\n{end}")
+    assert (found.light.angle.lower, found.light.angle.upper) == (69, 71)
+    assert found.instrument.wavelength_shift.start == 0
+    refused(f"{head}{{ lower = 69, upper = 91 }}\n{end}", "must lie in 0 to 90 degrees, got 91")
+    refused(f"{head}91\n{end}", "angle")
 
 
 def test_an_angle_shift(scene):

@@ -8,7 +8,7 @@ from pellicle.dispersion.effective_medium import Bruggeman, Looyenga, MaxwellGar
 from pellicle.dispersion.oscillators import Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.parameters import fixed_numbers, parameters
-from pellicle.recipes import media_words, read_recipe
+from pellicle.recipes import media_words
 from pellicle.recipes.dispersion_models import KNOTS, MODELS, TERMS
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
@@ -18,20 +18,13 @@ from pellicle.scene.layers import Layer
 AT = np.array([450.0, 633.0, 850.0])
 
 
-def scene_of(tmp_path, material: str):
-    path = tmp_path / "recipe.toml"
-    path.write_text(f'[scene]\nsubstrate = "Si"\n[[scene.layer]]\nthickness = 100\nmaterial = {material}\n')
-    return read_recipe(path).scene()
-
-
 def names(scene):
     return {p.name: p for p in parameters(scene)}
 
 
-def test_a_porous_layer(tmp_path):
+def test_a_porous_layer(scene_of):
     scene = scene_of(
-        tmp_path,
-        '{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }',
+        '{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }'
     )
     assert isinstance(scene.layers[0].material, Bruggeman)
     (fraction,) = parameters(scene)
@@ -40,19 +33,18 @@ def test_a_porous_layer(tmp_path):
     assert fraction.searched
 
 
-def test_a_list_of_two_is_host_and_inclusion(tmp_path):
-    listed = scene_of(tmp_path, '{ mix = "maxwell-garnett", materials = ["SiO2", "Au"], fraction = 0.1 }')
-    named = scene_of(tmp_path, '{ mix = "maxwell-garnett", host = "SiO2", inclusion = "Au", fraction = 0.1 }')
+def test_a_list_of_two_is_host_and_inclusion(scene_of):
+    listed = scene_of('{ mix = "maxwell-garnett", materials = ["SiO2", "Au"], fraction = 0.1 }')
+    named = scene_of('{ mix = "maxwell-garnett", host = "SiO2", inclusion = "Au", fraction = 0.1 }')
     assert isinstance(listed.layers[0].material, MaxwellGarnett)
     np.testing.assert_array_equal(listed.layers[0].material(AT), named.layers[0].material(AT))
 
 
-def test_mixtures_of_models_and_of_mixtures(tmp_path):
+def test_mixtures_of_models_and_of_mixtures(scene_of):
     scene = scene_of(
-        tmp_path,
         '{ mix = "looyenga", fraction = 0.2, inclusion = 1.0,'
         ' host = { mix = "linear", host = { model = "cauchy", A = { lower = 1.3, upper = 1.7 } },'
-        ' inclusion = { model = "tauc-lorentz", Eg = { lower = 1.0, upper = 3.0 } }, fraction = 0.4 } }',
+        ' inclusion = { model = "tauc-lorentz", Eg = { lower = 1.0, upper = 3.0 } }, fraction = 0.4 } }'
     )
     assert isinstance(scene.layers[0].material, Looyenga)
     assert set(names(scene)) == {"host.host.A", "host.inclusion.Eg"}
@@ -64,12 +56,11 @@ def test_mixtures_of_models_and_of_mixtures(tmp_path):
     assert fixed["host.host.C"] == (0.0, "nm^4")
 
 
-def test_a_sum_of_oscillators(tmp_path):
+def test_a_sum_of_oscillators(scene_of):
     scene = scene_of(
-        tmp_path,
         '{ model = "oscillators", eps_inf = { lower = 1, upper = 4 }, terms = ['
         '{ kind = "lorentz", A = { lower = 0, upper = 3 }, E0 = 3.0, gamma = 0.4 },'
-        '{ kind = "gaussian", E0 = { lower = 3, upper = 5 } } ] }',
+        '{ kind = "gaussian", E0 = { lower = 3, upper = 5 } } ] }'
     )
     material = scene.layers[0].material
     assert isinstance(material, Oscillators)
@@ -80,16 +71,13 @@ def test_a_sum_of_oscillators(tmp_path):
     assert (found["term1.A"].unit, found["term2.E0"].unit) == ("", "eV")
 
 
-def test_splines(tmp_path):
+def test_splines(scene_of):
     scene = scene_of(
-        tmp_path,
-        '{ model = "spline", knots = [400, 600, 900], n = { lower = 1.2, upper = 2.5 }, k = [0.1, 0, 0] }',
+        '{ model = "spline", knots = [400, 600, 900], n = { lower = 1.2, upper = 2.5 }, k = [0.1, 0, 0] }'
     )
     assert set(names(scene)) == {"n1", "n2", "n3"}
     assert scene.layers[0].material.knots == (400, 600, 900)
-    scene = scene_of(
-        tmp_path, '{ model = "spline-kk", knots = [400, 600, 900], k = { lower = 0, upper = 1 } }'
-    )
+    scene = scene_of('{ model = "spline-kk", knots = [400, 600, 900], k = { lower = 0, upper = 1 } }')
     assert set(names(scene)) == {"k1", "k2", "k3"}
     assert all(p.natural[0] for p in parameters(scene))
 
@@ -119,9 +107,9 @@ def test_splines(tmp_path):
         ('{ model = "spline", knots = "many" }', "knots must be"),
     ],
 )
-def test_refused_in_one_sentence(tmp_path, material, said):
+def test_refused_in_one_sentence(scene_of, material, said):
     with pytest.raises(DataError) as error:
-        scene_of(tmp_path, material)
+        scene_of(material)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -188,11 +176,10 @@ def test_numbers_of_two_layers_do_not_collide():
     assert {"top.A", "layer2.A"} <= set(found)
 
 
-def test_a_graded_layer(tmp_path):
+def test_a_graded_layer(scene_of):
     scene = scene_of(
-        tmp_path,
         '{ graded = ["SiO2", { model = "cauchy", A = { lower = 1.8, upper = 2.1 } }], mix = "linear",'
-        ' profile = "exponential", top = { lower = 0, upper = 1 }, bottom = 0.2, length = 0.3 }',
+        ' profile = "exponential", top = { lower = 0, upper = 1 }, bottom = 0.2, length = 0.3 }'
     )
     material = scene.layers[0].material
     assert isinstance(material, Graded)
@@ -201,11 +188,11 @@ def test_a_graded_layer(tmp_path):
     assert names(scene)["top"].searched
 
 
-def test_a_free_profile(tmp_path):
+def test_a_free_profile(scene_of):
     graded = (
         '{ graded = ["SiO2", "Si3N4"], profile = "spline", values = [0, { lower = 0, upper = 1 }, 0.4, 1] }'
     )
-    (value,) = parameters(scene_of(tmp_path, graded))
+    (value,) = parameters(scene_of(graded))
     assert (value.name, value.group, value.natural) == ("values2", "values", (True, False))
 
 
@@ -220,6 +207,6 @@ def test_a_free_profile(tmp_path):
         ('{ graded = ["SiO2"] }', "graded"),
     ],
 )
-def test_graded_layers_that_are_refused(tmp_path, material, message):
+def test_graded_layers_that_are_refused(scene_of, material, message):
     with pytest.raises(DataError, match=message):
-        scene_of(tmp_path, material)
+        scene_of(material)

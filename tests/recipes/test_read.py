@@ -39,25 +39,20 @@ def test_a_byte_order_mark(write):
     ("text", "message"),
     [
         (b"\xff\xfe\x00", "is not UTF-8 text, and a recipe is a TOML file; data files are arguments"),
-        ("[scene\n", "is not TOML, as a recipe must be: .*line 1"),
+        ("[scene\n", "is not TOML, as a recipe must be: "),
+        ("[scene\n", "line 1"),
         ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
-        (SURFACE.replace("model", "modle"), r"scene\.surface\.model is missing"),
-        (SURFACE.replace("noise", "noize"), r"unknown key 'data\.noize' \(did you mean 'noise'\?\)"),
-        (SURFACE.replace("[data]", "[Data]"), r"unknown key 'Data' \(did you mean 'data'\?\)"),
+        (SURFACE.replace("model", "modle"), "scene.surface.model is missing"),
+        (SURFACE.replace("noise", "noize"), "unknown key 'data.noize' (did you mean 'noise'?)"),
+        (SURFACE.replace("[data]", "[Data]"), "unknown key 'Data' (did you mean 'data'?)"),
     ],
 )
-def test_refused_in_one_sentence(write, text, message):
-    path = write(text)
-    with pytest.raises(DataError, match=message) as caught:
-        pl.read_recipe(path)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert "\n" not in str(caught.value)
+def test_refused_in_one_sentence(refused, text, message):
+    refused(text, message)
 
 
-def test_errors_of_a_surface_name_the_recipe(write):
-    path = write(SURFACE.replace("thickness", "thicknes"))
-    with pytest.raises(DataError, match=r"film\.csv: scene\.surface: microfacet-film has no 'thicknes'"):
-        pl.read_recipe(path).scene()
+def test_errors_of_a_surface_name_the_recipe(refused):
+    refused(SURFACE.replace("thickness", "thicknes"), "scene.surface: microfacet-film has no 'thicknes'")
 
 
 def test_files_that_are_no_recipe(tmp_path):
