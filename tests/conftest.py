@@ -2,10 +2,13 @@
 
 import dataclasses
 import gc
+import importlib
 import importlib.util
 import os
 import shutil
 import signal
+import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import hypothesis
@@ -70,6 +73,23 @@ def load_script():
         return module
 
     return load_script
+
+
+@pytest.fixture(scope="session")
+def modules_of():
+    """Return a context of the modules of a folder that is no package, by their names."""
+
+    @contextmanager
+    def modules_of(folder: Path, *names: str):
+        before = set(sys.modules)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.syspath_prepend(folder)
+            yield {name: importlib.import_module(name) for name in names}
+        for name in set(sys.modules) - before:
+            if str(getattr(sys.modules[name], "__file__", "")).startswith(str(folder)):
+                del sys.modules[name]
+
+    return modules_of
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import importlib
 import os
-import sys
 from pathlib import Path
 
 import jax
@@ -17,18 +16,14 @@ LAYERS = [(1.9 + 4000 / NM**2, 200.0), (np.full(5, 1.46 + 0.02j), 7.0)]
 
 
 @pytest.fixture(scope="module")
-def benchmark():
+def benchmark(modules_of):
     """Return a function that imports a module of the benchmarks; what these set is restored."""
-    double, others = jax.config.read("jax_enable_x64"), set(sys.modules)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(HERE)
+    double = jax.config.read("jax_enable_x64")
+    with pytest.MonkeyPatch.context() as patch, modules_of(HERE):
         for name in ("XLA_FLAGS", "OMP_NUM_THREADS"):
             patch.setenv(name, os.environ.get(name, ""))
         yield importlib.import_module
     jax.config.update("jax_enable_x64", double)
-    for name in set(sys.modules) - others:
-        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(HERE)):
-            del sys.modules[name]
 
 
 def _by_tmm(polarisation: str, angle: float, i: int, layers=LAYERS, substrate=SILICON) -> dict:

@@ -1,6 +1,5 @@
 """Comparison with other packages: reference values, errors and table. None of the packages is needed."""
 
-import importlib
 import json
 import math
 import runpy
@@ -15,15 +14,10 @@ NAMES = ("cases", "truth", "table", "packages", "birefringent", "graded", "adapt
 
 
 @pytest.fixture(scope="module")
-def peers():
+def peers(modules_of):
     """Modules of the script, which belong to no package."""
-    sys.path.insert(0, str(HERE))
-    try:
-        yield {name: importlib.import_module(name) for name in NAMES}
-    finally:
-        sys.path.remove(str(HERE))
-        for name in [*NAMES, "adapters"]:
-            sys.modules.pop(name, None)
+    with modules_of(HERE, *NAMES) as modules:
+        yield modules
 
 
 def test_reference_values_agree_with_pellicle(peers):

@@ -1,9 +1,7 @@
 """Benchmark of verdicts: its independent model, its cases and its scores."""
 
-import importlib
 import math
 import runpy
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +29,10 @@ NAMES = (
 
 
 @pytest.fixture(scope="module")
-def bench():
+def bench(modules_of):
     """Modules of the script, which belong to no package, and its names."""
-    sys.path.insert(0, str(HERE))
-    try:
-        modules = {name: importlib.import_module(name) for name in NAMES}
+    with modules_of(HERE, *NAMES) as modules:
         yield modules | {"script": runpy.run_path(str(HERE / "__main__.py"), run_name="verdicts")}
-    finally:
-        sys.path.remove(str(HERE))
-        for name in NAMES:
-            sys.modules.pop(name, None)
 
 
 def stacks(count: int = 20):

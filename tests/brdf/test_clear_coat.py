@@ -8,6 +8,7 @@ import tmm
 from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import model
+from tests.directions import unit
 
 COATED = model("clear-coat-film")
 EVALUATE = jax.jit(lambda numbers, i, o: COATED(numbers, i, o))
@@ -25,11 +26,6 @@ NUMBERS = {
     "diffuse": 0.03,
 }
 RGB = (645.0, 525.0, 445.0)
-
-
-def unit(theta, phi):
-    theta, phi = np.deg2rad([theta, phi])
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
 def facets(i, o, alpha):

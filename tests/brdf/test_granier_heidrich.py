@@ -10,6 +10,7 @@ from pellicle.brdf import granier_heidrich as gh
 from pellicle.brdf.albedo import directional_albedo, energy_warning, max_albedo
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import PRESETS, model
+from tests.directions import unit
 
 RNG = np.random.default_rng(5)
 N = 40
@@ -33,11 +34,6 @@ def jitted(name):
 
 
 PUBLISHED, RECIPROCAL = jitted("granier-heidrich"), jitted("granier-heidrich-reciprocal")
-
-
-def unit(theta, phi):
-    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
 def downward(v, index):

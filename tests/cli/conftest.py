@@ -56,19 +56,17 @@ def pellicle(monkeypatch, capsys) -> Callable[..., Ran]:
 
 
 @pytest.fixture
-def spectrum_file(tmp_path) -> Callable[..., Any]:
+def spectrum_file(write) -> Callable[..., Any]:
     """Writes a spectrum of 1.46 on 3.9 + 0.02i: 100 points with noise of 0.002, so 128 once padded."""
 
-    def write(name: str = "oxide.csv", thickness: float = 300.0, seed: int = 0):
+    def file(name: str = "oxide.csv", thickness: float = 300.0, seed: int = 0, index: float = 1.46):
         nm = np.linspace(400.0, 796.0, 100)
-        clean = np.asarray(reflectance(nm, thickness, Constant(1.46), Constant(3.9, 0.02)))
+        clean = np.asarray(reflectance(nm, thickness, Constant(index), Constant(3.9, 0.02)))
         values = clean + np.random.default_rng(seed).normal(0, 0.002, nm.size)
-        path = tmp_path / name
         rows = "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True))
-        path.write_text("wavelength_nm,R\n" + rows)
-        return path
+        return write("wavelength_nm,R\n" + rows, name)
 
-    return write
+    return file
 
 
 SCENE = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:800")

@@ -2,29 +2,17 @@
 
 import math
 
-import numpy as np
 import pytest
-
-from pellicle.dispersion import Constant
-from pellicle.simulation.functions import reflectance
 
 CAUCHY = "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"
 
 
-@pytest.fixture
-def wrong_index(write):
-    """A film of 1.52, which a recipe with 1.46 misses."""
-    nm = np.linspace(400.0, 796.0, 100)
-    clean = np.asarray(reflectance(nm, 300.0, Constant(1.52), Constant(3.9, 0.02)))
-    values = clean + np.random.default_rng(0).normal(0, 0.002, nm.size)
-    return write("wavelength_nm,R\n" + "".join(f"{w:g},{r:.6f}\n" for w, r in zip(nm, values, strict=True)))
-
-
 @pytest.mark.slow
-def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, wrong_index, tmp_path):
+def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_file, tmp_path):
+    film = spectrum_file(index=1.52)
     a, b = scene_recipe(name="a.toml"), scene_recipe(name="b.toml", material=CAUCHY)
     [again] = pellicle(
-        "compare", wrong_index, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out", code=0
+        "compare", film, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out", code=0
     ).objects
     assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
     assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")

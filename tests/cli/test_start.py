@@ -124,17 +124,6 @@ def test_a_folder_that_others_can_write_keeps_no_machine_code(spectrum_file, tmp
     assert f"{cache}: others can write to this folder" in ran.stderr
 
 
-@pytest.mark.slow  # a process that compiles for 4 s; the test above has one without a cache
-def test_no_cache_where_it_is_off(spectrum_file, tmp_path):
-    flags = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "299:301")
-    home = tmp_path / "home"
-    home.mkdir()
-    folders = {"HOME": str(home), "XDG_CACHE_HOME": str(home / "cache")}
-    ran = run("fit", spectrum_file(), *flags, PELLICLE_CACHE="off", **folders)
-    assert ran.returncode in (0, 4), ran.stderr
-    assert not list(home.iterdir())
-
-
 def test_where_programs_are_kept(monkeypatch, tmp_path):
     folder = session.cache_folder
     monkeypatch.setenv("PELLICLE_CACHE", "OFF")

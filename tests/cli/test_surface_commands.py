@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_brdf import read_brdf_samples
+from tests.directions import unit
 
 RECIPE = """
 [data]
@@ -20,14 +21,9 @@ diffuse = 0.05
 """
 
 
-def vectors(theta, phi):
-    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
 def by_hand(d):
     """A bare face of index 2 in a Blinn-Phong lobe of exponent 4, on 0.05/sr."""
-    i, o = vectors(d.theta_i, d.phi_i), vectors(d.theta_o, d.phi_o)
+    i, o = unit(d.theta_i, d.phi_i), unit(d.theta_o, d.phi_o)
     h = (i + o) / np.linalg.norm(i + o, axis=-1, keepdims=True)
     c0 = np.sum(i * h, axis=-1)
     c1 = np.sqrt(1 - (1 - c0**2) / 4)

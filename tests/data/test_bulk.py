@@ -6,7 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.tabular import table as bulk
 from pellicle.errors import DataError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.round(np.linspace(200, 2000, 500), 3)
 VALUES = np.round(0.3 + 0.1 * np.sin(NM / 10), 5)

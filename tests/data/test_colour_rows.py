@@ -5,13 +5,9 @@ import pytest
 
 from pellicle.data.colour_rows import is_colour_table, read_colour_rows
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read, rows
 
 RGB = np.array([[0.2, 0.41, 0.83], [0.5, 0.35, 0.11]])
-
-
-def rows(*columns, mark=",", form="{:.10g}"):
-    return "".join(mark.join(form.format(x) for x in row) + "\n" for row in zip(*columns, strict=True))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 
 @pytest.fixture

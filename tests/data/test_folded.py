@@ -6,7 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.optics.ellipsometry import alpha_beta
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.array([400.0, 500.0, 600.0])
 PSI = np.array([20.0, 45.0, 80.0])

@@ -9,7 +9,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.signals.folded_delta import can_be_folded, kinks
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.arange(300.0, 900.5, 2.0)
 

@@ -8,7 +8,7 @@ from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, delta_sigma
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 SIGNAL = "generalised-psi-delta"
 

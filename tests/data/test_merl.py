@@ -8,7 +8,8 @@ import pytest
 from pellicle.data.half_angles import angles, from_half_difference, vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
+from tests.directions import unit
 
 SHAPE = (90, 90, 180)
 CELLS = 90 * 90 * 180
@@ -35,11 +36,6 @@ def cell(light, eye):
     return np.array(
         [np.sqrt(theta_h / (np.pi / 2) * 90 * 90), theta_d / (np.pi / 2) * 90, phi_d % np.pi / np.pi * 180]
     ).astype(int)
-
-
-def unit(theta, phi):
-    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
 @pytest.fixture(scope="module")

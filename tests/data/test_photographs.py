@@ -14,7 +14,7 @@ from pellicle.data.photographs import (
     strip,
 )
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (12, 20, 3), dtype=np.uint8)
 

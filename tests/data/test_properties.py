@@ -9,7 +9,7 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NAMES = {
     "nm": "wavelength (nm)",

@@ -12,7 +12,7 @@ from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 HEADER = "theta_i,phi_i,theta_o,phi_o,R,G,B\n"
 ROW = "30,0,40,180,0.1,0.2,0.3\n"

@@ -9,7 +9,7 @@ from PIL import Image, ImageCms
 import pellicle as pl
 from pellicle.data.read_colours import read_colours, read_colours_by_film
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 RNG = np.random.default_rng(3)
 PIXELS = RNG.integers(20, 200, (20, 30, 3), dtype=np.uint8)

@@ -6,7 +6,7 @@ import pytest
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 GRID = np.array([400.0, 500.0, 600.0, 700.0, 800.0])
 

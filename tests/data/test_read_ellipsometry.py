@@ -8,7 +8,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read, rows
 
 NM = np.array([400.0, 500.0, 600.0])
 PSI = np.array([20.0, 25.5, 31.0])
@@ -18,12 +18,6 @@ DELTA = np.array([170.0, 179.5, 190.25])
 @pytest.fixture
 def refused(refusal):
     return partial(refusal, read_spectrum)
-
-
-def rows(*columns, separator=","):
-    return "".join(
-        separator.join(f"{cell:.12g}" for cell in row) + "\n" for row in zip(*columns, strict=True)
-    )
 
 
 def assert_film(spectrum):
@@ -111,7 +105,7 @@ def test_psi_and_delta_go_before_ncs_beside_them(write):
 
 
 def test_three_columns_without_a_header(write, refused):
-    path = write(rows(NM, PSI, DELTA, separator=" "))
+    path = write(rows(NM, PSI, DELTA, mark=" "))
     assert_film(read_spectrum(path, signal="psi-delta"))
     refused(path, UsageError, "no header", "`signal=")
 

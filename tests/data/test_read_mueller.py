@@ -6,7 +6,7 @@ import pytest
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.linspace(400.0, 800.0, 6)
 M12, M33, M34 = np.linspace(-0.9, 0.8, 6), np.linspace(0.3, -0.4, 6), np.linspace(0.1, 0.5, 6)

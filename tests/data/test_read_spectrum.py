@@ -7,7 +7,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 WAVELENGTH = [400.0, 450.5, 500.0, 600.0, 700.0, 800.0]
 VALUES = [0.1, 0.25, 0.3, 0.35, 0.2, 0.15]

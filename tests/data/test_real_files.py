@@ -6,7 +6,7 @@ import pytest
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 CALIBRATED = {
     "regresspro_filmetrics_F20/quartz_reflectance.csv": ("R", 1341),

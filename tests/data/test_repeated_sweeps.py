@@ -10,14 +10,11 @@ from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.repeated_sweeps import mean_spectrum, repeatability, sweep_numbers
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.sphere import ncs
+from tests.data.tables import rows
 
 NM = np.arange(400.0, 500.0, 10.0)
 LEVELS = 0.3 + 0.1 * np.cos(NM / 20)
-SWEEPS = LEVELS + np.random.default_rng(0).normal(0, 0.003, (3, NM.size)).round(6)
-
-
-def rows(*columns) -> str:
-    return "".join(",".join(f"{x:.10g}" for x in row) + "\n" for row in zip(*columns, strict=True))
+SWEEPS = (LEVELS + np.random.default_rng(0).normal(0, 0.003, (3, NM.size))).round(6)
 
 
 UP = [rows(NM, sweep) for sweep in SWEEPS]
@@ -109,7 +106,7 @@ def test_repeatability_of_psi_and_delta_is_that_of_psi():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (UP[0] + UP[1][: len(UP[1]) // 2 + 1], ("line 12", "400 turns back after 490", "complete sweeps")),
+        (UP[0] + rows(NM[:5], SWEEPS[1][:5]), ("line 12", "400 turns back after 490", "complete sweeps")),
         (rows(NM[[0, 2, 1, 3, 4, 5]], LEVELS[:6]) * 2, ("line 4", "410 turns back after 420")),
         (rows(NM[:4], LEVELS[:4]) * 2, ("line 6", "400 turns back")),  # too short for a sweep
         (rows(NM, LEVELS) + rows(NM, 1.5 * LEVELS), ("2 sweeps", "differ by 28 %", "angle_deg")),

@@ -5,13 +5,10 @@ import pytest
 
 from pellicle.data.sensors import read_lamp, read_sensitivities
 from pellicle.errors import DataError
+from tests.data.tables import rows
 
 NM = [500.0, 600.0, 700.0]
 BANDS = np.array([[0.1, 0.8, 0.4], [0.9, 0.3, 0.0], [0.2, 0.0, 0.05]])
-
-
-def rows(nm, *columns, mark=","):
-    return "".join(mark.join(f"{x:.10g}" for x in row) + "\n" for row in zip(nm, *columns, strict=True))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pellicle.data.settings import named, setting_numbers, settings
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.tile(np.linspace(400.0, 800.0, 6), 4)
 ANGLE = np.repeat([60.0, 60.0, 70.0, 70.0], 6)

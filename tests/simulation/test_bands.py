@@ -7,6 +7,7 @@ import pellicle as pl
 from pellicle.colour import sensor
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, default_directions
+from tests.directions import unit
 
 from ..airy import airy
 
@@ -15,14 +16,9 @@ DIRECTIONS = Directions(*(x[:128] for x in default_directions()))
 FILM = {"thickness": 320.0, "n": 1.47, "base_n": 2.7, "base_k": 2.8, "roughness": 0.3, "diffuse": 0.05}
 
 
-def vectors(theta, phi):
-    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
-
-
 def by_hand(directions, eye, numbers):
     """GGX facets with Smith's height-correlated shadowing (Heitz 2014) under a film, and a diffuse part."""
-    i, o = (vectors(getattr(directions, f"theta_{x}"), getattr(directions, f"phi_{x}")) for x in ("i", "o"))
+    i, o = (unit(getattr(directions, f"theta_{x}"), getattr(directions, f"phi_{x}")) for x in ("i", "o"))
     h = (i + o) / np.linalg.norm(i + o, axis=-1, keepdims=True)
     a2 = numbers["roughness"] ** 2
     density = a2 / (np.pi * (h[:, 2] ** 2 * (a2 - 1) + 1) ** 2)

@@ -6,18 +6,14 @@ import pytest
 from pellicle.errors import UsageError
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import default_directions, simulate_samples
-
-
-def vectors(theta, phi):
-    theta, phi = np.deg2rad(theta), np.deg2rad(phi)
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+from tests.directions import unit
 
 
 def test_directions_are_above_the_horizon_and_dense_where_a_lobe_is():
     directions = default_directions()
     assert {len(x) for x in directions} == {1000}
     assert max(directions.theta_i.max(), directions.theta_o.max()) < 90
-    i, o = vectors(directions.theta_i, directions.phi_i), vectors(directions.theta_o, directions.phi_o)
+    i, o = unit(directions.theta_i, directions.phi_i), unit(directions.theta_o, directions.phi_o)
     half = np.rad2deg(np.arccos((i + o)[:, 2] / np.linalg.norm(i + o, axis=-1)))
     assert np.mean(half < 10) > 0.3
     assert len(default_directions(10).phi_o) == 10

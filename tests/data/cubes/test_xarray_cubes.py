@@ -6,7 +6,7 @@ import xarray as xr
 
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import DataError, UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 NM = np.linspace(400.0, 800.0, 9)
 

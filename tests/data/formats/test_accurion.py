@@ -69,7 +69,6 @@ def test_accurion_files_that_are_refused(refused):
     refused(IMAGE.replace("#-\tdeg\tnm", "#-\tdeg\tum"), "Lambda in 'um', not in 'nm'")
     refused(IMAGE.replace("\t24.5", ""), "line 5 has fewer values")
     refused(IMAGE.replace("24.5", "94.5"), "line 5, column 'psi_deg': 94.5")
-    refused("".join(lines[:2] + lines[5:6]), "no point with psi and delta")
 
 
 def test_zones_without_their_mean_are_averaged(write):

@@ -7,7 +7,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 SAMPLES = Path(__file__).with_name("samples")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 # the ordinates of every form below, and their even axis
 VALUES = [100, 101, 104, 104, 104, 104, 99, 45, 5, -3, 12, 500]

@@ -10,7 +10,7 @@ from pellicle.data.formats import hdf5_reading, isolated
 from pellicle.data.formats import nexus as nexus_reader
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 h5py = pytest.importorskip("h5py")
 

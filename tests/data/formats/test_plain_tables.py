@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 PERCENT = "400{c}10{d}5{n}500{c}20{d}5{n}"
 

@@ -9,7 +9,7 @@ import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
-from tests.data.comparison import assert_read
+from tests.data.tables import assert_read
 
 pytest.importorskip("defusedxml")
 

@@ -1,4 +1,4 @@
-"""Comparison of what was read with what a file states."""
+"""Texts of tables, and comparison of what was read with what they state."""
 
 from typing import Any
 
@@ -13,3 +13,8 @@ def assert_read(data: Any, rtol: float = 1e-12, **expected: Any) -> None:
             assert read == value, name
         else:
             np.testing.assert_allclose(read, value, rtol=rtol, err_msg=name)
+
+
+def rows(*columns: Any, mark: str = ",") -> str:
+    """Lines of the numbers of these columns."""
+    return "".join(mark.join(f"{x:.12g}" for x in row) + "\n" for row in zip(*columns, strict=True))
