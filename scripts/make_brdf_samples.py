@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pellicle
-from pellicle.data.write_brdf import write_brdf_samples
+from pellicle.data.brdf_samples import write_brdf_samples
 from pellicle.recipes import read_recipe
 from pellicle.simulation.brdf import default_directions, simulate_samples
 

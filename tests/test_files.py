@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.data.brdf_samples import write_brdf_samples
 from pellicle.data.colours import write_colours
-from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.errors import DataError, UsageError
 from pellicle.files import _TEMPORARY, _machine, new_folder, replacing, write_text
 from pellicle.reporting.figures import draw_spectrum

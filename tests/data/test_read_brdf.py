@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pellicle as pl
-from pellicle.data.brdf_samples import BrdfSamples, spread
+from pellicle.data.brdf_samples import BrdfSamples, spread, write_brdf_samples
 from pellicle.data.read_brdf import read_brdf_samples
-from pellicle.data.write_brdf import write_brdf_samples
 from pellicle.errors import DataError, UsageError
 from tests.data.tables import assert_read
 

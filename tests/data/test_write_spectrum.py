@@ -55,13 +55,18 @@ CASES = {
     "declared": reflectance(declared=(("instrument", "A # 1"), ("date", "2024-01-01"))),
     "ellipsometry": angles(),
     "Mueller": elements(),
+    "contrast": reflectance(signal="contrast", values=0.2 * np.sin(NM / 37), sigma=np.full(7, 0.01)),
     "generalised": ratios(),
     "folded": dataclasses.replace(angles(), delta=np.linspace(5, 175, 14), folded=True),
 }
 
 
 FILES = [(name, ".csv") for name in CASES]
-FILES += [(name, suffix) for name in ("ellipsometry", "Mueller", "generalised") for suffix in (".nc", ".nxs")]
+FILES += [
+    (name, suffix)
+    for name in ("ellipsometry", "Mueller", "generalised", "contrast")
+    for suffix in (".nc", ".nxs")
+]
 
 
 @pytest.mark.parametrize(("name", "suffix"), FILES)

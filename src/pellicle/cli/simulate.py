@@ -266,7 +266,7 @@ def _write_samples(
 ) -> None:
     import numpy as np
 
-    from pellicle.data.write_brdf import write_brdf_samples
+    from pellicle.data.brdf_samples import write_brdf_samples
     from pellicle.fitting.film.messages import log_plan
     from pellicle.simulation.brdf import simulate_samples
 

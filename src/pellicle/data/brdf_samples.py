@@ -1,11 +1,13 @@
-"""Samples of a BRDF as arrays."""
+"""Samples of a BRDF as arrays, and their CSV."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 
 import numpy as np
 from jaxtyping import Int
@@ -13,6 +15,7 @@ from jaxtyping import Int
 from pellicle.data.noise_level import noise_level
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import UsageError
+from pellicle.files import write_text
 from pellicle.signals.limits import Where, refuse_first
 
 CHANNELS = (("value",), ("R", "G", "B"))
@@ -160,3 +163,32 @@ def spread(count: int, samples: int) -> Int[np.ndarray, " samples"]:
     if samples >= count:
         return np.arange(count)
     return np.sort(np.argpartition(np.arange(count) * _GOLDEN % 1, samples)[:samples])
+
+
+def write_brdf_samples(
+    path: str | os.PathLike[str],
+    samples: BrdfSamples,
+    *,
+    comments: Sequence[str] = (),
+    overwrite: bool = False,
+) -> None:
+    """Write samples as CSV, which `read_brdf_samples` reads back unchanged.
+
+    `comments` are lines of the header. Raises UsageError where `path` exists without `overwrite`, or cannot
+    be written.
+    """
+    names = [*DIRECTIONS, *samples.channels]
+    names += [] if samples.sigma is None else sigma_names(samples.channels)
+    source = " ".join(samples.path.split()) or "samples"
+    header = [
+        "# BRDF in 1/sr; directions in degrees, from the normal and around it",
+        *(f"# {line}" for line in comments),
+        f"# from {source}, sha256 {samples.sha256 or 'unknown'}",
+        f"# written by pellicle {version('pellicle')}",
+        ",".join(names),
+    ]
+    sigma = [] if samples.sigma is None else [samples.sigma]
+    columns = [*(getattr(samples, name) for name in DIRECTIONS), samples.values, *sigma]
+    # each number with the digits that reproduce it exactly
+    rows = (",".join(map(repr, row)) for row in np.column_stack(columns).tolist())
+    write_text(path, "\n".join([*header, *rows, ""]), overwrite=overwrite)

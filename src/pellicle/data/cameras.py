@@ -147,8 +147,7 @@ def read_chart(path: str | os.PathLike[str]) -> Chart:
     each = [plain.index(name) for name in ("sigma r", "sigma g", "sigma b") if name in plain]
     errors = each if len(each) == 3 else [plain.index("sigma")] if "sigma" in plain else []
     wanted = [*sets["rgb"], *sets["xyz"], *errors]
-    comma = delimiter != "," and any("," in row[i] for row in cells for i in wanted)
-    table = colour_table(file, names, rows, cells, comma)
+    table = colour_table(file, names, rows, cells, delimiter, wanted)
     numbers = table.numbers(wanted)
     if len(rows) < FEWEST:
         raise DataError(

@@ -97,8 +97,7 @@ def read_colour_rows(
     names, rows, cells, delimiter = named_cells(file, columns)
     chosen = _recognised(names, file.path)
     space = _space(file, chosen.kind, space)
-    comma = delimiter != "," and any("," in row[i] for row in cells for i in chosen.channels)
-    table = colour_table(file, names, rows, cells, comma)
+    table = colour_table(file, names, rows, cells, delimiter, chosen.channels)
     values, sigma, angle = _numbers(table, chosen)
     where = [table.places(position) for position in chosen.channels]
     values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
@@ -260,10 +259,12 @@ def colour_table(
     names: Sequence[str],
     rows: Sequence[Line],
     cells: Sequence[Sequence[str]],
-    decimal_comma: bool,
+    delimiter: str,
+    positions: Sequence[int],
 ) -> Table:
-    """Return the table of cells that `named_cells` has found."""
-    decimal = "," if decimal_comma else "."
+    """Return the table of cells that `named_cells` has found, whose numbers are at these positions."""
+    comma = delimiter != "," and any("," in row[i] for row in cells for i in positions)
+    decimal = "," if comma else "."
     layout = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
     return Table(file.path, file.sha256, layout)
 

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.data.spectrum import POLARISATIONS
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.signals.limits import Where, refuse_first
 
 SPACES = ("rgb", "srgb", "xyz", "lab")
-_POLARISATIONS = ("s", "p", "unpolarised")
 USUAL_NOISE = {"srgb": 1.5 / 255, "rgb": 0.01, "xyz": 0.005, "lab": 0.5}
 """Standard deviation of each channel where none is given: that of a good camera, or of a colorimeter."""
 _ARRAYS = ("angle", "lines")
@@ -109,7 +109,7 @@ class Colours:
         self._check_values()
 
     def _check_words(self) -> None:
-        known = {"space": SPACES, "signal": ("R", "T"), "polarisation": _POLARISATIONS}
+        known = {"space": SPACES, "signal": ("R", "T"), "polarisation": POLARISATIONS}
         for name, words in (known | {"white_balance": ("fixed", "free")}).items():
             if getattr(self, name) not in words:
                 raise UsageError(f"`{name}` must be one of {', '.join(words)}, not {getattr(self, name)!r}")

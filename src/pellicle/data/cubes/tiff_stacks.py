@@ -11,10 +11,9 @@ import numpy as np
 
 from pellicle.data.cubes.numpy_files import array_axes, need_wavelengths
 from pellicle.data.cubes.raw_cube import COUNTS, Asked, MappedFile, RawCube, Stored
-from pellicle.data.tabular.text import open_binary
+from pellicle.data.photographs import image_format
 from pellicle.errors import DataError, UsageError, install_command
 
-_SIGNATURES = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _OME_CHANNEL = re.compile(r'<Channel\b[^>]*?\bEmissionWavelength="([\d.]+)"')
 _OME_UNIT = re.compile(r'\bEmissionWavelengthUnit="([^"]+)"')
 _LABEL = re.compile(r"(?<![\d.])(\d+(?:\.\d+)?)\s*nm\b", re.IGNORECASE)
@@ -23,8 +22,7 @@ _NAMES = {"Y": "y", "X": "x", "T": "time"}
 
 def is_tiff(path: Path) -> bool:
     """True for a TIFF, by its first bytes."""
-    with open_binary(path) as file:
-        return file.read(4) in _SIGNATURES
+    return image_format(path) == "TIFF"
 
 
 def read_tiff(path: Path, asked: Asked) -> RawCube:

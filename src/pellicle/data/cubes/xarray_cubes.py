@@ -13,6 +13,7 @@ import numpy as np
 from pellicle.data.cubes.numpy_files import arrays_to_raw
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
 from pellicle.data.cubes.variable_names import choose_variables
+from pellicle.data.formats.hdf5_reading import SIGNATURE
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.text import open_binary
@@ -27,7 +28,7 @@ _PIXELS = {
 }
 _BANDS = ("band", "bands", "channel", "channels", "spectral", "wvl", "wave")
 _SIGNALS = ("signal", "signals", "quantity")
-_HDF5, _CLASSIC = b"\x89HDF\r\n\x1a\n", b"CDF"
+_CLASSIC = b"CDF"
 _STORES = ("zarr.json", ".zgroup", ".zarray", ".zmetadata")
 
 
@@ -236,7 +237,7 @@ def is_netcdf(path: Path) -> bool:
     """True for a NetCDF or HDF5 file, by its first bytes."""
     with open_binary(path) as file:
         head = file.read(8)
-    return head == _HDF5 or head.startswith(_CLASSIC)
+    return head == SIGNATURE or head.startswith(_CLASSIC)
 
 
 def is_classic(path: Path) -> bool:

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from math import dist
-from typing import TypeAlias
 
+from pellicle.data.formats.exports import Rows, measured
 from pellicle.data.tabular.layout import Layout, plain_columns
-from pellicle.data.tabular.text import Line, TextFile, is_number
+from pellicle.data.tabular.text import TextFile, is_number
 from pellicle.errors import DataError, UsageError
 
 MEAN_ZONE = "0"
@@ -25,8 +25,6 @@ _POSITION = ("X_pos", "Y_pos")
 DRIFT_MM = 1.0
 """Drift of the stage that is accepted within one spot; files show 0.1 mm."""
 _MOST_LISTED = 40
-
-Rows: TypeAlias = list[tuple[Line, list[str]]]
 
 
 def layout(file: TextFile, spot: int | None = None) -> Layout | None:
@@ -58,13 +56,11 @@ def layout(file: TextFile, spot: int | None = None) -> Layout | None:
     else:
         rows, spot_notes = _select_spot(rows, columns, spot, path)
     notes += spot_notes
-    measured = [row for row in rows if not {row[1][columns["Psi"]], row[1][columns["Delta"]]} & _UNMEASURED]
-    if len(measured) < len(rows):
-        notes.append(f"{len(rows) - len(measured)} of {len(rows)} points, written NaN, left out")
-    if not measured:
+    points, missing = measured(rows, (columns["Psi"], columns["Delta"]))
+    if not points:
         raise DataError(f"{path}: has no point with psi and delta; check the measurement")
-    kept = [(line, [cells[columns[name]] for name in _UNITS]) for line, cells in measured]
-    return plain_columns(_NAMES, kept, notes)
+    kept = [(line, [cells[columns[name]] for name in _UNITS]) for line, cells in points]
+    return plain_columns(_NAMES, kept, [*notes, *missing])
 
 
 def _check_units(columns: dict[str, int], units: Sequence[str], path: str) -> None:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import csv
 import dataclasses
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from pellicle.data.tabular.columns import Column, Statement, declarations, recognise
 from pellicle.data.tabular.layout import Layout, plain_columns
@@ -29,6 +29,7 @@ _NO_NAME = "ordinate"
 _SPECTRAL = ("R", "T")
 _NOT_STATED = "not stated"
 _DELIMITERS = ("\t", ";", ",")
+_MISSING = frozenset(("nan", "NaN", "NAN"))
 
 
 def export(
@@ -92,6 +93,19 @@ def counted(rows: Rows, stated: Iterable[str]) -> list[str]:
     if number is None or len(rows) >= int(number):
         return []
     return [f"states {int(number)} points but has {len(rows)}: it may have been cut off"]
+
+
+def measured(rows: Rows, positions: Iterable[int]) -> tuple[Rows, list[str]]:
+    """Return the rows whose cells at `positions` are not written NaN, and a note on the others."""
+    kept = [row for row in rows if _MISSING.isdisjoint(row[1][i] for i in positions)]
+    missing = len(rows) - len(kept)
+    return kept, [f"{missing} of {len(rows)} points, written NaN, left out"] if missing else []
+
+
+def first_stated(wanted: Mapping[str, Iterable[str]], text: Callable[[str], Any]) -> list[tuple[str, str]]:
+    """Return facts by the first of their names that a file has a `text` for."""
+    values = {fact: next(filter(None, map(text, names)), "") for fact, names in wanted.items()}
+    return [(fact, str(value)) for fact, value in values.items() if value]
 
 
 def told_apart(names: Sequence[str]) -> list[str]:

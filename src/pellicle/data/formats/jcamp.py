@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pellicle.data.formats.exports import Curve, axis_column, readable, signal_column
+from pellicle.data.formats.exports import Curve, axis_column, export, first_stated, readable, signal_column
 from pellicle.data.formats.jcamp_values import Point, ordinates, plain_numbers
-from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.layout import Layout
 from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError
 
@@ -140,7 +140,7 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
         x, y = points_of(table, scales, path)
         names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
-            (line, (repr(float(abscissa)), repr(value)))
+            (line, [repr(float(abscissa)), repr(value)])
             for abscissa, (value, line) in zip(x, y, strict=True)
             if np.isfinite(value)
         ]
@@ -149,19 +149,12 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
             raise DataError(
                 f"{path}: line {table.line.number} begins a table without points; the file is cut short"
             )
-        notes = ["read as a JCAMP-DX file"]
-        notes += [f"{unknown} points of unknown value (?) left out"] if unknown else []
-        title = block.text("TITLE")
-        layout = plain_columns(names, rows, notes, name=title or quantity, facts=_facts(block))
+        notes = [f"{unknown} points of unknown value (?) left out"] if unknown else []
+        title, facts = block.text("TITLE"), first_stated(_FACTS, block.text)
+        layout = export(
+            "JCAMP-DX", names, rows, facts=facts, notes=notes, name=title or quantity, decimal="."
+        )
         yield Curve(layout, axis, quantity, block.records.get("YUNITS", ("", table.line))[1].number)
-
-
-def _facts(block: _Block) -> list[tuple[str, str]]:
-    stated = {
-        fact: next((block.text(label) for label in labels if block.text(label)), "")
-        for fact, labels in _FACTS.items()
-    }
-    return [("format", "JCAMP-DX"), *((fact, value) for fact, value in stated.items() if value)]
 
 
 def _scales(block: _Block, path: str) -> Scales:

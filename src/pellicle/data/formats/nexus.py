@@ -16,17 +16,18 @@ import numpy as np
 
 from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
-from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
-from pellicle.signals.mueller import ELEMENTS
+from pellicle.signals.registry import KINDS, ONE_COLUMN
 
 _MEASURED = "measured_data"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
 """Columns of `measured_data` by its `data_type`."""
-_ERRORS = {name: f"sigma_{name}" for name in ("psi", "delta", "depolarisation", *ELEMENTS, *RATIO_COLUMNS)}
-_SIGNALS = {"R", "T", "psi", "N", "C", "S", "counts", "intensity", *ELEMENTS, *RATIO_COLUMNS}
+_QUANTITIES = [quantity for kind in KINDS.values() for quantity in kind().quantities]
+_SIGNALS = {"N", "C", "S", "intensity", *(q.name for q in _QUANTITIES if q.array == "values")}
+_ERRORS = {q: f"sigma_{q}" for q in ("depolarisation", *(q.name for q in _QUANTITIES))}
+_ERRORS |= dict.fromkeys(ONE_COLUMN, "sigma")
 _MOST_MEMBERS = 1000
 
 
@@ -108,7 +109,7 @@ def _named(name: str, units: str) -> str:
     plain = name.lower().removesuffix("_spectrum")
     if plain.endswith("_errors"):
         base = recognise(plain.removesuffix("_errors")).role
-        plain = _ERRORS.get(base, "sigma" if base in ("R", "T") else plain)
+        plain = _ERRORS.get(base, plain)
     role = recognise(plain).role
     if role == "angle":
         plain = "angle"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.formats.exports import Curve, axis_column, readable, signal_column
+from pellicle.data.formats.exports import Curve, axis_column, first_stated, readable, signal_column
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.layout import Layout, array_columns
 from pellicle.errors import DataError, install_command
@@ -30,6 +30,11 @@ _FORMATS = {
     "0": "Bruker OPUS",
     "sp": "PerkinElmer .sp",
     "jws": "JASCO .jws",
+}
+_FACTS = {
+    "instrument": ("instrument", "source_instrument", "instrument_model"),
+    "date": ("acquired_at", "recorded_at", "measured_at"),
+    "sample": ("sample_name", "title"),
 }
 _JASCO_INVALID = -1.2e-38
 """JASCO writes about -1.18e-38 for a point that was not measured."""
@@ -131,7 +136,7 @@ def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
                     columns,
                     [f"read as a {name} file", *notes],
                     name=label,
-                    facts=_facts(name, extra),
+                    facts=[("format", name), *first_stated(_FACTS, extra.get)],
                 )
                 yield Curve(layout, axis, quantity)
 
@@ -171,13 +176,3 @@ def _measured(x: np.ndarray, y: np.ndarray, name: str, path: str) -> tuple[Seque
     if invalid.all():
         raise DataError(f"{path}: is a {name} file without a measured point; export it again")
     return (x[~invalid], y[~invalid]), notes
-
-
-def _facts(name: str, extra: dict[str, Any]) -> list[tuple[str, str]]:
-    keys = {
-        "instrument": ("instrument", "source_instrument", "instrument_model"),
-        "date": ("acquired_at", "recorded_at", "measured_at"),
-        "sample": ("sample_name", "title"),
-    }
-    stated = {fact: next((extra[k] for k in names if extra.get(k)), "") for fact, names in keys.items()}
-    return [("format", name), *((fact, str(value)) for fact, value in stated.items() if value)]

@@ -16,7 +16,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from pellicle.data.formats import woollam_rows
-from pellicle.data.formats.woollam_rows import Rows, Selected
+from pellicle.data.formats.exports import Rows
+from pellicle.data.formats.woollam_rows import Selected
 from pellicle.data.tabular.layout import Layout, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit

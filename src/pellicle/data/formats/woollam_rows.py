@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
+from pellicle.data.formats.exports import Rows, measured
 from pellicle.data.tabular.text import Line, is_number
 from pellicle.errors import DataError
-
-Rows: TypeAlias = list[tuple[Line, list[str]]]
-_MISSING = frozenset(("nan", "NaN", "NAN"))
 
 
 class Selected(NamedTuple):
@@ -30,18 +28,16 @@ def psi_delta(rows: Rows, path: str, label: str = "") -> Selected:
     """Ψ, Δ and, where they are not all zero, their errors. Raises DataError for rows of other lengths."""
     notes: list[str] = []
     of = f"{label} " if label else ""
-    width = len(rows[0][1])
-    odd = next((line for line, cells in rows if len(cells) != width), None)
-    if odd is not None or width not in (4, 6, 8):
-        place = f"line {(odd or rows[0][0]).number}"
+    width, odd = len(rows[0][1]), _odd(rows, (4, 6, 8))
+    if odd is not None:
         raise DataError(
-            f"{path}: looks like a Woollam file, but {place} is not wavelength, angle, {of}psi, delta and "
+            f"{path}: looks like a Woollam file, but line {odd} is not wavelength, angle, {of}psi, delta and "
             "their errors, as the other rows; export psi and delta as text, or correct that line"
         )
     if width == 8:  # CompleteEASE and programs of other makers write 1 and 1 there
         rows = [(line, cells[:6]) for line, cells in rows]
         notes.append("2 columns behind the errors ignored")
-    rows, missing = _measured(rows, slice(2, 4))
+    rows, missing = measured(rows, (2, 3))
     if not rows:
         raise DataError(f"{path}: has no point with {of}psi and delta; check the measurement")
     names = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")[: len(rows[0][1]) - 1]
@@ -60,7 +56,7 @@ def tan_cos(rows: Rows, path: str) -> Selected:
                 f"{path}: line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
                 "cos(delta) are expected; correct that line"
             )
-    rows, missing = _measured([(line, cells[:4]) for line, cells in rows], slice(2, 4))
+    rows, missing = measured([(line, cells[:4]) for line, cells in rows], (2, 3))
     if not rows:
         raise DataError(f"{path}: has no point with tan(psi) and cos(delta); check the measurement")
     return Selected(("angle_deg", "tan_psi", "cos_delta"), rows, [*notes, *missing])
@@ -104,12 +100,11 @@ def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
 
     Raises DataError for rows of other lengths.
     """
-    width = len(rows[0][1])
-    odd = next((line for line, cells in rows if len(cells) != width), None)
-    if odd is not None or width not in (3, 4):
+    width, odd = len(rows[0][1]), _odd(rows, (3, 4))
+    if odd is not None:
         raise DataError(
-            f"{path}: line {(odd or rows[0][0]).number} is not {label}, wavelength, angle, a value and its "
-            "error, as the other rows; correct that line"
+            f"{path}: line {odd} is not {label}, wavelength, angle, a value and its error, as the other "
+            "rows; correct that line"
         )
     errors = [cells[3] for _, cells in rows] if width == 4 else []
     if errors and all(_is(error, 1.0) for error in errors):
@@ -118,7 +113,7 @@ def power(label: str, quantity: str, rows: Rows, path: str) -> Selected | None:
     if errors and all(_is(error, 0.0) for error in errors):
         names, rows = names[:2], [(line, cells[:3]) for line, cells in rows]
         notes.append("errors that are all zero ignored")
-    rows, missing = _measured(rows, slice(2, 3))
+    rows, missing = measured(rows, (2,))
     return Selected(names, rows, [*notes, *missing]) if rows else None
 
 
@@ -151,7 +146,7 @@ def mueller(groups: dict[str, Rows], path: str) -> Selected:
 
     Raises DataError for rows of other lengths, and without a point that all elements have.
     """
-    measured, notes = {}, []
+    by_label, notes = {}, []
     for label, rows in groups.items():
         odd = next((line for line, cells in rows if len(cells) not in (3, 4)), None)
         if odd is not None:
@@ -159,16 +154,16 @@ def mueller(groups: dict[str, Rows], path: str) -> Selected:
                 f"{path}: line {odd.number} is not {label}, wavelength, angle, a value and its error; "
                 "correct that line"
             )
-        measured[label], missing = _measured(rows, slice(2, 3))
+        by_label[label], missing = measured(rows, (2,))
         notes += [f"{label}: {note}" for note in missing]
-    points, common = _in_common(measured, "its Mueller elements", path)
-    errors = [cells[3:] for rows in measured.values() for _, cells in rows]
+    points, common = _in_common(by_label, "its Mueller elements", path)
+    errors = [cells[3:] for rows in by_label.values() for _, cells in rows]
     # 0 and 1 stand for unknown errors
     known = all(errors) and not any(all(_is(error, x) for [error] in errors) for x in (0.0, 1.0))
-    with_error = [label for label in measured if label.lower() != "mm11"] if known else []
-    names = ("angle_deg", *measured, *(f"sigma_{label}" for label in with_error))
+    with_error = [label for label in by_label if label.lower() != "mm11"] if known else []
+    names = ("angle_deg", *by_label, *(f"sigma_{label}" for label in with_error))
     rows = [
-        (line, [*setting, *(values[x][0] for x in measured), *(values[x][1] for x in with_error)])
+        (line, [*setting, *(values[x][0] for x in by_label), *(values[x][1] for x in with_error)])
         for line, setting, values in points
     ]
     return Selected(names, rows, [*notes, *common])
@@ -198,11 +193,11 @@ def _in_common(
     return points, notes
 
 
-def _measured(rows: Rows, positions: slice) -> tuple[Rows, list[str]]:
-    """The rows whose values are not written NaN, and a sentence on the others."""
-    kept = [(line, cells) for line, cells in rows if _MISSING.isdisjoint(cells[positions])]
-    missing = len(rows) - len(kept)
-    return kept, [f"{missing} of {len(rows)} points, written NaN, left out"] if missing else []
+def _odd(rows: Rows, widths: tuple[int, ...]) -> int | None:
+    """Line of the first row that is not as long as the first, or of the first, if its length is wrong."""
+    width = len(rows[0][1])
+    other = next((line for line, cells in rows if len(cells) != width), None)
+    return (other or rows[0][0]).number if other is not None or width not in widths else None
 
 
 def _points(rows: Rows, one_angle: bool) -> list[tuple[float | str, float | str, int]]:
