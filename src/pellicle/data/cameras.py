@@ -94,7 +94,8 @@ def _by_chart(path: str, coding: Encoding, white: np.ndarray) -> tuple[CameraMat
     """Matrix of a camera by a chart, with a sentence on the misfit of its patches."""
     chart = read_chart(path)
     linear = coding.decoded(chart.rgb)
-    sigma = None if chart.sigma is None else chart.sigma / _slope(coding, linear)
+    slope = np.diagonal(coding.rise(linear), axis1=-2, axis2=-1)  # ∂ coded / ∂ linear of each channel
+    sigma = None if chart.sigma is None else chart.sigma / slope
     fitted = fit_matrix(linear, chart.xyz, sigma, path)
     one, other = (np.asarray(lab(x, white)) for x in (linear @ np.linalg.inv(fitted.matrix).T, chart.xyz))
     try:
@@ -106,11 +107,6 @@ def _by_chart(path: str, coding: Encoding, white: np.ndarray) -> tuple[CameraMat
         f" {difference.max():.2g} at most"
     )
     return fitted, (misfit, *chart.notes)
-
-
-def _slope(coding: Encoding, linear: np.ndarray) -> np.ndarray:
-    """∂ coded / ∂ linear of each channel by itself, (..., 3)."""
-    return np.diagonal(coding.rise(linear), axis1=-2, axis2=-1)
 
 
 FEWEST = 6

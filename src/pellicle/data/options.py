@@ -52,10 +52,6 @@ def parse_angles(text: str, name: str) -> float | list[float]:
     return angles[0] if len(angles) == 1 else angles
 
 
-def _names(text: str, name: str) -> list[str]:
-    return [word.strip() for word in text.split(",")]
-
-
 def _number_or_text(text: str, name: str) -> float | str:
     try:
         return float(text)
@@ -293,7 +289,7 @@ class SpectrumOptions(Options):
         Option(
             "Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
             metavar="m12,...",
-            parse=_names,
+            parse=lambda text, name: [word.strip() for word in text.split(",")],
             kinds=(SPECTRA,),
         ),
     ] = None

@@ -104,7 +104,8 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
     for name in _EQUAL:
         if any(not np.array_equal(getattr(first, name), getattr(sweep, name)) for sweep in sweeps):
             raise UsageError(f"sweeps that are averaged must have the same {name}")
-    copies = [i for i in range(1, count) if any(_same(sweeps[i], earlier) for earlier in sweeps[:i])]
+    points = [sweep.kind.coordinates(sweep) for sweep in sweeps]
+    copies = [i for i in range(1, count) if any(np.array_equal(points[i], one) for one in points[:i])]
     if copies:
         note = f"{len(copies)} of {count} sweeps hold the same numbers as an earlier one and are left out"
         kept = [sweep for i, sweep in enumerate(sweeps) if i not in copies]
@@ -146,10 +147,6 @@ def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points c
     """Each sweep less the mean of all."""
     points = np.stack([sweep.kind.coordinates(sweep) for sweep in sweeps])
     return points - points.mean(axis=0)
-
-
-def _same(one: Spectrum, other: Spectrum) -> bool:
-    return np.array_equal(one.kind.coordinates(one), other.kind.coordinates(other))
 
 
 def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,8 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
     if absent:
         notes.append(f"{len(absent)} sites without data, whose files do not exist: {_shortened(absent)}")
     present = [names[i] for i in there]
-    spectra = [_read(table.parent / name, asked) for name in present]
+    read = partial(read_spectrum, signal=asked.signal, spectrum=asked.variable, wavelength_unit=asked.unit)
+    spectra = [read(table.parent / name) for name in present]
     first = spectra[0]
     for name, one in zip(present, spectra, strict=True):
         _compare(one, first, present[0], table.parent / name)
@@ -148,10 +150,6 @@ def _rows(
     units = {key: columns[key][1] or "mm" for key in ("x", "y")}
     assumed = not (columns["x"][1] and columns["y"][1])
     return names, where, units, ["positions in mm, assumed"] if assumed else []
-
-
-def _read(file: Path, asked: Asked) -> Spectrum:
-    return read_spectrum(file, signal=asked.signal, spectrum=asked.variable, wavelength_unit=asked.unit)
 
 
 def _compare(one: Spectrum, first: Spectrum, first_name: str, file: Path) -> None:

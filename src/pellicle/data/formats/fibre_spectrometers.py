@@ -127,7 +127,10 @@ def ocean_optics(file: TextFile) -> list[Layout] | None:
         return None
     above = lines[:begin]
     end = next((i for i in range(begin, len(lines)) if END.match(lines[i].text)), len(lines))
-    rows: Rows = [(line, _ocean_cells(line)) for line in lines[begin + 1 : end]]
+    rows: Rows = []
+    for line in lines[begin + 1 : end]:
+        delimiter = delimiter_of(line.text)
+        rows.append((line, all_cells(line.text, " " if delimiter == "," else delimiter)))
     if not rows:
         raise DataError(f"{path}: has no rows below {lines[begin].text!r}; export it again")
     for line in above:
@@ -149,10 +152,6 @@ def ocean_optics(file: TextFile) -> list[Layout] | None:
     stated = [value for key, value in map(keyword, above) if key.startswith("Number of Pixels")]
     stated_facts = facts(above, **_ocean_settings(above))
     return [export("Ocean Optics text", names, rows, facts=stated_facts, notes=counted(rows, stated))]
-
-
-def _ocean_cells(line: Line) -> list[str]:
-    return all_cells(line.text, delimiter_of(line.text) if "\t" in line.text or ";" in line.text else " ")
 
 
 def _ocean_quantity(above: Sequence[Line], path: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
 
@@ -65,11 +66,7 @@ def read_hdf5(content: bytes, path: str) -> list[Layout]:
             f"{path}: is an HDF5 (NeXus) file without a wavelength, energy or wavenumber beside a "
             "reflectance, a transmittance or psi and delta in a group NXdata; export the spectrum as CSV"
         )
-    return layouts if len(layouts) > 1 else [_alone(layouts[0])]
-
-
-def _alone(layout: Layout) -> Layout:
-    return Layout(layout.names, layout.width, layout.cells, layout.notes, "", layout.declared)
+    return layouts if len(layouts) > 1 else [replace(layouts[0], name="")]
 
 
 def _layouts(file: Any, path: str) -> Iterator[Layout]:

@@ -108,7 +108,8 @@ class RglBrdf:
         x, y = theta_to_unit(theta_m), phi_to_unit(phi_m - phi if self.isotropic else phi_m)
         around = corners((self.phi_i, self.theta_i), (phi, theta))
         u, v = self.warp.invert(around, x, y)
-        values = interpolated(np.moveaxis(self._flat(), 1, -1), around, u, v)
+        slices = self.values.reshape(-1, *self.values.shape[2:])
+        values = interpolated(np.moveaxis(slices, 1, -1), around, u, v)
         scale = self._scale(x, y, theta, phi) / np.where(above, o[2], 1.0)
         return np.where(above[:, None], values * scale[:, None], 0.0)
 
@@ -133,9 +134,6 @@ class RglBrdf:
         o = 2 * (i @ m) * m - i[:, None]
         light = np.full((2, x.size), [[theta_i], [phi_i]])
         return i, o, self._scale(x, y, *light) / np.where(o[2] > 0, o[2], 1.0)
-
-    def _flat(self) -> np.ndarray:
-        return self.values.reshape(-1, *self.values.shape[2:])
 
     def _scale(self, x: np.ndarray, y: np.ndarray, theta: np.ndarray, phi: np.ndarray) -> np.ndarray:
         """D/4σ, by which values are to be multiplied."""

@@ -139,7 +139,7 @@ def _name(group: Sequence[Column], names: Sequence[str]) -> str:
 def stacked_tables(file: TextFile) -> list[Layout] | None:
     """Return one layout for each table, or None where the names are not repeated."""
     lines = file.lines
-    first = next((line for line in lines[:40] if _names(line)), None)
+    first = next((line for line in lines[:40] if is_header(all_cells(line.text))), None)
     headers = [i for i, line in enumerate(lines) if first is not None and line.text == first.text]
     if len(headers) < 2:
         return None
@@ -152,10 +152,6 @@ def stacked_tables(file: TextFile) -> list[Layout] | None:
         note = f"table {i + 1} of {len(headers)} in the file"
         layouts.append(dataclasses.replace(layout, name=title, notes=(note, *layout.notes)))
     return layouts
-
-
-def _names(line: Line) -> bool:
-    return is_header(all_cells(line.text))
 
 
 def _title(lines: Sequence[Line], header: int, after: int) -> int:
