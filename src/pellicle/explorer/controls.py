@@ -108,7 +108,7 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
                 value=value.start if isinstance(value, Free) else float(value),
                 group=_group(scene, path),
                 path=path,
-                optional=_is_optional(path) and number.lower <= 0,
+                optional=getattr(path[-1], "name", "") in _OPTIONAL and number.lower <= 0,
                 free=value if isinstance(value, Free) else None,
             )
         )
@@ -204,10 +204,6 @@ def _addable(scene: Scene) -> list[tuple[Any, ...]]:
             paths.append((layers, SequenceKey(varied_layer(scene)), GetAttrKey("thickness_spread")))
     instrument = ["bandwidth", *([] if scene.instrument.has_cone else ["numerical_aperture"])]
     return [*paths, *((GetAttrKey("instrument"), GetAttrKey(name)) for name in instrument)]
-
-
-def _is_optional(path: tuple[Any, ...]) -> bool:
-    return getattr(path[-1], "name", "") in _OPTIONAL
 
 
 def _bounds(path: tuple[Any, ...], value: Any) -> Free:
