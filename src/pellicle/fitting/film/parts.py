@@ -26,9 +26,9 @@ from pellicle.fitting.reported_layer import layer_errors, principal_indices
 from pellicle.fitting.result import Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 
-LARGEST_POWER, LARGEST_ANGLES = 0.02, 0.02
+_LARGEST_POWER, _LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
-LARGEST_DRIFT = 1.0
+_LARGEST_DRIFT = 1.0
 """Structure in residuals that no drifting lamp makes, in units of the error that its model has: 0.7 of it
 remains in a soap film of known thickness, 1.3 of titania on silicon that is fitted as a soap film."""
 
@@ -77,7 +77,7 @@ def missed(
     return tuple(
         part
         for part, view, left, fringe in each
-        if fringe is not None or misfit(discrepancy, left, _accuracy(part, view))
+        if fringe is not None or misfit(discrepancy, left, _part_accuracy(part, view))
     )
 
 
@@ -104,16 +104,23 @@ def with_curves(
     return tuple(replace(rival, curves=Deferred(len(parts), partial(curves, rival))) for rival in rivals)
 
 
-def _accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
+def _part_accuracy(part: Part, view: SpectrumView | ColoursView) -> Accuracy:
     if isinstance(view, ColoursView):
         return colours_accuracy(view, part.sigma)
+    return accuracy(view, part.spectrum.calibrated, np.asarray(view.data.values)[: view.points])
+
+
+def accuracy(view: SpectrumView, calibrated: bool, values: np.ndarray) -> Accuracy:
+    """The structure that no instrument makes in residuals of spectra of one view with `values` (..., points).
+
+    Only R and T use their values.
+    """
     if view.signal.ellipsometric:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
-        return Accuracy(largest=LARGEST_ANGLES)
+        return Accuracy(largest=_LARGEST_ANGLES)
     if view.noise.drifting:
-        return Accuracy(weighted=LARGEST_DRIFT)
-    values = np.asarray(view.data.values)[: view.points]
-    return Accuracy(LARGEST_POWER if part.spectrum.calibrated else math.inf, float(np.ptp(values)))
+        return Accuracy(weighted=_LARGEST_DRIFT)
+    return Accuracy(_LARGEST_POWER if calibrated else math.inf, np.ptp(values, axis=-1))
 
 
 def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.ndarray) -> Curve:

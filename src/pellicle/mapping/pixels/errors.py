@@ -13,12 +13,12 @@ from pellicle.fitting.covariance import Scaled, errors
 from pellicle.fitting.discrepancy import DOUBTFUL, Evidence, discrepancy
 from pellicle.fitting.film.evidence import LEAST_NOISE, SCATTER_OF_NOISE
 from pellicle.fitting.film.form import Local
-from pellicle.fitting.film.parts import LARGEST_ANGLES, LARGEST_DRIFT, LARGEST_POWER
+from pellicle.fitting.film.parts import accuracy
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
 from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.misfit import Accuracy, misfit, other_material
+from pellicle.fitting.misfit import misfit, other_material
 from pellicle.fitting.noise import DRIFT_CORRELATION, NoiseEstimate, noise_of, short_range_noise, student
 from pellicle.fitting.problem import NoiseGroup, Problem
 from pellicle.fitting.robust_losses import median
@@ -116,8 +116,7 @@ class PixelErrors:
         self.parameters = problem.parameters
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
-        self.prior_mean = np.asarray(problem.box.prior_mean)
-        self.prior_weight = np.asarray(problem.box.prior_weight)
+        self.box = jax.device_get(problem.box)
         self.nuisances = Nuisances(self.view, target.scene)
         self.limits = PixelLimits(problem, target.scene, self.nuisances)
         middle = 0.5 * (self.lower + self.upper)
@@ -206,9 +205,8 @@ class PixelErrors:
             jacobian=columns, effects=effects
         )
         discrepancies = discrepancy([evidence], scaled, minima.units[who, 0], contributions=False)
-        wrong = misfit(
-            discrepancies, discrepancies.remaining[0], self._accuracy(taken(pixels.values)[..., 0])
-        )
+        largest = accuracy(view, self.calibrated, taken(pixels.values)[..., 0])
+        wrong = misfit(discrepancies, discrepancies.remaining[0], largest)
         doubtful = np.flatnonzero((discrepancies.remaining[0].ratio > DOUBTFUL) & ~wrong)
         if len(doubtful):
             units = minima.units[who, 0][doubtful]
@@ -235,10 +233,10 @@ class PixelErrors:
         stretch = np.concatenate([np.broadcast_to(span, values.shape), prior_sd], axis=1)
         known = stretch.shape[1]
         own = pixels.weight / np.sqrt(noise.variance(view.noise))[:, None]
-        priors = np.diag(np.concatenate([self.prior_weight * span, np.ones(flat.shape[2])]))
+        priors = np.diag(np.concatenate([self.box.prior_weight * span, np.ones(flat.shape[2])]))
         priors = np.broadcast_to(priors, (len(values), known, known))
         pull = np.zeros(stretch.shape)
-        pull[:, : len(span)] = (values - self.prior_mean) * self.prior_weight
+        pull[:, : len(span)] = self.box.prior_rows(values)
         rows = np.concatenate([jacobian * own[..., None], priors], axis=1)
         names = tuple(p.name for p in self.parameters) + ("",) * prior_sd.shape[1]
         return jacobian, Scaled(rows, stretch[..., None] * np.eye(known), names, pull)
@@ -289,14 +287,6 @@ class PixelErrors:
             uncertain=0.0 if kind.known else SCATTER_OF_NOISE / left.shape[1] ** 0.5,
             exact_noise=short if given else None,
         )
-
-    def _accuracy(self, values: np.ndarray) -> Accuracy:
-        """The structure that no instrument makes in residuals of `values` (pixels, rows)."""
-        if self.view.channels > 1:
-            return Accuracy(largest=LARGEST_ANGLES)
-        if self.view.noise.drifting:
-            return Accuracy(weighted=LARGEST_DRIFT)
-        return Accuracy(LARGEST_POWER if self.calibrated else np.inf, np.ptp(values, axis=1))
 
 
 def _joined(*pieces: Any) -> Any:

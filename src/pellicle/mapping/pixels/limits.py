@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 
 from pellicle.fitting.film.search import thickness_grid
@@ -43,8 +44,7 @@ class PixelLimits:
         self._scene, self._nuisances = scene, nuisances
         self._lower = np.array([p.lower for p in self._parameters])
         self._upper = np.array([p.upper for p in self._parameters])
-        self._prior_mean = np.asarray(problem.box.prior_mean)
-        self._prior_weight = np.asarray(problem.box.prior_weight)
+        self._box = jax.device_get(problem.box)
         self._natural = np.reshape([p.natural for p in self._parameters], (-1, 2)).astype(bool)
         self._depth = problem.thickness_axis
         if self._depth is not None:
@@ -144,7 +144,7 @@ class PixelLimits:
 
     def _prior(self, at: np.ndarray) -> np.ndarray:
         """-2 ln of the priors of parameters `at` (..., parameters), without a constant."""
-        return np.sum(((at - self._prior_mean) * self._prior_weight) ** 2, axis=-1)
+        return np.sum(self._box.prior_rows(at) ** 2, axis=-1)
 
     def _deviance(self, arrays: PixelArrays, which: np.ndarray, at: np.ndarray) -> np.ndarray:
         return in_lanes(deviances, self._view, arrays.some(which), at).value + self._prior(at)
@@ -171,9 +171,9 @@ class PixelLimits:
             data = ((own.values - local.model) * weight)[:, : view.points]
             matrix = np.swapaxes(rows, 1, 2) @ rows
             right = np.einsum("pnc,pn->pc", rows, data)
-            prior = np.concatenate([self._prior_weight * span, np.ones(flat.shape[2])])
+            prior = np.concatenate([self._box.prior_weight * span, np.ones(flat.shape[2])])
             matrix = matrix + np.diag(prior**2)
-            right[:, : at.shape[1]] -= prior[: at.shape[1]] * (at - self._prior_mean) * self._prior_weight
+            right[:, : at.shape[1]] -= prior[: at.shape[1]] * self._box.prior_rows(at)
             kept = np.concatenate([~held, np.ones((len(at), flat.shape[2]), bool)], axis=1)
             matrix = np.where(kept[:, :, None] & kept[:, None, :], matrix, np.eye(kept.shape[1]))
             step = solve(matrix, np.where(kept, right, 0.0))[:, : at.shape[1]] * span
