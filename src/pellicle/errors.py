@@ -1,7 +1,5 @@
 """Errors that a user can act on: each message is one sentence that ends with the remedy."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

@@ -8,8 +8,6 @@ The name of a temporary file contains the machine and the process that write it.
 killed are removed when their file, or another one in their result folder, is written again.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import platform

@@ -1,7 +1,5 @@
 """Case of a comparison: a scene, its full plan, draws of its free parameters, and compiled programs."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 They run in single precision, as colours do; the reference runs in double.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Sequence

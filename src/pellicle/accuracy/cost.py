@@ -1,7 +1,5 @@
 """Accuracy against time for a film: methods of simulation, solvers, and methods of computing intervals."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import math

@@ -1,7 +1,5 @@
 """Colours of a film by every method of integrating its spectrum: accuracy against time, and maps of them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

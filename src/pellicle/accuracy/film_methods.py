@@ -1,7 +1,5 @@
 """Methods of simulating a scene, each of which leaves something out, and their comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -4,8 +4,6 @@ Source: H. A. Macleod, Thin-Film Optical Filters, chapter 2; incoherent plates b
 The indices of the media are those of the forward model, rounded to float64.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import mpmath

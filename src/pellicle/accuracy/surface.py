@@ -1,7 +1,5 @@
 """Accuracy against time for a surface: methods of computing the colour of its film, and its BRDF."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

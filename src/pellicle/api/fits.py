@@ -1,7 +1,5 @@
 """Verbs of fitting: fit, posterior, and comparison of several descriptions."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Mapping, Sequence

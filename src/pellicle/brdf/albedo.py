@@ -6,8 +6,6 @@ equal steps of ln tan θ_h, in which a lobe has the same width whatever its roug
 directions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

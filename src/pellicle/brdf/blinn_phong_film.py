@@ -7,8 +7,6 @@ film, 550 nm, normal incidence: 0.0942 where Airy gives 0.0239). The corrected f
 `pellicle.optics.film`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

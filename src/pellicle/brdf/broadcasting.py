@@ -1,7 +1,5 @@
 """Broadcasting of BRDF parameters against directions: a parameter is one number, or a map of samples."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 

@@ -4,8 +4,6 @@ Every root here has slope zero where it is zero, so that values and gradients ar
 grazing incidence.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax.numpy as jnp

@@ -4,8 +4,6 @@ The colour depends on the directions only through ⟨i, h⟩. So it is computed 
 and each sample evaluates one polynomial: the cost per sample does not depend on the film.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, TypeAlias

@@ -17,8 +17,6 @@ paper. Where it is ambiguous, the reading that is consistent with the rest of it
 Energy can exceed one, so the weights are not albedos (`pellicle.brdf.albedo` computes it).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 

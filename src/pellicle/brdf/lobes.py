@@ -3,8 +3,6 @@
 The normal is z. Values and gradients are finite at the edge of a lobe, where both are zero.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax.numpy as jnp

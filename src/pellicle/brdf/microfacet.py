@@ -19,8 +19,6 @@ the face sends back to the film is left out: 4 % of the film's light near the no
 it beyond the critical angle, where rough facets send a part.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax.numpy as jnp

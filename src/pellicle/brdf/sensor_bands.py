@@ -4,8 +4,6 @@ A film's reflectance is a Fourier series in 1/λ whose periods are optical paths
 wavelengths, in equal steps of 1/λ, are fitted to the Fourier transform of the bands, by linear least squares.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The `pellicle` command: results on stdout, messages on stderr."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import nullcontext, suppress

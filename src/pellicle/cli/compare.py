@@ -1,7 +1,5 @@
 """`pellicle compare`: fits of the same data by several recipes, ranked by AIC and BIC."""
 
-from __future__ import annotations
-
 from logging import getLogger
 from pathlib import Path
 from typing import Annotated

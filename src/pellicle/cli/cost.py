@@ -1,7 +1,5 @@
 """`pellicle plan` and `pellicle cost`: effects that a scene needs, and error and time of every method."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Any

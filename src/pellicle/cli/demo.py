@@ -1,7 +1,5 @@
 """`pellicle demo`: a simulated measurement, from the recipe to the posterior."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

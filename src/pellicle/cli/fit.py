@@ -1,7 +1,5 @@
 """`pellicle fit` and `pellicle sample`: fits of spectra, colours and BRDF samples, and their posteriors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`pellicle materials`: the catalogue of materials."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from cyclopts import Parameter

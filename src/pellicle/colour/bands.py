@@ -4,8 +4,6 @@ Every method is a set of bands: centres, widths, and weights for X, Y and Z. A b
 sample of the spectrum; in a Gaussian band the film's Fourier orders are damped by their optical path.
 """
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from typing import NamedTuple

@@ -5,8 +5,6 @@ in a known direction is found by linear regression, and a model is exposed witho
 another power.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Colour of one film: its reflectance in each band, weighted and summed."""
 
-from __future__ import annotations
-
 from typing import Any, final
 
 import equinox as eqx

@@ -1,7 +1,5 @@
 """Sensors: the CIE standard observers under its illuminants, and cameras and observers under any lamp."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import resources
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Conversion of XYZ to linear sRGB, sRGB and Lab, colour differences, and colours outside sRGB."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax.numpy as jnp

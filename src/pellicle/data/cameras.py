@@ -1,7 +1,5 @@
 """Observers and cameras of a film's colours, with their lamp and coding, and a camera's matrix by a chart."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from typing import NamedTuple

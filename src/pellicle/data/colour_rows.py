@@ -1,7 +1,5 @@
 """Colours in CSV: R, G, B, or X, Y, Z, or x, y, Y, or L*, a*, b*, of one film or several, and their scale."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Measured colours of a film as arrays, and their CSV."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Ψ and Δ from the quantities that ellipsometers write in their place; angles in degrees."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Spectra in one file: what there is to choose from, and the choice."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Fingerprint of data, files, scenes and settings: equal for equal content in every process."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping

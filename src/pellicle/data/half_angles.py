@@ -5,8 +5,6 @@ efficient BRDF representation, 1998): the half vector lies at (θ_h, φ_h), and 
 (θ_d, φ_d) is one of the two directions after a rotation of the half vector onto the normal.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 Angle = np.ndarray | float

@@ -1,7 +1,5 @@
 """Measurements as a fit takes them: a spectrum, colours or BRDF samples, or a list."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """Standard deviation of noise as users write it: 0.01, or "2 %" of the signal."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ From these records follow the flags of the command line (`cli/flags.py`), the ke
 nothing heavy: `pellicle --help` loads it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

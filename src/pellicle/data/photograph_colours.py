@@ -1,7 +1,5 @@
 """Colours of regions of a photograph, averaged in linear light and divided by a white."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading of BRDF samples: CSV, ALTA text, MERL and RGL binary files."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections.abc import Sequence

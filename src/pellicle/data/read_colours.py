@@ -1,7 +1,5 @@
 """Colours of films from files and photographs, with the sensor that saw them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Reflectance from raw counts, or from a ratio of reflectances, by a reference of known reflectance."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace

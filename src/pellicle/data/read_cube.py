@@ -1,7 +1,5 @@
 """Reading of cubes: spectra of many positions of a sample, from files or xarray objects."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ at small angles, as instruments write it. N = cos 2Ψ, C = sin 2Ψ cos Δ, S = s
 A column of depolarisation, 1 − N² − C² − S², is read with them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

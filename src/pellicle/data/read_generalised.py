@@ -1,7 +1,5 @@
 """Reading of generalised Ψ and Δ from a table: the columns of each ratio, their units and checks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

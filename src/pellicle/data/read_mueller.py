@@ -1,7 +1,5 @@
 """Reading of normalised Mueller elements from a table: their columns, normalisation and checks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reading of reflectance and transmittance from a table: their units and checks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reading of spectra: reflectance, transmittance, or Ψ and Δ against wavelength."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Spectra that were measured in several sweeps over the same wavelengths: their mean and their spread."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

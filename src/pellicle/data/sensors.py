@@ -1,7 +1,5 @@
 """Sensors by name or files: an observer, or a camera of known sensitivities, under any lamp."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

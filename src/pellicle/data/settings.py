@@ -1,7 +1,5 @@
 """Settings of a measurement: angle of incidence and azimuth of the sample at each point, in degrees."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

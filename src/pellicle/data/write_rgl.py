@@ -4,8 +4,6 @@ The density of half vectors that shapes the grid is the BRDF's own: its mean ove
 against the angle from the normal, so that a table serves any lobe, with or without a diffuse part.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Writing of spectra as CSV, NetCDF or NeXus."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Base class of dispersions, and the bounds of their parameters."""
 
-from __future__ import annotations
-
 import abc
 from typing import Any, ClassVar
 

@@ -5,8 +5,6 @@ themselves; `fraction` is the inclusion's share of the volume. Two transparent m
 Sources: D. E. Aspnes, Thin Solid Films 89, 249 (1982), and H. Looyenga, Physica 31, 401 (1965).
 """
 
-from __future__ import annotations
-
 from typing import Any, final
 
 import jax

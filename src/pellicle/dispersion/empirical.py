@@ -4,8 +4,6 @@ A dispersion answers `index(wavelength)` with a real array where it cannot absor
 where it can: that type is what tells the rest of the code whether there is absorption to compute.
 """
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, final
 
 import numpy as np

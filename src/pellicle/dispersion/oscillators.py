@@ -3,8 +3,6 @@
 Energies are in eV. Each term has ε₂ ≥ 0 and is Kramers-Kronig consistent by itself.
 """
 
-from __future__ import annotations
-
 import abc
 import math
 from typing import Any, ClassVar, final

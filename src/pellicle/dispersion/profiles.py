@@ -4,8 +4,6 @@ The relative depth z is 0 at the upper face of the layer and 1 at its lower face
 0 to 1, and each of its numbers may be a `pellicle.Free`.
 """
 
-from __future__ import annotations
-
 import abc
 import itertools
 from typing import Any, final

@@ -6,8 +6,6 @@ writes a "formula A" under the properties of some glasses (Schott's thermal disp
 is a change with temperature, not an index, and is not among these.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, final
 

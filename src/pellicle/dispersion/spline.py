@@ -7,8 +7,6 @@ rise or fall give a curve that does. It is linear in the coefficients, which mak
 it meets the first and the last coefficient and passes near the others.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

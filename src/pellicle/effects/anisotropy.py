@@ -1,7 +1,5 @@
 """Anisotropic media of a scene: closed forms of s and p, or the 4×4 method where s and p mix."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pellicle.dispersion.anisotropic import Anisotropic, isotropic_in_plane, mixes_polarisations

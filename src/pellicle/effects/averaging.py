@@ -1,7 +1,5 @@
 """Averages over bandwidth, uneven thickness and a cone of light: orders, nodes, rays, and their errors."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Extremes over the bounds of a scene: indices, thicknesses, |q|, and the difference of two plans."""
 
-from __future__ import annotations
-
 import itertools
 import statistics
 import time

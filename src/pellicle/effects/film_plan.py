@@ -1,7 +1,5 @@
 """Plans of a film: the exact one, and those within a tolerance, by measuring what each effect changes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial

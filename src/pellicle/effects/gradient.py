@@ -1,7 +1,5 @@
 """Number of slices of graded layers, from the measured error of the signal over the bounds."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable
 from dataclasses import replace

@@ -4,8 +4,6 @@ Start values decide nothing: a layer whose k is free and starts at 0 keeps its a
 dR/dk is not 0 there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from pellicle.dispersion.anisotropic import isotropic_in_plane, mixes_polarisations, principal_media

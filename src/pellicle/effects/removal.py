@@ -10,8 +10,6 @@ fits into the tolerance. Each step starts from the plan before it, so the bounds
 a bound on the total error (triangle inequality).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ relative: to each value where it is above a hundredth of a white diffuser (`FLOO
 where it is below.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Answers to the page: curves and colours as JSON, and a ball under a film as a PNG."""
 
-from __future__ import annotations
-
 from functools import cache
 from io import BytesIO
 from math import isfinite

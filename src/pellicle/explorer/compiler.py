@@ -1,7 +1,5 @@
 """Programs compiled in the background, one at a time, the most urgent first."""
 
-from __future__ import annotations
-
 import atexit
 import threading
 from collections.abc import Callable, Hashable

@@ -3,8 +3,6 @@
 A structure of a program is the set of effects that are there, and the largest sizes that the program serves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Data files that are dropped on the explorer, or lie in its folder."""
 
-from __future__ import annotations
-
 import tempfile
 from base64 import b64decode
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """One fit at a time: the scene of the sliders fitted to data, with progress, and stopped on request."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Collection, Sequence

@@ -3,8 +3,6 @@
 Several angles of incidence give a curve each, or one curve against them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

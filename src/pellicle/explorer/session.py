@@ -1,7 +1,5 @@
 """Session of the explorer: answers the requests of a page or a widget about one scene."""
 
-from __future__ import annotations
-
 import os
 import time
 from base64 import b64encode

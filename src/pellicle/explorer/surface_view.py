@@ -1,7 +1,5 @@
 """A surface in the explorer: sliders of the numbers of its BRDF, its lobes and a sphere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn

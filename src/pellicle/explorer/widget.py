@@ -1,7 +1,5 @@
 """Widget of the explorer for notebooks: the page's script, with messages to the kernel."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from threading import Thread

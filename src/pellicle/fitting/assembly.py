@@ -1,7 +1,5 @@
 """From ranked minima to a `Fit`, for every kind of data."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable

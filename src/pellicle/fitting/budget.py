@@ -1,7 +1,5 @@
 """Uncertainty budget of a fit: the systematic effects that its errors include."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
 BIC = −2 ln L + k ln n (G. Schwarz 1978, Ann. Stat. 6, 461).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """From ranked minima to a status, estimates and what the data do not determine."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from logging import getLogger

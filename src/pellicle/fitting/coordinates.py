@@ -6,8 +6,6 @@ one plane depend on y² alone, the tilt out of that plane: y itself has no slope
 stop on the saddle between the two signs and underestimate the error of what is correlated with y².
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias

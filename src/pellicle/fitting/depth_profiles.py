@@ -1,7 +1,5 @@
 """Fitted profiles of graded layers: fraction, n and k against depth, with standard errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Estimates, limits and rivals from ranked minima."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Compiled evaluations of a problem: deviances, polished minima, model curves."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

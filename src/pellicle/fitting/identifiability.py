@@ -6,8 +6,6 @@ deviation of the noise. Several parameters in such a direction are correlated: o
 determined.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Container, Mapping, Sequence

@@ -4,8 +4,6 @@ Both kinds of data are fitted apart first. The numbers that bear one name in the
 (`thickness`, `n`) are then one parameter, and all data are fitted together from every pair of minima.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import replace

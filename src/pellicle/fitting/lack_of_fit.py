@@ -1,7 +1,5 @@
 """Lack of fit of repeated sweeps: residuals of their mean against their scatter, which needs no model."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

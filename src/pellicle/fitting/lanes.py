@@ -5,8 +5,6 @@ more is spent on lanes that have ended. Here a lane that has ended takes the nex
 loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -9,8 +9,6 @@ damping follows H. Nielsen (1999, IMM-REP-1999-05). The state has the size of th
 data, so that many lanes are cheap to carry (`fitting.lanes`).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, final
 
 import equinox as eqx

@@ -1,7 +1,5 @@
 """Local minima of a problem: polished in lanes of one compiled program, made distinct, sorted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from logging import getLogger
 

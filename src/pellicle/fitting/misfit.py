@@ -5,8 +5,6 @@ effects of ordinary size leave a large part of the residuals unexplained, or exp
 they do not have.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

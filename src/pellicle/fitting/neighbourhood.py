@@ -1,7 +1,5 @@
 """The misfit around the best minimum of a fit, in the parameters' own units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pellicle.fitting.evaluation import total_deviance

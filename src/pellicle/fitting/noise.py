@@ -1,7 +1,5 @@
 """Noise of spectra, and the number of their independent points; leading axes are those of many spectra."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

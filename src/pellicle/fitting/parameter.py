@@ -1,7 +1,5 @@
 """A free parameter of a fit: its name, unit, bounds and prior."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 Apart from the solver, which imports Optimistix: a cached program needs no solver.
 """
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import cho_solve

@@ -3,8 +3,6 @@
 The Guide to the expression of uncertainty in measurement (JCGM 100:2008, GUM) numbers the equations.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

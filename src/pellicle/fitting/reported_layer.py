@@ -1,7 +1,5 @@
 """The layer of a scene whose n and k a fit reports: its slopes beside those of the signal, and its errors."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

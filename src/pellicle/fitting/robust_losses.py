@@ -5,8 +5,6 @@ whose ψ stops growing, or falls again, is not moved by a few outliers. They are
 with weights ψ(z)/z, again and again (P. Huber and E. Ronchetti, 2009, Robust Statistics, 7.8).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Status of a fit, the first that holds, and its verdict in one or two sentences."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace

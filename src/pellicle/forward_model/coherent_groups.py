@@ -1,7 +1,5 @@
 """Coherent groups of layers between incoherent plates, and the intensities of all groups together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ of intensities, never amplitudes or ratios. Errors of the quadrature rules are i
 `pellicle.optics.quadrature`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial

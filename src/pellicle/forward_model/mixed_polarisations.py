@@ -10,8 +10,6 @@ with the matrices of the layers from above (r, t) and from below (r′, t′), o
 (b), and the transmittance τ of one passage through the plate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Forward model of a surface: composes the effects of a plan into a BRDF."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any

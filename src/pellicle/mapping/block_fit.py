@@ -1,7 +1,5 @@
 """Fit of one block of pixels of a map: read from the cube, fitted, and written into the store."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

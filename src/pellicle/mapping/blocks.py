@@ -1,7 +1,5 @@
 """Blocks of pixels: the parts of a cube that are read, fitted and stored one at a time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

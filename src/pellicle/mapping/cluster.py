@@ -6,8 +6,6 @@ its path. Blocks of a large cube in memory are sent to it one by one. Blocks of 
 others.
 """
 
-from __future__ import annotations
-
 import logging
 import pickle
 import signal

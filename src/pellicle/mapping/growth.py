@@ -12,8 +12,6 @@ to 8 % of the processor time of a fit (4096 pixels of 100 bands), and finds the 
 (enlargement of errors by the square root of the reduced chi-square).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

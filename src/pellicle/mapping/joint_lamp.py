@@ -10,8 +10,6 @@ needs a free one.
 Bundle adjustment: a modern synthesis, LNCS 1883, section 6 (Schur complement of the parameters of each view).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from logging import getLogger

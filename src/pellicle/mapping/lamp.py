@@ -4,8 +4,6 @@ From a region of known reflectance g is the mean of measured over simulated valu
 jointly with the films of some pixels (`pellicle.mapping.joint_lamp`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Neighbours of pixels: windows on a grid of any number of axes, the nearest ones of scattered sites."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Thickness of a film at every pixel of a photograph, or along a strip, from its colours."""
 
-from __future__ import annotations
-
 import os
 from typing import Any, NamedTuple
 

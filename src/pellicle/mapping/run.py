@@ -1,7 +1,5 @@
 """Maps of cubes: preparation, and fits of all blocks of pixels, here or in several worker processes."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

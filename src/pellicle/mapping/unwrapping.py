@@ -9,8 +9,6 @@ front after the other, where the prediction is best first.
 Two-dimensional phase unwrapping, ch. 4 (growth by quality).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

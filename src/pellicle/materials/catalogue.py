@@ -1,7 +1,5 @@
 """From a name to a dispersion: the catalogue, its pages, the whole database, a table of one's own."""
 
-from __future__ import annotations
-
 import difflib
 import functools
 import importlib.util

@@ -3,8 +3,6 @@
 `data/pages.csv` is written by scripts/index_materials.py; `data/catalogue.toml` by hand.
 """
 
-from __future__ import annotations
-
 import csv
 import functools
 import re

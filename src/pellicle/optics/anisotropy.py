@@ -13,8 +13,6 @@ condition. So the formulas of isotropic media serve, one polarisation at a time;
 and N. M. Bashara, Ellipsometry and Polarized Light (North-Holland, 1977), section 4.7.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 

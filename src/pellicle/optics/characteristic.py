@@ -9,8 +9,6 @@ it is small.
 Source: Born and Wolf, Principles of Optics, section 1.6.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -7,8 +7,6 @@ products of a few cannot overflow, and an opaque layer halves the fields.
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

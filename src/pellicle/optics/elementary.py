@@ -3,8 +3,6 @@
 A film spends most of its time here.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

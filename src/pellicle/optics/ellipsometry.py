@@ -6,8 +6,6 @@ S = sin 2Ψ sin Δ lie on a unit sphere, do not wrap around, and are what is fit
 1990, Appl. Opt. 29, 959).
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

@@ -11,8 +11,6 @@ Source: Macleod, Thin-Film Optical Filters, chapter 2; Byrnes, arXiv:1603.02720,
 Principles of Optics, section 1.6.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ and tunnelling need no special case. This is the Airy formula of Gerardin et al.
 multiplied out; the same lines serve real, complex and `Pair` numbers.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

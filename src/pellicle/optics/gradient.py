@@ -17,8 +17,6 @@ Source: Blanes, Casas, Oteo and Ros, Physics Reports 470, 151 (2009), section 5.
 multiplies the matrices of the slices in pairs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ parameters and a signal stand a few numbers at each wavelength: the indices and 
 `pointwise` computes the slopes in these once, and a tangent is a sum of products with them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -8,8 +8,6 @@ here, q = (n_x/n_z) √(n_z² − a²), with n_x² in place of n² in the bounda
 isotropic medium of index n_y (`principal_axes.seen_by`).
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from typing import Any, NamedTuple
 

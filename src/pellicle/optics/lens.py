@@ -17,8 +17,6 @@ way as the ordinary or the extraordinary wave, and the geometric series of furth
 geometrically with both numbers, which are chosen one after the other.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple

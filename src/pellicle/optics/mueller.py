@@ -15,8 +15,6 @@ Source: R. M. A. Azzam and N. M. Bashara, Ellipsometry and Polarized Light, sect
 F. A. Modine, Appl. Opt. 36, 8184 (1997) for the signs.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

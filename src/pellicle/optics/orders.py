@@ -10,8 +10,6 @@ With W_m = 1 the sum is Airy's formula. It converges for |q| < 1. After M orders
 2|K||q|^M/(1−|q|) times the next window factor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

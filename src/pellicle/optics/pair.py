@@ -10,8 +10,6 @@ which compiles nothing: JAX takes 30 to 90 ms to trace and load even a program o
 traced programs the same formulas use JAX.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import update_wrapper
 from typing import Any, TypeAlias

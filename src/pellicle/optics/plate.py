@@ -1,7 +1,5 @@
 """Thick plates: the two faces add intensities, not amplitudes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 

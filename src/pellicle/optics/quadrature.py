@@ -1,7 +1,5 @@
 """Quadrature over a bandwidth, a non-uniform thickness and a cone of light, with error estimates."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Optical response of coherent layers to one polarisation: amplitudes over a common denominator."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from pellicle.optics.pair import Number

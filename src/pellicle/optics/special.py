@@ -1,7 +1,5 @@
 """Special functions of the dispersion models, finite in value and slope at their singular points."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -11,8 +11,6 @@ Loading machine code takes some milliseconds: nothing is traced, lowered or comp
 written them. A file begins with a digest of its content and of the key under which it was kept.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """One thread for each worker process, by the environment that it inherits."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

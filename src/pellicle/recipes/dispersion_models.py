@@ -1,7 +1,5 @@
 """Dispersion models by name: their parameters, default bounds and values, and how to build them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 

@@ -1,7 +1,5 @@
 """Words of the command line and of recipes: media, and numbers that may be free."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -6,8 +6,6 @@ A key of a table is the field of its part that has the same name, so that `_part
 every key; the functions of each part add what differs.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, fields, replace

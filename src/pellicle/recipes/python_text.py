@@ -1,7 +1,5 @@
 """Python expression of a scene, which builds the same scene where `pl` is pellicle."""
 
-from __future__ import annotations
-
 from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any
 

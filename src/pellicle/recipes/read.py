@@ -1,7 +1,5 @@
 """Reading recipes: TOML files that describe a film, or a surface by its BRDF."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from collections.abc import Mapping

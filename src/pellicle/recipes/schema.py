@@ -1,7 +1,5 @@
 """The tables of a recipe, and what may stand in them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator

@@ -1,7 +1,5 @@
 """Writing recipes: the TOML text of a film or a surface, which reads back as the same scene."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

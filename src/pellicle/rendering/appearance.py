@@ -1,7 +1,5 @@
 """Exact colours of a film in reflection over the angle, and the numbers that renderers take of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -14,8 +14,6 @@ Source: Blender 5.0.1, `intern/cycles/kernel/closure/bsdf_util.h` (`fresnel_irid
 `intern/cycles/doc/precompute/thin_film_table.py`; renders agree with this module to 1e-6.
 """
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import cache

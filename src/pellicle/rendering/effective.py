@@ -5,8 +5,6 @@ shift fringes, and a neighbouring order may fit better. Residuals are CIE 1994 d
 in L*, a* and b* and close to ΔE2000; the best start is chosen by ΔE2000.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Export of a film to a renderer, with the error of the renderer's formula, and maps of thickness in nm."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import dataclass, replace

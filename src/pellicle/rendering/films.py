@@ -1,7 +1,5 @@
 """Films to export: of scenes, of surfaces, and of fits with their best values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ approximate them: L. Belcour and P. Barla, ACM TOG 36(4), 65 (2017), in the form
 publish.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple

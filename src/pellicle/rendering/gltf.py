@@ -11,8 +11,6 @@ Babylon.js and others use the same code.
 Source: Khronos, KHR_materials_iridescence, "Implementation Notes" (2022).
 """
 
-from __future__ import annotations
-
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A film as a renderer takes it: numbers of its formula, physical and effective, with their errors."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any

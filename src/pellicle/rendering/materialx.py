@@ -12,8 +12,6 @@ becomes RGB by a matrix of CIE RGB; renderers take the result as their linear wo
 Source: MaterialX 1.39.5, libraries/pbrlib/genglsl/lib/mx_microfacet_specular.glsl.
 """
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from importlib.metadata import version

@@ -5,8 +5,6 @@ cosine, `pellicle_film.py`, the BSDF that reads it, and two scenes of a sphere: 
 which needs no Python, and `film_lookup.xml` by the lookup, whose thickness may vary over the surface.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -20,8 +20,6 @@ In RGB variants the table has linear sRGB under D65, in spectral ones the reflec
 the built-in `roughconductor` it reflects on the front side only; wrap it in `twosided` for open surfaces.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import drjit

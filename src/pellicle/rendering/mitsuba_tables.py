@@ -1,7 +1,5 @@
 """Tables of a film for Mitsuba: lookups over thickness and cosine, and `.bsdf` files of `measured`."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

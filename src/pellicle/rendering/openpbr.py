@@ -4,8 +4,6 @@
 degrees are colours.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Formulas of renderers as methods of computing a film's colour, with its own numbers and solved ones."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from functools import partial

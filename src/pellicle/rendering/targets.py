@@ -3,8 +3,6 @@
 A module has a `TARGET`. To add one, write it and add its name to `MODULES`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec

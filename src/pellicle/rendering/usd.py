@@ -4,8 +4,6 @@ UsdPreviewSurface has no film: it gets the film's colour at normal incidence. Bo
 custom data of the material.
 """
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """Rendering of tables as CSV."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Iterable, Sequence

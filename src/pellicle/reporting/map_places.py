@@ -1,7 +1,5 @@
 """Places of pixels of a map in words: along the edge, in a patch, in rows, scattered."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Summaries of spectra, colours and cubes: what was read from a file, as text and as JSON."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plain text for reports: blocks, wrapped text and aligned columns, at most 100 characters wide."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Sequence
 

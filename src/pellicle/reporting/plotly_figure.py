@@ -9,8 +9,6 @@ Colours are names of the page's style, `var(--fit)`, which differ between light 
 Plotly take some HTML: names of files are escaped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any

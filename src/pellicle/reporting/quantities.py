@@ -1,7 +1,5 @@
 """Measured quantities of spectra, colours and BRDF samples: names, labels with units, data, model, σ."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Display of renderings of spheres: one exposure, colours outside sRGB, and the background."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Log posterior of a problem at many points of the unit cube at once, systematic effects integrated out."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

@@ -3,8 +3,6 @@
 A chain is extended until its checks pass, a limit is reached, or the user interrupts.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

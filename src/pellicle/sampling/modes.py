@@ -6,8 +6,6 @@ that their covariance becomes that of the sandwich estimator: the open-faced san
 J. Comput. Graph. Stat. 23, 853 (2014).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple

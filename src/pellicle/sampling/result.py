@@ -1,7 +1,5 @@
 """Results of sampling: draws of the posterior, and the data that they predict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Sample the posterior of a fit's free parameters, from every minimum that the fit found."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar

@@ -1,7 +1,5 @@
 """Methods of computing 95 % intervals of a fit from samples of its posterior, for `pellicle cost`."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

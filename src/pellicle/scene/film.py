@@ -4,8 +4,6 @@ Scenes are pytrees of numbers. A `Free`, a parameter to be fitted, may stand in 
 marks an absent effect, which costs nothing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

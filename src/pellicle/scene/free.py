@@ -1,7 +1,5 @@
 """Free parameters, which stand in a pytree in place of numbers, and pytrees as keys by their content."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps

@@ -1,7 +1,5 @@
 """Effects of the instrument on the signal: scale, offset, bandwidth, spreads and the cone of light."""
 
-from __future__ import annotations
-
 import math
 from typing import final
 

@@ -1,7 +1,5 @@
 """Priors of free parameters, each in the parameter's own unit."""
 
-from __future__ import annotations
-
 from typing import TypeAlias, final
 
 import equinox as eqx

@@ -5,8 +5,6 @@ is no polynomial nearby; with the sign put back it is one. A smooth S that only 
 stands.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from jaxtyping import Float
 

@@ -1,7 +1,5 @@
 """Physical limits of measured values: which reflectances, Ψ and Δ, σ and angles are accepted."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

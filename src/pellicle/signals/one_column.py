@@ -1,7 +1,5 @@
 """Signals of one column: powers, counts, and their change against a reference."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reflectance, transmittance and raw counts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, final
 

@@ -1,7 +1,5 @@
 """Every kind of signal by its word. A new one is one module, one line here, and its tests."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

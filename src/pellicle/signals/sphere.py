@@ -3,8 +3,6 @@
 N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ (Jellison and Modine 1990, Appl. Opt. 29, 959).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Apart from the other modules of signals, which import no JAX.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Simulated samples of the BRDF of a surface, and the directions where they are taken."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

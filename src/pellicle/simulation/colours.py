@@ -1,7 +1,5 @@
 """Interference colours of a film against thickness and angle, and simulated measurements of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

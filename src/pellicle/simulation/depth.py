@@ -4,8 +4,6 @@ As in `pellicle.simulation.functions`, every argument broadcasts and may be trac
 the input.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

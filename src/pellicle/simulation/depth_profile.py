@@ -8,8 +8,6 @@ absorbed in the plate, as in Byrnes, arXiv:1603.02720, section 5. So does the di
 and T of the forward model all absorptances then add up to 1.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple

@@ -9,8 +9,6 @@ radiance 1.
 The sphere has radius 1, the eye is at infinite z: all lines of sight are parallel.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ A line of sight crosses the film of a bubble in front and at the back at one ang
 further chords within. Its thickness depends on the height.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ Every argument broadcasts and may be traced: `jit`, `vmap`, `grad` and `jacfwd` 
 them. The precision follows the input, float32 or float64.
 """
 
-from __future__ import annotations
-
 import warnings
 from typing import Any, NamedTuple
 

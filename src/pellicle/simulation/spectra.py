@@ -1,7 +1,5 @@
 """Simulated spectra of films: the signal of a scene with noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

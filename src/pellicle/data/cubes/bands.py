@@ -1,7 +1,5 @@
 """Wavelengths of the bands of a cube: their unit, checks, and the bands to use."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ R = (raw − dark) / (white − dark) · R_white, block by block. A frame is an 
 a line of a pushbroom camera (x, bands), the mean of several such lines, or one spectrum (bands).
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

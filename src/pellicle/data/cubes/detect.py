@@ -1,7 +1,5 @@
 """Detection of the format of a cube, by content and not by suffix."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

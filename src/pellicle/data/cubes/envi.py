@@ -3,8 +3,6 @@
 **Source**: NV5 Geospatial, ENVI Header Files, https://www.nv5geospatialsoftware.com/docs/enviheaderfiles.html
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

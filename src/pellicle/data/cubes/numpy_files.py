@@ -3,8 +3,6 @@
 Files are read block by block, but for compressed `.npz`, which are unpacked into memory.
 """
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path

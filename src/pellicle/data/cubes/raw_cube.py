@@ -3,8 +3,6 @@
 Stored arrays hold a path and no open file, so that copies sent to other processes are small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

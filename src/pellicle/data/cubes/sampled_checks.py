@@ -3,8 +3,6 @@
 The sample has some blocks in a grid, so that memory and time do not grow with the cube.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any

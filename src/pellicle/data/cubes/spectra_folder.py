@@ -1,7 +1,5 @@
 """Folders of spectra with a table of their positions, as wafer maps are exported."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

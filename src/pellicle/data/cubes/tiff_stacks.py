@@ -1,7 +1,5 @@
 """TIFF stacks with one page, or one sample, for each wavelength, read block by block."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Variables of a cube by their names: which are the measured values, and which their errors."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Cubes in xarray objects, zarr stores and NetCDF files: only axes, coordinates and names are read."""
 
-from __future__ import annotations
-
 import json
 import warnings
 from collections.abc import Mapping

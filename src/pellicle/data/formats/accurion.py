@@ -5,8 +5,6 @@ each point is measured in up to four zones of the polariser and analyser; zone 0
 their largest difference, which is not a standard deviation.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from math import dist

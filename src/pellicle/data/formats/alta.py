@@ -5,8 +5,6 @@ and `#PARAM_OUT` for their meaning, `#VS` for no interval (0), a radius (1) or b
 about each value. Angles are in radians; L is the light and V the viewer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Text files of laboratory spectrometers: PerkinElmer PEDS, JASCO and Bruker's data point tables."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import PurePath

@@ -7,8 +7,6 @@ Source: J. Dupuy and W. Jakob, ACM TOG 37(6), 274 (2018), and the class Marginal
 whose results it reproduces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ their line numbers, or None for another format. A binary reader takes the conten
 then checked as in any other file, and messages name the lines of the user's file.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 

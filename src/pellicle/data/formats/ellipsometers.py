@@ -1,7 +1,5 @@
 """Text files of ellipsometers: Horiba, Sentech, Film Sense, and those of Regress Pro and ADAP."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ A format that stores several curves, such as a sample, a dark and a reference sp
 each; `readable` keeps reflectances, transmittances and absorbances, and names what it leaves out.
 """
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import re

@@ -1,7 +1,5 @@
 """Text files of fibre spectrometers: Avantes, Ocean Optics (Ocean Insight) and StellarNet."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import PurePath

@@ -5,8 +5,6 @@ datasets and chunks too large for a spectrum, before anything is allocated. Soft
 part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import prod
 from typing import Any

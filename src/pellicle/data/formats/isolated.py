@@ -4,8 +4,6 @@ HDF5 2.0 ends its process (segmentation fault) on some files with a few wrong by
 content on its standard input and answers with a line of JSON and the columns as float64; it takes 0.25 s.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os

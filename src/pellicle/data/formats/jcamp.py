@@ -5,8 +5,6 @@ are `##XUNITS=` and `##YUNITS=`. The table is `(X++(Y..Y))`, at even steps from 
 `(XY..XY)`. Some programs write decimal commas. **Source**: JCAMP-DX 4.24 and 5.01, http://www.jcamp-dx.org.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

@@ -10,8 +10,6 @@ Public readers are not used: jcamp 1.3 and openreadout 0.4 read decimal commas a
 and neither refuses a table whose checks fail.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from math import isclose

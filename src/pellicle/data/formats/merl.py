@@ -6,8 +6,6 @@ Three int32 (90, 90, 180), then float64, little-endian: all of R, then G, then B
 swapped. A cell is read at its middle. Values have a scale per channel; negative ones are invalid.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from pathlib import Path

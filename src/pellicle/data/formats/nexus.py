@@ -5,8 +5,6 @@ NXellipsometry of FAIRmat stores `measured_data[angle, observable, wavelength]` 
 `data_type` names the observables. **Source**: https://manual.nexusformat.org and the NXDL of NXellipsometry.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator
 from dataclasses import replace

@@ -6,8 +6,6 @@ are left out. No part is unpacked to disk; entities and document types are refus
 readers of lightr and Veusz.
 """
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile

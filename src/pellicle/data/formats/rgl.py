@@ -10,8 +10,6 @@ ACM TOG 37(6), 274 (2018); rgl.epfl.ch/materials; the plugin `measured` of Mitsu
 reproduces.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ Thermo's INSIGHT and other programs that measure a batch write title, date, name
 layouts are those of public exports.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Sequence

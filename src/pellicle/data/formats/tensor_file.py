@@ -7,8 +7,6 @@ position of its data (uint64) and its shape (uint64 for each axis).
 Source: Mitsuba 3's documentation and writer (`mitsuba.tensor_io`); rgl.epfl.ch/materials.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 from collections.abc import Mapping

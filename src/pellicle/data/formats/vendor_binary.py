@@ -4,8 +4,6 @@ They are recognised by their first bytes and decoded by the package openreadout 
 memory. It gives each trace with the quantity and the unit of both axes; what it does not name is not guessed.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Sequence
 from typing import Any

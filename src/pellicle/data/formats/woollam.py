@@ -9,8 +9,6 @@ or transmittance of p, s or unpolarised light. Rows of dynamic data end with the
 is that of files of both programs.
 """
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

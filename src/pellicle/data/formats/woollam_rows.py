@@ -5,8 +5,6 @@ Each function takes rows of wavelength, angle, values and errors, and returns th
 the wavelength, the rows and sentences on what was done.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from typing import NamedTuple

@@ -4,8 +4,6 @@
 faulty line and column.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

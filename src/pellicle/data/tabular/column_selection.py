@@ -1,7 +1,5 @@
 """Selection of the columns to read: by the caller's names, by the header, or by position."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass

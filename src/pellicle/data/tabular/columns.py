@@ -5,8 +5,6 @@ after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%
 rows only those of a keyword and a value count, as `Y-axis mode: %T` or `##XUNITS=1/CM`; free text does not.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

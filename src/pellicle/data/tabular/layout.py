@@ -4,8 +4,6 @@ The preamble is any text before the first row of numbers; a line of column names
 rows is an error; a closing `>>>>>` line and text below a blank line that follows the rows are not.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

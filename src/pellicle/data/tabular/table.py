@@ -5,8 +5,6 @@ layout as for any file, and the rows are given to a parser as they are. Whatever
 is left to the reader of lines, which names line and column.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import sys

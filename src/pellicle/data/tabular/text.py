@@ -1,7 +1,5 @@
 """Text files as lines and cells: decoding, comments, and the syntax of numbers."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import os

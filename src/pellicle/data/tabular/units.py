@@ -3,8 +3,6 @@
 Plain constants instead of a unit library: importing one would take longer than reading the file.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 HC_EV_NM = 6.62607015e-34 * 299792458 / 1.602176634e-19 * 1e9

@@ -1,7 +1,5 @@
 """HTML of the explorer, its script as one ES module, and its style, for a page and for a notebook."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from importlib.resources import files

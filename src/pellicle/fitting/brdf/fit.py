@@ -1,7 +1,5 @@
 """Fit a layered surface to BRDF samples, and the same samples without a layer: then judge."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Evidence for a layer: held-out errors against baselines without one, and a meaningful layer."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

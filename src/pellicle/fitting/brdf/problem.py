@@ -1,7 +1,5 @@
 """A surface and BRDF samples of it as a least-squares problem."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

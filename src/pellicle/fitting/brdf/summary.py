@@ -1,7 +1,5 @@
 """Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers, warnings."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

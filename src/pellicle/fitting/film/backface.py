@@ -1,7 +1,5 @@
 """Comparison of a fit with and without the back face of a plate."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Summary of a fit of colours: part and curve, evidence of a discrepancy, probability of each minimum."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

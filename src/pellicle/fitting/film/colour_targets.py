@@ -1,7 +1,5 @@
 """Targets of a fit of colours: linear values, σ and the scene that is to explain them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import equinox as eqx

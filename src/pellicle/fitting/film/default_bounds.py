@@ -4,8 +4,6 @@ Nobody chose these bounds for the sample at hand. What lies beside them is searc
 explained better there, the fit is done again within wider bounds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 from logging import getLogger

@@ -1,7 +1,5 @@
 """Residuals of spectra and what may explain them: the input of a discrepancy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Fit a scene to spectra and colours of one sample: scan, polish, rank minima, estimate uncertainties."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import replace

@@ -10,8 +10,6 @@ independent look at the thickness of a fit, from fewer assumptions, and less acc
 others, Thin Solid Films 138, 117 (1986) (Fourier transform).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple

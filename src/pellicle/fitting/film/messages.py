@@ -3,8 +3,6 @@
 `pellicle ... --verbose` listens; so does anyone with `logging.getLogger("pellicle").setLevel("INFO")`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from logging import INFO, getLogger
 

@@ -6,8 +6,6 @@ linear system; what they cost in evidence is a log-determinant (marginal likelih
 Gaussian model: Bishop 2006, section 3.5). Physical signs are imposed: g ≥ 0 and o ≥ 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ The sign of Δ may not have been measured, a file may follow another convention 
 fourth Stokes parameter. A reading by which the scene would explain the data is named, with what to change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 

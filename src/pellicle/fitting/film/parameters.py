@@ -1,7 +1,5 @@
 """The free parameters of a scene: their names, units and bounds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

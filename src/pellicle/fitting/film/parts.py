@@ -1,7 +1,5 @@
 """Fit quality, curves and misfit of each spectrum, and of colours, of a fit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Spectra and colours of a sample and their scenes as a least-squares problem."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Structure in residuals: the wavelengths at which the model misses something."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ order of its own: it is polished too, unless it is further above the best minimu
 any start by. The period of the fringes (`fringes.py`) proposes more.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from logging import getLogger

@@ -1,7 +1,5 @@
 """Summary of a fit of spectra: scan profile, drift limits, opaque layers, warnings."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

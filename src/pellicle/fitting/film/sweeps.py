@@ -6,8 +6,6 @@ mean, and the linearised fit turns its deviation into steps of the parameters. T
 deviation of the mean (GUM 4.2) replaces the stated noise where the two do not agree.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Systematic effects of a spectrum: what each that a scene takes for granted does to the signal."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple

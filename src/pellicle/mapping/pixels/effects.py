@@ -1,7 +1,5 @@
 """Systematic effects of many pixels: changes of their data by what a scene takes for granted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Fits of the spectra of many pixels by one scene."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Any

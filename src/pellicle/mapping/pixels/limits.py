@@ -1,7 +1,5 @@
 """Standard errors of pixels by the noise: of a parabola or, where the misfit is none, of a profile."""
 
-from __future__ import annotations
-
 import jax
 import numpy as np
 

@@ -7,8 +7,6 @@ pixels have in common the spans of all nodes are one matrix, and the scan of a b
 of matrices. A step counts up to half the distance to the next node only.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from logging import getLogger
 from typing import Any, NamedTuple

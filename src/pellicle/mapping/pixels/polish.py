@@ -1,7 +1,5 @@
 """Gauss-Newton steps of many pixels side by side, with the exact model of their scene."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Results of fits of many pixels: plain arrays with a row for each pixel."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

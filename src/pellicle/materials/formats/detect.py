@@ -4,8 +4,6 @@ The programs are IMD, Sentech's SpectraRay, SOPRA, and Woollam's WVASE and Compl
 Each function returns None for a file of another format, and raises DataError for faulty rows.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

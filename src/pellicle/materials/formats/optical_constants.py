@@ -1,7 +1,5 @@
 """Optical constants of a material file: lines and rows of its text, checks, and n + ik against nm."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ header, columns are found by name (`wavelength_nm`, `Wavelength, µm`, `Energy (
 `eps2`); without one they are wavelength in nm, n, k.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ The CSV holds a block `wl,n` and, where the page has k, a second block `wl,k` be
 if n and k come from different sources.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

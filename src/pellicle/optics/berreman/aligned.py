@@ -1,7 +1,5 @@
 """Layers whose principal axes are those of the laboratory: s and p each have a 2×2 matrix."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import jax

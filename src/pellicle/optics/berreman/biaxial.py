@@ -7,8 +7,6 @@ thin layer among thick ones keeps its digits.
 Source: N. J. Higham, Functions of Matrices (2008), chapter 10.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

@@ -7,8 +7,6 @@ in units of E over the impedance of free space and the time factor exp(−iωt);
 Source: D. W. Berreman, J. Opt. Soc. Am. 62, 502 (1972).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ and the scattering matrix of one slice is doubled m times: nothing in it exceeds
 Matrices are complex arrays here, which compile to less code than pairs of real ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -13,8 +13,6 @@ normal incidence, E = d + u and H = d − u in the tangential fields; those of a
 faces are joined by Redheffer's star product.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple

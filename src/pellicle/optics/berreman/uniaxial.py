@@ -11,8 +11,6 @@ the extraordinary roots μ ± √W. No eigenvectors appear, and γX is regular w
 wave runs along the axis, the elimination that gives X is singular; differences of exponentials replace it.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

@@ -1,7 +1,5 @@
 """Page of a result: template, style, script, figures and pictures in one file."""
 
-from __future__ import annotations
-
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
