@@ -18,52 +18,10 @@ from pellicle.recipes.media import medium as recipe_medium
 from pellicle.scene.layers import Layer
 
 # n + ik = 1.5 + 0.1i at 400 nm and 1.4 + 0.05i at 600 nm: ε = n² − k² + 2nki, E = 1239.8419844 eV nm / λ
-FORMATS = {
-    "WVASE nm": (".mat", "Résin of 1999\nnm\nNK\n400\t1.5\t0.1\n600\t1.4\t0.05\n"),
-    "WVASE eV": (
-        ".mat",
-        "Resin\nmade by me\neV\nE1E2\n3\n3.099604961 2.24 0.3\n2.5 2.1 0.2\n2.066403307 1.9575 0.14\n",
-    ),
-    "WVASE Angstroms": (".MAT", "Resin\nAngstroms NK\n4000 1.5 0.1\n6000 1.4 0.05\n"),
-    "WVASE microns": (".txt", "Resin\nmicrons\nNK\n0.4 1.5 0.1\n0.6 1.4 0.05\n"),
-    "SpectraRay nm": (
-        ".mat",
-        "Name=Résin\nUnits=Wavelength,nm\nBegin of array\n400 2.24 0.3\n600 1.9575 0.14\nEnd of array\n",
-    ),
-    "SpectraRay eV": (
-        ".txt",
-        "Units=Energy, eV, n, k\nBegin of array\n2.066403307 1.4 0.05\n3.099604961 1.5 0.1\nEnd of array\n",
-    ),
-    "SOPRA records": (
-        ".MAT",
-        "VERSION*1*$\nPOINTS*2*$\nDATA1*1*4.0e2*1.5*0.1*$\nDATA1*2*6.0e2*1.4*0.05*$\nCOMMENT*Résin*\nEOF*\n",
-    ),
-    "SOPRA grid": (".nk", "4 400 600 1\n1.5; 0.1\n1.4; 0.05\n"),
-    "IMD": (".nk", "; Résin, by me\n; lambda (A)   n   k\n 4000.0  1.5  0.1\n\n 6000.0  1.4  0.05\n"),
-    "refractiveindex.info YAML": (
-        ".yml",
-        "REFERENCES: |\n    A. Éditor. Resins. (1999)\nCOMMENTS: a resin\nDATA:\n  - type: tabulated nk\n"
-        "    data: |\n        0.4 1.5 0.1\n        0.6 1.4 0.05\n",
-    ),
-    "refractiveindex.info CSV": (".csv", "wl,n\n0.4,1.5\n0.6,1.4\n\nwl,k\n0.4,0.1\n0.6,0.05\n"),
-    "refractiveindex.info text": (".txt", "wl\tn\n0.4\t1.5\n0.6\t1.4\nwl\tk\n0.35\t0.125\n0.6\t0.05\n"),
-    "refellips": (".csv", '"Wavelength, µm","n","k"\n0.4,1.5,0.1\n0.6,1.4,0.05\n'),
-    "Filmetrics": (".txt", "Wavelength(nm)\tn\tk\n400\t1.5\t0.1\n600\t1.4\t0.05\n"),
-    "table of ε": (".csv", "Energy (eV);ε1;ε2\n3.099604961;2.24;0.3\n2.066403307;1.9575;0.14\n"),
-    "table with units below": (".txt", "wavelength  n  k\num - -\n0.4 1.5 0.1\n0.6 1.4 0.05\n"),
-    "table of numpy": (".dat", "# wavelength_nm n k\n400 1.5 0.1\n600 1.4 0.05\n"),
-    "table of MATLAB": (".txt", "% Photon energy (eV)  n  k\n3.099604961 1.5 0.1\n2.066403307 1.4 0.05\n"),
-    "commented names": (".csv", "# of 1999\n# wavelength_A,eps1,eps2\n4000,2.24,0.3\n6000,1.9575,0.14\n"),
-}
-UNIT = {
-    "WVASE nm": "nm",
-    "WVASE eV": "eV",
-    "WVASE Angstroms": "Angstroms",
-    "SpectraRay nm": "Wavelength,nm",
-    "refellips": "µm",
-    "Filmetrics": "nm",
-    "table of ε": "eV",
-}
+SAMPLES = sorted(Path(__file__).with_name("samples").iterdir())
+FORMATS = {path.stem: (path.suffix, path.read_bytes().decode("utf-8")) for path in SAMPLES}
+UNIT = {"WVASE nm": "nm", "WVASE eV": "eV", "WVASE Angstroms": "Angstroms", "SpectraRay nm": "Wavelength,nm"}
+UNIT |= {"refellips": "µm", "Filmetrics": "nm", "table of eps": "eV"}
 """The unit that a format states, which the test of a wrong one replaces."""
 
 
@@ -104,14 +62,14 @@ def test_every_format_in_every_encoding(write, name, encoding, ending):
     check(write(text.replace("\n", ending), suffix, encoding), name)
 
 
-@pytest.mark.parametrize("name", [name for name in FORMATS if "ε" not in name])
+@pytest.mark.parametrize("name", [name for name in FORMATS if "eps" not in name])
 def test_latin_1(write, name):
     suffix, text = FORMATS[name]
     check(write(text, suffix, "latin-1"), name)
 
 
 @pytest.mark.parametrize(
-    "name", [n for n, (_, text) in FORMATS.items() if "csv" not in _ and "YAML" not in n] + ["table of ε"]
+    "name", [n for n, (_, text) in FORMATS.items() if "csv" not in _ and "YAML" not in n] + ["table of eps"]
 )
 def test_decimal_commas(write, name):
     suffix, text = FORMATS[name]
@@ -144,18 +102,11 @@ def test_an_unknown_unit_is_refused(write, name):
     assert "unit" in message
 
 
-LARGEST_K = {
-    "SpectraRay nm": "0.3",
-    "WVASE eV": "0.3",
-    "table of ε": "0.3",
-    "commented names": "0.3",
-    "refractiveindex.info text": "0.125",
-}
+LARGEST_K = dict.fromkeys(("SpectraRay nm", "WVASE eV", "table of eps", "commented names"), "0.3")
+LARGEST_K["refractiveindex.info text"] = "0.125"
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in FORMATS if "YAML" not in name]
-)  # the database drops such rows
+@pytest.mark.parametrize("name", [n for n in FORMATS if "YAML" not in n])  # the database drops such rows
 def test_absorption_of_the_other_sign_is_refused(write, name):
     suffix, text = FORMATS[name]
     wrong = re.sub(rf"(?<![\d.]){LARGEST_K.get(name, '0.1')}(?!\d)", lambda k: "-" + k[0], text)
