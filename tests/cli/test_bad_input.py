@@ -2,8 +2,6 @@
 
 import pytest
 
-from pellicle.cli.session import say
-
 
 @pytest.fixture
 def check_refused(pellicle, tmp_path):
@@ -19,28 +17,6 @@ def check_refused(pellicle, tmp_path):
 
 
 ROWS = "".join(f"{400 + 10 * i},0.{20 + i}\n" for i in range(10))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        pytest.param("", ("is empty",), id="empty"),
-        pytest.param("wavelength,R\n" + ROWS + "500,blue\n", ("line 12", "'blue'"), id="text in a column"),
-        pytest.param(
-            "wavelength,R\n" + ROWS + "500,31.5\n", ("line 12", "--signal-unit percent"), id="percent"
-        ),
-    ],
-)
-def test_data(check_refused, write, scene, text, said):
-    file = write(text)
-    check_refused("fit", file, *scene, code=3, said=(str(file), *said))
-
-
-def test_missing_file_and_folder(check_refused, tmp_path, scene):
-    check_refused("fit", tmp_path / "gone.csv", *scene, code=3, said=("gone.csv", "no such file"))
-    folder = tmp_path / "folder"
-    folder.mkdir()
-    check_refused("fit", folder, *scene, code=3, said=(str(folder), "is a folder"))
 
 
 def test_outside_a_materials_table(check_refused, spectrum_file):
@@ -81,14 +57,6 @@ def test_missing_layer_substrate_and_data(check_refused, spectrum_file):
     check_refused("fit", spectrum_file(), "--substrate", "Si", code=2, said=("--layer is missing",))
     check_refused("fit", spectrum_file(), "--layer", "SiO2", code=2, said=("--substrate is missing",))
     check_refused("fit", code=2, said=("no data",))
-
-
-@pytest.mark.parametrize("layer", ["SiO3", "hematit", "Unobtainium"])
-def test_unknown_material_suggests_the_nearest(check_refused, spectrum_file, layer):
-    nearest = {"SiO3": "SiO2", "hematit": "hematite"}.get(layer, "pellicle materials")
-    check_refused(
-        "fit", spectrum_file(), "--layer", layer, "--substrate", "Si", code=2, said=(layer, nearest)
-    )
 
 
 def test_an_intensity_without_a_scale(check_refused, write, scene):
@@ -161,9 +129,3 @@ def test_wrong_usage_is_a_json_object_with_the_exit_code(pellicle, words, code, 
     assert said in record["error"]
     assert said in ran.err
     assert pellicle(*words).out == ""
-
-
-def test_talk_goes_to_stderr(capsys):
-    say("one", "two")
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err) == ("", "one\ntwo\n")

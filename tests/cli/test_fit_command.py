@@ -2,7 +2,6 @@
 
 import csv
 import hashlib
-import json
 
 import pytest
 
@@ -80,18 +79,6 @@ def test_the_assumed_thickness_is_said(pellicle, spectrum_file):
 
 
 FILES = {"recipe.toml", "report.html", "report.txt", "result.json", "figure.png", "fit.csv", "nk.csv"}
-
-
-def test_out_writes_the_five_files(pellicle, spectrum_file, scene, tmp_path):
-    out = tmp_path / "results" / "oxide"
-    ran = pellicle("fit", spectrum_file(), *scene, "--out", out, code=0)
-    assert {p.name for p in out.iterdir()} == FILES
-    assert json.loads((out / "result.json").read_text())["status"] == "converged"
-    assert (out / "report.txt").read_text().strip() == ran.out.strip()
-    assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert str(out) in ran.err
-    again = pellicle("fit", spectrum_file(), *scene, "--out", out)
-    assert again.code == 0  # a folder of pellicle's own is written anew
 
 
 def test_a_folder_with_a_users_files_is_refused_before_anything_is_fitted(

@@ -1,7 +1,6 @@
 """`pellicle simulate`: a file that says what it is, and whose fit finds the truth."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -49,21 +48,6 @@ def test_the_file_says_what_it_is_and_its_fit_finds_the_truth(pellicle, recipe, 
     assert abs(thickness["value"] - 321.5) < 4 * thickness["stderr_noise"] < 2
 
 
-def test_noise_and_seed(pellicle, recipe, tmp_path):
-    def made(name, *flags):
-        pellicle("simulate", recipe, "--out", tmp_path / name, *flags)
-        return numbers(tmp_path / name)
-
-    clean = made("clean.csv", "--noise", 0)
-    assert clean.shape == (100, 2)
-    one, same, other = made("a.csv", "--seed", 1), made("b.csv", "--seed", 1), made("c.csv", "--seed", 2)
-    np.testing.assert_array_equal(one, same)
-    assert np.std((one - other)[:, 1]) > 0.001
-    assert 0.0015 < np.std(one[:, 1] - clean[:, 1]) < 0.0025
-    loud = made("d.csv", "--noise", 0.02)
-    assert 0.015 < np.std(loud[:, 1] - clean[:, 1]) < 0.025
-
-
 def test_default_wavelengths_are_said(pellicle, recipe, tmp_path):
     recipe.write_text(RECIPE.replace("wavelengths = { start = 400, stop = 796, step = 4 }\n", ""))
     ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv")
@@ -79,10 +63,6 @@ def test_bad_wavelengths(pellicle, recipe, tmp_path, grid, said):
     recipe.write_text(RECIPE.replace("{ start = 400, stop = 796, step = 4 }", grid))
     pellicle("simulate", recipe, "--out", tmp_path / "film.csv").refused(3, said)
     assert not (tmp_path / "film.csv").exists()
-
-
-def test_negative_noise(pellicle, recipe, tmp_path):
-    pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--noise", -1).refused(2, "--noise")
 
 
 @pytest.mark.slow  # a fit of ellipsometry
@@ -197,11 +177,3 @@ def test_each_angle_of_a_list_has_its_rows_at_each_azimuth(pellicle, tmp_path):
         alone = pl.Scene(pl.Layer(1.46, 321.5), 3.9 + 0.02j, light=pl.Light(angle=own.angle))
         one = pl.simulate(alone, spectrum.wavelength[own.rows])
         np.testing.assert_allclose(spectrum.values[own.rows], one.values, atol=1e-8)
-
-
-def test_one_wavelength_is_simulated_at_each_angle(pellicle, tmp_path):
-    path, out = tmp_path / "laser.toml", tmp_path / "laser.csv"
-    text = RECIPE.replace('signal = "R"', 'signal = "R"\nangle = [30, 50]\nwavelengths = [632.8]')
-    path.write_text(re.sub(r"wavelengths = \{.*\}\n", "", text))
-    assert pellicle("simulate", path, "--out", out).code == 0
-    assert pl.read_spectrum(out).angle.tolist() == [30.0, 50.0]

@@ -1,6 +1,5 @@
 """`--uncertainty`, and the uncertainties of a recipe, in a fit's errors."""
 
-import json
 import math
 
 import pytest
@@ -55,15 +54,6 @@ def test_an_index_of_a_recipe_counts_as_one_that_is_fitted(thickness, write):
     together = math.hypot(fitted["stderr"], fitted["value"] - found["value"])
     assert found["stderr_noise"] < 0.5 * found["stderr"]
     assert found["stderr"] == pytest.approx(together, rel=0.02)
-
-
-def test_the_budget_of_the_report_and_of_the_file(pellicle, spectrum_file, scene, tmp_path):
-    ran = pellicle("fit", spectrum_file(), *scene, "--out", tmp_path / "out")
-    assert "[[Uncertainty budget]]" in ran.out
-    assert "% by noise alone" not in ran.out
-    assert "nm by noise alone)" in ran.out.splitlines()[1]
-    kept = json.loads((tmp_path / "out" / "result.json").read_text())
-    assert kept["budget"][0]["effect"] in ran.out
 
 
 def test_another_word_is_refused(pellicle, spectrum_file, scene):

@@ -1,6 +1,5 @@
 """`--verbose` tells on stderr what was understood and why; without it the library is silent."""
 
-import logging
 import re
 
 import jax
@@ -48,15 +47,3 @@ def test_why_a_fit_is_no_answer(pellicle, spectrum_file):
     )
     assert "status: does the scene not explain the data? yes" in ran.err
     assert "its noise is given" in ran.err
-
-
-def test_other_commands_tell_their_scene(pellicle, tmp_path, write):
-    recipe = write(
-        '[data]\nsignal = "R"\nwavelengths = [500, 600]\n[scene]\nsubstrate = 1.5\n'
-        "[[scene.layer]]\nmaterial = 1.33\nthickness = 100\n",
-        "film.toml",
-    )
-    ran = pellicle("simulate", recipe, "--out", tmp_path / "film.csv", "--verbose", code=0)
-    assert "scene: from index 1: index 1.33, 100 nm, on index 1.5" in ran.err
-    assert logging.getLogger("pellicle").handlers == []
-    assert "--verbose" in pellicle("materials", "--help").out

@@ -157,21 +157,6 @@ def test_remedies_for_a_whole_axis(write, nm, remedy, refused):
 
 
 @pytest.mark.parametrize(
-    ("values", "line", "what"),
-    [
-        ([400, 401, 401, 402], 4, "401 repeats 401 of line 3"),
-        ([400, 500, 450, 600], 4, "450 turns back after 500 of line 3"),
-        ([600, 500, 550, 400], 4, "550 turns back after 500 of line 3"),
-        ([500, 400, 600, 700], 3, "400 turns back after 500 of line 2"),
-        ([400, 400], 3, "400 repeats 400 of line 2"),
-    ],
-)
-def test_wavelengths_that_are_not_monotone(write, values, line, what, refused):
-    path = write("wavelength,R\n" + "".join(f"{v},0.5\n" for v in values))
-    refused(path, DataError, f"line {line}, column 'wavelength'", what, "delete or correct")
-
-
-@pytest.mark.parametrize(
     ("header", "row"),
     [("R", "-0.06"), ("R (%)", "-6"), ("R,sigma", "-0.02,0.001"), ("R,sigma", "-0.11,0.02")],
 )

@@ -27,11 +27,6 @@ def test_axis_and_absorbance_of_a_preamble(write, axis, quantity):
     assert any("absorbance A, converted to T" in note for note in spectrum.notes)
 
 
-def test_percent_of_a_comment(write):
-    spectrum = read_spectrum(write("# Photometric mode: %R\nwavelength,R\n400,10\n500,20\n"))
-    np.testing.assert_allclose(spectrum.values, [0.1, 0.2])
-
-
 @pytest.mark.parametrize(
     ("text", "flags", "parts"),
     [
@@ -70,21 +65,9 @@ def test_error_of_an_absorbance(write):
     np.testing.assert_allclose(spectrum.sigma, 0.01 * slope, rtol=1e-8)
 
 
-def test_absorbance_by_flag(write):
-    spectrum = read_spectrum(write("400,1\n500,2\n"), signal="T", signal_unit="absorbance")
-    np.testing.assert_allclose(spectrum.values, [0.1, 0.01])
-
-
 @pytest.mark.parametrize("name", ["T (Abs)", "R (abs.)"])
 def test_absolute_or_absorbance(write, refused, name):
     refused(write(f"nm,{name}\n400,0.1\n500,0.2\n"), DataError, "unit 'abs", '`signal_unit="absorbance"`')
-
-
-@pytest.mark.parametrize(("first", "last"), [(25000, 12500), (4000, 8000), (0.4, 0.8), (3.1, 1.5)])
-def test_an_axis_that_is_unlike_nm(write, refused, first, last):
-    path = write(f"{first},0.1\n{(first + last) / 2},0.2\n{last},0.3\n")
-    refused(path, DataError, "unlike nm", '`wavelength_unit="nm"`', signal="R")
-    assert len(read_spectrum(path, signal="R", wavelength_unit="nm")) == 3
 
 
 WIDE = "Wavelength (nm),film a,film b,film c\n400,10,20,30\n500,11,21,31\n"
@@ -99,19 +82,6 @@ def test_several_samples_beside_each_other(write, refused):
     every = pl.read_spectra(path, signal="R", signal_unit="percent", spectrum="all")
     assert [spectrum.name for spectrum in every] == ["film a", "film b", "film c"]
     np.testing.assert_allclose([spectrum.values[0] for spectrum in every], [0.1, 0.2, 0.3])
-
-
-def test_quantity_of_samples_is_declared(write):
-    every = read_spectra(write("Y units: %T\n" + WIDE), spectrum="all")
-    np.testing.assert_allclose([spectrum.values[0] for spectrum in every], [0.1, 0.2, 0.3])
-    assert {spectrum.signal for spectrum in every} == {"T"}
-
-
-def test_both_polarisations(write, refused):
-    path = write("nm,Rs,Rp\n400,0.3,0.1\n500,0.3,0.1\n")
-    refused(path, UsageError, '`polarisation="s"`', '`spectrum="all"`')
-    s, p = read_spectra(path, spectrum="all")
-    assert (s.polarisation, p.polarisation, s.values[0], p.values[0]) == ("s", "p", 0.3, 0.1)
 
 
 def test_ellipsometry_with_reflectances_is_of_one_film(write, refused):

@@ -302,8 +302,3 @@ def test_files_beside_the_repository(shared_data, tmp_path, name):
         np.savetxt(alta, rows, header=header.rstrip("\n").removeprefix("#"), comments="#", fmt="%.15g")
         alta.write_text(alta.read_text().replace("##", "#"))
         np.testing.assert_allclose(read_brdf_samples(alta).values[:, 0], expected[:, 4], rtol=2e-5)
-
-
-def test_a_file_that_is_no_brdf(shared_data, refused):
-    path = shared_data / "brdf" / "teal_spectra_300_700nm.csv"
-    refused(path, DataError, "no column is theta_i")

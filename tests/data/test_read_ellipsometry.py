@@ -1,6 +1,5 @@
 """Ψ and Δ from plain columns: every way they are written, and one sentence where they cannot be."""
 
-import re
 from functools import partial
 
 import numpy as np
@@ -36,11 +35,6 @@ def test_names(write, header):
     assert spectrum.angle is None  # then it is for the fit to ask
     assert_read(spectrum, sigma=None, delta_sigma=None)
     assert "psi and delta in degrees" in spectrum.notes
-
-
-@pytest.mark.parametrize("given", [DELTA - 360 * (DELTA > 180), DELTA, DELTA - 360 * (DELTA > 185)])
-def test_delta_from_minus_180_or_from_0(write, given):
-    assert_film(read_spectrum(write(f"wl,psi,delta\n{rows(NM, PSI, given)}")))
 
 
 def test_delta_is_stored_from_0_to_below_360(write):
@@ -141,13 +135,6 @@ def test_impossible_rows(write, row, said, refused):
     refused(write(f"wl,psi,delta\n400,20,170\n{row}\n600,22,172\n"), DataError, *said)
 
 
-def test_an_impossible_end_may_be_cut_off(write, refused):
-    nm = np.arange(400.0, 500.0, 10)
-    bent = write(f"wl,psi,delta\n{rows(nm, np.where(nm < 420, 95.0, 20.0), nm - 300)}")
-    refused(bent, DataError, "line 2", "95")
-    assert len(read_spectrum(bent, range=(420, 500))) == 8
-
-
 def test_errors_that_are_none(write, refused):
     text = "wl,psi,delta,sigma_psi,sigma_delta\n400,20,170,0.1,1\n500,21,171,0.1,0\n"
     refused(write(text), DataError, "line 3, column 'sigma_delta': 0", "above zero")
@@ -158,15 +145,6 @@ def test_errors_that_are_none(write, refused):
 def test_missing_columns(write, header, refused):
     path = write(f"{header}\n400,0.20,0.70\n500,0.21,0.71\n")
     refused(path, DataError, "not all among", "`columns=[", signal="psi-delta")
-
-
-def test_missing_delta_without_a_flag(write, refused):
-    refused(
-        write("wl,psi\n400,20\n500,21\n"),
-        DataError,
-        "'psi'",
-        '`columns=["wavelength", "angle", "psi", "delta"]`',
-    )
 
 
 def test_radians_are_not_taken_for_degrees(write, refused):
@@ -260,14 +238,3 @@ def test_tan_psi_and_cos_delta(write, header):
     path.write_text(f"{header}\n500,1,0.5\n600,0.5,-1.06\n")
     with pytest.raises(DataError, match=r"line 3, .*-1\.06 is no cos\(delta\)"):
         read_spectrum(path)
-
-
-@pytest.mark.parametrize("header", ["eV,Is,Ic", "nm,re(rho),im(rho)"])
-@pytest.mark.parametrize("words", [{}, {"signal": "R"}])
-def test_other_quantities_of_ellipsometers_are_named(write, header, words):
-    path = write(f"{header}\n2,0.1,0.2\n3,0.3,0.4\n", "other.csv")
-    first, second = header.split(",")[1:]
-    with pytest.raises(
-        DataError, match=f"'{re.escape(first)}', '{re.escape(second)}' are neither .* psi and delta"
-    ):
-        read_spectrum(path, **words)

@@ -34,11 +34,6 @@ def test_decimal_commas_in_quotes(write, quotes_in_header):
     assert not any("separated" in note for note in spectrum.notes)
 
 
-def test_line_ends_of_windows_and_comments_keep_their_line_numbers(write):
-    text = "# a film\r\nwavelength,R\r\n\r\n400,0.1 # lamp\r\n# gap\r\n500,0.2\r\n"
-    assert_read(read_spectrum(write(text)), lines=[4, 6], values=[0.1, 0.2])
-
-
 def test_what_a_spectrum_carries(write):
     path = write("wavelength,R\n" + rows())
     spectrum = read_spectrum(path)
@@ -50,14 +45,6 @@ def test_what_a_spectrum_carries(write):
     assert "6 points of R, 400 to 800 nm" in str(spectrum)
     assert "wavelength unit: nm, assumed" in spectrum.notes
     assert "signal unit: fraction, assumed" in spectrum.notes
-
-
-def test_falling_wavelengths_are_turned_round_with_all_that_belongs_to_them(write):
-    spectrum = read_spectrum(write("wavelength,R,sigma\n700,0.3,0.03\n600,0.2,0.02\n500,0.1,0.01\n"))
-    np.testing.assert_array_equal(spectrum.wavelength, [500, 600, 700])
-    np.testing.assert_array_equal(spectrum.values, [0.1, 0.2, 0.3])
-    np.testing.assert_array_equal(spectrum.sigma, [0.01, 0.02, 0.03])
-    np.testing.assert_array_equal(spectrum.lines, [4, 3, 2])
 
 
 def test_no_header_three_and_four_columns_as_refnx_writes_them(write):
@@ -76,12 +63,6 @@ def test_names_in_a_comment_as_numpy_writes_them(write, tmp_path):
     spectrum = read_spectrum(path)
     np.testing.assert_allclose(spectrum.values, VALUES, rtol=1e-15)
     assert any("comment" in note for note in spectrum.notes)
-
-
-def test_a_separator_at_the_end_of_each_row(write):
-    text = "".join(f"{w},{v},\n" for w, v in zip(WAVELENGTH, VALUES, strict=True))
-    assert_film(read_spectrum(write(text), signal="R"))
-    assert_film(read_spectrum(write("wavelength,R,\n" + text)))
 
 
 def test_a_preamble_without_column_names(write):
@@ -109,12 +90,6 @@ def test_a_text_column_that_nobody_reads_is_left_alone(write):
     spectrum = read_spectrum(write(text))
     np.testing.assert_array_equal(spectrum.values, [0.1, 0.2, 0.3])
     assert "ignored: 'remark'" in spectrum.notes
-
-
-def test_r_and_t_in_one_file(write):
-    path = write("wavelength,R,T\n500,0.1,0.8\n600,0.2,0.7\n")
-    assert read_spectrum(path, signal="T").values[0] == 0.8
-    assert "ignored: 'T'" in read_spectrum(path, signal="R").notes
 
 
 def test_polarised_columns(write):

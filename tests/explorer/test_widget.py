@@ -72,11 +72,6 @@ def test_its_recipe_has_the_angles_of_the_list(widget):
     assert "angle" not in widget.recipe()
 
 
-def test_a_wrong_request_is_answered_by_a_sentence(ask):
-    assert "thicknes" in ask("view", {"values": {"thicknes": 1.0}})["error"]
-    assert "error" in ask("nothing", {})
-
-
 def test_other_messages_are_ignored(widget, ask, sent):
     widget._handle_custom_msg("text", [])
     widget._handle_custom_msg({"request": "scene"}, [])

@@ -7,7 +7,6 @@ the material, and the tolerance is then what such measurements differ by.
 import csv
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from pellicle.materials import material
@@ -26,13 +25,3 @@ def test_galena_reflects_as_the_mineral():
     """42.1 % at 589 nm in air: Criddle and Stanley, Quantitative Data File for Ore Minerals."""
     n = complex(material("PbS")(589.0))
     assert abs((n - 1) / (n + 1)) ** 2 == pytest.approx(0.421, abs=0.015)
-
-
-@pytest.mark.parametrize("name", ["GaAs", "Ta2O5", "PMMA", "ethanol", "Ge"])
-def test_a_name_gives_its_range_source_and_reason(name):
-    source = material(name)
-    low, high = source.wavelength_range
-    assert low < 633 < high
-    assert "doi.org" in source.citation
-    assert len(source.note.split()) > 3
-    assert np.isfinite(complex(source(633.0)))

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.dispersion.empirical import Cauchy, Constant
-from pellicle.fitting.film.parameters import parameters
+from pellicle.dispersion.empirical import Cauchy
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
 
@@ -79,31 +78,6 @@ def test_tables_are_relative_to_the_recipe(scene, tmp_path):
     np.testing.assert_allclose(found.layers[0].material(AT), 1.6 + 0.1j)
 
 
-@pytest.mark.parametrize(
-    ("material", "index"),
-    [("1.46", 1.46), ("2", 2.0), ('"2.9+0.1j"', 2.9 + 0.1j), ('{ model = "cauchy", A = 1.4 }', 1.4)],
-)
-def test_media(scene, material, index):
-    for text in (BASE.replace('"SiO2"', material), BASE.replace('"Si"', material)):
-        found = scene(text)
-        medium = found.layers[0].material if '"Si"' in text else found.substrate.material
-        np.testing.assert_allclose(medium(AT), index)
-
-
-def test_a_porous_top_mixes_the_film_below(scene):
-    found = scene(
-        BASE.replace(
-            LAYER,
-            '[[scene.layer]]\nname = "top"\nbetween = "bruggeman"\nfraction = { lower = 0.2, upper = 1 }\n'
-            "thickness = 20\n"
-            '[[scene.layer]]\nname = "film"\nthickness = 300\n'
-            'material = { model = "cauchy", A = { lower = 1.4, upper = 1.8 } }\n',
-        )
-    )
-    assert found.layers[0].fraction.lower == 0.2
-    assert [p.name for p in parameters(found)] == ["top.fraction", "film.A"]
-
-
 def test_a_thickness_may_be_a_number_or_a_value(scene):
     thickness = lambda text: scene(BASE.replace("{ lower = 10, upper = 3000 }", text)).layers[0].thickness  # noqa: E731
     assert thickness("120") == 120
@@ -112,13 +86,6 @@ def test_a_thickness_may_be_a_number_or_a_value(scene):
     assert isinstance(free, Free)
     assert (free.start, free.lower, free.upper) == (120, 10, 300)
     assert (free.prior.mean, free.prior.sd) == (100, 5)
-
-
-def test_free_words_in_a_layer(scene):
-    layer = scene(BASE + 'free = ["n", "k=0:0.1"]\n').layers[0]
-    assert layer.material.n.lower < 0 < layer.material.n.upper
-    assert layer.material.k.upper == 0.1
-    assert isinstance(scene(BASE.replace('"SiO2"', "1.46") + 'free = ["n"]\n').layers[0].material, Constant)
 
 
 @pytest.mark.parametrize(
@@ -303,11 +270,3 @@ def test_calibration_errors_as_parameters(scene, refused):
     assert found.instrument.wavelength_shift.start == 0
     refused(f"{head}{{ lower = 69, upper = 91 }}\n{end}", "must lie in 0 to 90 degrees, got 91")
     refused(f"{head}91\n{end}", "angle")
-
-
-def test_an_angle_shift(scene):
-    shift = "{ lower = -0.5, upper = 0.5 }"
-    found = scene(f"[data]\nsignal = 'psi-delta'\nangle = 70\n{BASE}[instrument]\nangle_shift = {shift}\n")
-    assert found.instrument.angle_shift == Free(-0.5, 0.5)
-    assert [(p.name, p.unit) for p in parameters(found)][1] == ("instrument.angle_shift", "deg")
-    assert scene(f"{BASE}[instrument]\nangle_shift = -0.2\n").instrument.angle_shift == -0.2

@@ -133,15 +133,6 @@ def _filled(tree, values):
     return jax.tree.map(lambda x: next(values) if is_free(x) else x, tree, is_leaf=is_free)
 
 
-def test_bounds_are_the_documented_ones():
-    layer = media_words.medium("tauc-lorentz")
-    free = names(Scene(Layer(layer, 100.0), "Si"))
-    assert list(free) == ["eps_inf", "A", "E0", "C", "Eg"]
-    for key, own in MODELS["tauc-lorentz"].items():
-        assert (free[key].lower, free[key].upper) == (own.lower, own.upper)
-    assert {p.unit for p in free.values()} == {"", "eV"}
-
-
 def test_calls_fix_in_the_order_of_the_table():
     layer = media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)")
     assert layer == Oscillators(1.5, (TaucLorentz(120.0, 4.1, 2.3, 2.2),))

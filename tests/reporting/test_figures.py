@@ -98,11 +98,6 @@ def test_without_a_scan_or_a_free_index_there_is_no_panel_for_it(fit, with_part)
     assert labels(draw(with_part(replace(fit, profile=None), curve=curve))) == ["reflectance", "data − fit"]
 
 
-def test_n_and_k_have_a_panel_each(fit, with_part):
-    curve = replace(fit.curve, k=np.full(41, 0.01), k_stderr=np.full(41, 0.002))
-    assert labels(draw(with_part(fit, curve=curve)))[3:] == ["n", "k"]
-
-
 def test_an_infinite_error_leaves_a_gap_in_the_band(fit, with_part, tmp_path):
     curve = replace(fit.curve, n_stderr=np.where(np.arange(41) < 9, np.inf, 0.001))
     save_figure(draw(with_part(fit, curve=curve)), tmp_path / "figure.png")

@@ -126,15 +126,6 @@ def test_a_file_that_cannot_be_read_has_the_same_keys_and_an_error(fit):
     assert failure("bad.csv", "no", "cd" * 32)["data"]["sha256"] == "cd" * 32
 
 
-def test_a_folder_holds_report_json_tables_and_figure(fit, tmp_path):
-    assert write_fit(tmp_path / "out", fit) == tmp_path / "out"
-    assert sorted(os.listdir(tmp_path / "out")) == sorted(FILES)
-    assert (tmp_path / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "out" / "report.txt").read_text().startswith("[[Verdict]]")
-    record = strictly((tmp_path / "out" / "result.json").read_text())
-    assert record["parameters"]["thickness"]["value"] == 486.28
-
-
 def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
     write_fit(tmp_path, fit)
     (tmp_path / "diary.txt").write_text("mine")

@@ -10,7 +10,6 @@ import pellicle as pl
 from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.registry import Comparison, Result
 from pellicle.accuracy.surface import SurfaceCost
-from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
 from pellicle.reporting.fit_text import report as fit_report
 from pellicle.sampling.chain import Checks
@@ -36,13 +35,6 @@ def test_a_fit_reports_draws_and_saves_itself(either, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == files
     assert (tmp_path / "out" / "report.txt").read_text() == fit.report()
     assert json.loads((tmp_path / "out" / "result.json").read_text())["schema"] == "pellicle.fit/1"
-
-
-def test_a_folder_with_other_files_is_refused(either, tmp_path):
-    (tmp_path / "thesis.txt").write_text("years of work")
-    with pytest.raises(UsageError, match=r"did not write; .*`folder`"):
-        either[0].save(tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
 
 def test_a_fit_prints_status_verdict_and_free_parameters(fit):

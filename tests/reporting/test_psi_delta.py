@@ -8,7 +8,6 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.fit_tables import fit_csv
 from pellicle.reporting.fit_text import report
-from pellicle.reporting.json_record import to_json
 from pellicle.reporting.matplotlib_figure import save_figure
 from pellicle.reporting.page.figures import of_part
 
@@ -115,11 +114,6 @@ def test_the_table_holds_model_and_residuals(spectroscopic):
     assert numbers["psi_residual"] == 0.1
     assert numbers["delta_residual"] == 2.0
     assert (numbers["psi_model"], numbers["delta_model"]) == (20.0, 300.0)
-
-
-def test_the_record_names_the_signal_and_counts_points(angular):
-    assert to_json(angular)["data"]["signal"] == "psi-delta"
-    assert to_json(angular)["data"]["points"] == 11
 
 
 def test_reflectances_of_one_wavelength_are_drawn_against_the_angle(angular, with_part):

@@ -193,13 +193,6 @@ def test_a_small_film_on_an_empty_background():
     assert read_cube(large, wavelengths=nm, mask=mask).wavelength.size == 20
 
 
-def test_few_pixels_leave_all_bands():
-    large = np.full((300, 300, 20), np.nan, "f4")
-    large[40, 40] = 0.3
-    large[40, 40, 7] = np.nan  # one pixel shows no band to be dead
-    assert read_cube(large, wavelengths=np.linspace(400, 800, 20)).wavelength.size == 20
-
-
 def test_frames_stay_in_their_file(camera, tmp_path):
     """A copy for another process is small, and the fingerprint covers the frame."""
     counts, white, _ = camera

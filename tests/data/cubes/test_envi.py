@@ -128,7 +128,3 @@ def test_without_wavelengths_or_data(envi, refused, same):
     refused(header, "9 bands", error=DataError, wavelengths="400:750:50")
     header.with_suffix(".dat").unlink()
     refused(header, "not beside it", "cube.img", error=DataError)
-
-
-def test_whole_numbers_without_a_scale_are_counts(envi, refused):
-    refused(envi(code=12, kind="u2", scale=4000.0), "uint16", "counts", "`white_frame`", error=DataError)

@@ -67,10 +67,6 @@ def test_sites_whose_files_do_not_exist(wafer, values, refused):
     refused(wafer, "2 of its 3 files", "site_0.csv", error=DataError)
 
 
-def test_units_are_noted_once(wafer):
-    assert [note.split(":")[0] for note in read_cube(wafer).notes].count("wavelength unit") == 1
-
-
 def test_folders_that_are_no_wafer(tmp_path, refused):
     refused(tmp_path, "is an empty folder", error=DataError)
     for name in ("dark.hdr", "white.hdr"):

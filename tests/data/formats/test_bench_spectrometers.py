@@ -87,11 +87,6 @@ def test_an_undeclared_unit_is_asked_for(write, refused):
     assert read_spectrum(write(text), signal_unit="percent").values[0] == 0.0025
 
 
-def test_wavenumbers_and_commas(write):
-    spectrum = read_spectrum(write(JASCO.replace("NANOMETERS", "1/CM").replace("\t", ",")))
-    np.testing.assert_allclose(spectrum.wavelength, 1e7 / np.array([800, 799, 798]))
-
-
 def test_sections_without_a_blank_line(write):
     text = JASCO.replace("\n##### Extended Information\n", "").replace("NPOINTS\t3", "NPOINTS\t9")
     spectrum = read_spectrum(write(text))
@@ -122,9 +117,3 @@ def test_a_dpt_states_nothing(write):
             read_spectrum(path, **asked)
     spectrum = read_spectrum(path, signal="R", wavelength_unit="cm-1", signal_unit="fraction")
     assert_read(spectrum, wavelength=1e7 / np.array([3999.5, 2000, 1000]), values=[0.25, 0.5, 0.75])
-
-
-def test_a_dpt_in_nm(write):
-    path = write(DPT.replace("3999.5", "900").replace("2000.0", "800").replace("1000.0", "700"), "film.DPT")
-    asked = {"signal": "T", "wavelength_unit": "nm", "signal_unit": "absorbance"}
-    np.testing.assert_allclose(read_spectrum(path, **asked).values, 10.0 ** -np.array([0.75, 0.5, 0.25]))

@@ -26,11 +26,6 @@ def test_psi_and_delta(write, text):
     assert "columns ignored: eV, Is, Ic" in spectrum.notes
 
 
-def test_energies(write):
-    text = HORIBA.replace("nm eV", "eV").replace("400.5 ", "").replace("410.5 ", "")
-    np.testing.assert_allclose(read_spectrum(write(text)).wavelength, [400.5, 410.5], rtol=1e-4)
-
-
 def test_horiba_refused(refused):
     refused(HORIBA.replace("Psi Delta Is Ic", "Is Ic a b"), "line 13 names nm, eV, Is, Ic", "export these")
     refused(HORIBA.replace("nm eV", "steps eV"), "its angle below INCIDENCE ANGLE")

@@ -66,11 +66,6 @@ def test_counts_alone(write, refused):
     ] == [100, 20]
 
 
-def test_a_file_without_counts_of_a_reference(write):
-    path = write("wavelength_nm,counts\n400,5\n500,6\n")
-    assert read_counts_beside(path, "reference counts") is None
-
-
 @pytest.mark.parametrize(
     ("name", "unit", "said"),
     [
@@ -171,11 +166,6 @@ def test_an_absolute_irradiance_is_refused_by_name(refused):
 def test_no_rows(refused):
     refused(OCEANVIEW.partition("400.1")[0], "no rows", **R)
     refused(JAZ.partition("400.1")[0], "no rows", **R)
-
-
-def test_fewer_pixels_than_stated(write):
-    spectrum = read_spectrum(write(OCEANVIEW.partition("400.9")[0]), **R)
-    assert "states 3 points but has 2: it may have been cut off" in spectrum.notes
 
 
 SPECTRAWIZ = (SAMPLES / "stellarnet/spectrawiz.txt").read_text(encoding="utf-8")

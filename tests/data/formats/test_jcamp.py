@@ -136,12 +136,6 @@ def test_decimal_commas_and_a_dark_spectrum(write):
     assert any("INTENSITY (COUNTS)" in note for note in found.notes)
 
 
-def test_a_relative_intensity_beside_a_transmittance_is_left_out(write):
-    found = read_spectrum(write(link(PROCESSED, DARK.replace("INTENSITY (COUNTS)", "RELATIVE INTENSITY"))))
-    assert found.signal == "T"
-    assert any("RELATIVE INTENSITY" in note for note in found.notes)
-
-
 def test_decimal_points_between_commas(write):
     text = link(PROCESSED).replace(", ", ";").replace(",", ".").replace(";", ", ")
     np.testing.assert_allclose(read_spectrum(write(text)).values, [0.32795, 0.335, 0.3425])
@@ -219,7 +213,3 @@ def test_pairs_with_a_mark_of_another_kind_are_refused(refused):
 def test_forms_that_are_not_read_are_named(refused):
     refused(jcamp(AFFN, form="(XYA)"), "'(XYA)'", "(XY..XY)")
     refused(jcamp(AFFN, kind="PEAK TABLE", form="(XY..XY)"), "without a table of a spectrum")
-
-
-def test_a_file_without_rows_is_refused(refused):
-    refused(jcamp("", form=""), "only comments")

@@ -67,17 +67,6 @@ def test_percent_of_several_samples(write, header):
     assert one.name != other.name
 
 
-def test_a_counter_is_no_signal(write):
-    text = "Index;Wavelength;Value\n1;400;10,5\n2;500;20,5\n"
-    spectrum = read_spectrum(write(text), signal="R", signal_unit="percent")
-    np.testing.assert_allclose(spectrum.values, [0.105, 0.205])
-
-
-def test_counts_of_a_plain_table(write):
-    text = "Wavelength (nm),Sample,Dark,Reference\n400,110,10,210\n500,60,10,210\n"
-    np.testing.assert_allclose(read_spectrum(write(text), signal="T").values, [0.5, 0.25])
-
-
 @pytest.mark.parametrize(
     ("text", "said", "reading"),
     [
@@ -105,12 +94,6 @@ def test_counts_of_a_plain_table(write):
 )
 def test_refused(refused, text, said, reading):
     refused(text, *said, **reading)
-
-
-@pytest.mark.parametrize(("unit", "first"), [("1/CM", 1e7 / 3000), ("micrometers", 2000e3)])
-def test_a_declared_axis_holds_where_only_the_quantity_is_a_flag(write, unit, first):
-    spectrum = read_spectrum(write(f"XUNITS={unit}\n3000,0.1\n2000,0.2\n"), signal="R")
-    np.testing.assert_allclose(spectrum.wavelength[0], first)
 
 
 def test_angles_that_look_like_optical_constants_are_read_by_name(write):
@@ -167,11 +150,6 @@ def test_a_technique_is_the_quantity_of_the_processed_column(write, refused):
     refused(PROCESSED.format("Scope", 0.6, 0.7), "neither", columns=None)
 
 
-def test_declared_intensities_are_no_transmittance(refused):
-    text = "XAxisUnit,nm_air\nYAxisUnit,intensity\n[Data]\n500.1;0.5\n500.4;0.6\n"
-    refused(text, "'intensity'", signal="T")
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -191,11 +169,6 @@ def test_tables_as_sheets_and_programs_save_them(write, text):
 def test_the_measured_column_is_read_beside_the_calculated_one(write):
     text = "Wavelength(nm),Reflectance (Measured),Reflectance (Calculated)\n400,0.31,0.9\n500,0.32,0.9\n"
     np.testing.assert_allclose(read_spectrum(write(text)).values, [0.31, 0.32])
-
-
-def test_an_energy_named_by_its_letter(write):
-    spectrum = read_spectrum(write("E(eV)\tPsi\tDelta\n2\t20\t120\n1\t21\t110\n"))
-    np.testing.assert_allclose(spectrum.wavelength, [619.92, 1239.84], rtol=1e-4)
 
 
 @pytest.mark.parametrize("header", ["Absorption (%)", "Re(rho),Im(rho)", "1-R", "-ln(T)"])

@@ -56,10 +56,6 @@ def test_the_processed_spectrum_is_read(write):
     assert facts["date"] == "2020-01-01 00:00:00 UTC"
 
 
-def test_the_unit_is_asked_for(refused):
-    refused(procspec(document()), "'not stated'", 'signal_unit="percent"')
-
-
 def test_modes(write):
     content = procspec(document(processor="TransmissionProcessor"))
     assert read_spectrum(write(content), signal_unit="percent").signal == "T"
@@ -126,10 +122,6 @@ DAMAGED = {
 @pytest.mark.parametrize("name", DAMAGED)
 def test_damaged_files_are_refused(name, refused):
     refused(DAMAGED[name], "Optics ProcSpec file" if name != "no number" else "processedPixels has no number")
-
-
-def test_other_packed_files_keep_their_sentence(refused):
-    refused(procspec("400,0.1\n500,0.2\n", names=["spectrum.csv"]), "packed", "unpack it")
 
 
 def test_the_extra_is_named(refused, monkeypatch):

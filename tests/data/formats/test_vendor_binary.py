@@ -253,10 +253,6 @@ def test_percent_without_a_quantity_asks_for_the_signal(write, refused):
     np.testing.assert_allclose(read_spectrum(write(content), signal="T").values, Y, rtol=1e-6)
 
 
-def test_a_percentage_without_percent_asks_for_the_unit(refused):
-    refused(spc((100 * Y,), quantity=128), 'signal_unit="percent"')
-
-
 def test_several_spectra_are_chosen_by_name(write, refused):
     content = spc((Y, Y / 2))
     message = refused(content, "has 2 spectra")
