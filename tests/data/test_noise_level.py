@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.data.noise_level import noise_level
 from pellicle.errors import UsageError
+from pellicle.signals.limits import noise_level
 
 RGB = BrdfSamples(*np.zeros((4, 3)), np.array([[1.0, 2, 4], [10, 20, 40], [0, 2, 4]]), ("R", "G", "B"))
 

@@ -234,7 +234,7 @@ def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOpt
     if reading.signal not in (None, "brdf"):
         raise UsageError(f"{recipe.path}: describes a surface, whose signal is brdf, not {reading.signal}")
     if reading.noise is not None:
-        from pellicle.data.noise_level import noise_level
+        from pellicle.signals.limits import noise_level
 
         noise_level(reading.noise, "--noise")
     recipe = recipe.with_data(**{name: x for name, x in reading.given().items() if name != "signal"})

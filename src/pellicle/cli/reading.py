@@ -57,7 +57,7 @@ def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Sp
 
 def sigma(noise: float | str | None) -> float | None:
     """The standard deviation of a spectrum. Raises UsageError where the noise is a share of the signal."""
-    from pellicle.data.noise_level import noise_level
+    from pellicle.signals.limits import noise_level
 
     if noise is None:
         return None

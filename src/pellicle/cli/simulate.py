@@ -44,7 +44,7 @@ class SimulationFlags(Flags):
 
     def spread(self) -> float | str | None:
         """The noise: a number from 0, or a share of the signal as text. Raises UsageError."""
-        from pellicle.data.noise_level import noise_level
+        from pellicle.signals.limits import noise_level
 
         if self.noise is None or self.noise == 0:
             return self.noise

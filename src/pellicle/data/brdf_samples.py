@@ -12,11 +12,10 @@ from importlib.metadata import version
 import numpy as np
 from jaxtyping import Int
 
-from pellicle.data.noise_level import noise_level
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import UsageError
 from pellicle.files import write_text
-from pellicle.signals.limits import Where, refuse_first
+from pellicle.signals.limits import Where, noise_level, refuse_first
 
 CHANNELS = (("value",), ("R", "G", "B"))
 ROUNDING = 1e-3

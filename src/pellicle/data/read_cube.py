@@ -25,10 +25,10 @@ from pellicle.data.cubes.sampled_checks import (
     sample_blocks,
 )
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
-from pellicle.data.noise_level import noise_level
 from pellicle.data.photographs import image_format
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.errors import DataError, UsageError, install_command
+from pellicle.signals.limits import noise_level
 
 log = getLogger(__name__)
 SIGNALS = ("R", "T", "psi-delta")

@@ -186,8 +186,8 @@ class FilmView:
             raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
         azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
         light = Light(None, angle, data.signal, polarised, azimuth, data.transmission)
-        view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, data.kind.is_folded)
-        same = data.kind.is_folded == self.folded and np.array_equal(nm, self.wavelength)
+        view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, data.kind.folded)
+        same = data.kind.folded == self.folded and np.array_equal(nm, self.wavelength)
         same = same and eqx.tree_equal(view.scene.light, own) is True
         return None if same else view
 

@@ -78,7 +78,7 @@ def spectrum_json(spectrum: Spectrum) -> dict[str, Any]:
         "signal": spectrum.signal,
         "polarisation": spectrum.polarisation,
         "calibrated": spectrum.calibrated,
-        "folded": spectrum.kind.is_folded,
+        "folded": spectrum.kind.folded,
         "transmission": spectrum.transmission,
         "points": len(spectrum),
         "sweeps": len(spectrum.sweeps),

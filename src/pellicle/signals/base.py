@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+from pellicle.errors import UsageError
 from pellicle.signals.limits import Where
 
 Place = Callable[[str], Where]
@@ -173,10 +174,32 @@ class Signal(ABC):
     """Arguments of `pellicle.Spectrum` that go with this kind, beside those of any."""
     required: ClassVar[frozenset[str]] = frozenset()
     """Those of them that it needs."""
+    named: ClassVar[str] = ""
+    """The argument of them that names the `parts`."""
+    every: ClassVar[tuple[str, ...]] = ()
+    """Parts that it may have, in the order of the simulated light."""
+    expected: ClassVar[str] = ""
+    """What a name among them must be, for a message."""
     parts: tuple[str, ...] = ()
     """Names of the columns of `values`; empty for one column."""
     depolarisation: bool = False
     """True where 1 − N² − C² − S² was measured beside N, C and S."""
+    transmission: bool = False
+    """True for Ψ and Δ of transmitted light."""
+    folded: bool = False
+    """True where Δ is known in 0 to 180 degrees only."""
+
+    def __post_init__(self) -> None:
+        for name in self.parts:
+            if name not in self.every:
+                raise UsageError(f"`elements` {self.expected}, not {name!r}")
+        if len(set(self.parts)) < len(self.parts):
+            raise UsageError(f"`elements` are repeated: {', '.join(self.parts)}")
+
+    @property
+    def positions(self) -> list[int]:
+        """Places of the `parts` among those of the simulated light."""
+        return [self.every.index(name) for name in self.parts]
 
     @property
     def ellipsometric(self) -> bool:
@@ -186,12 +209,7 @@ class Signal(ABC):
     @property
     def transmitted(self) -> bool:
         """True for signals of transmitted light."""
-        return self.simulated == "T"
-
-    @property
-    def is_folded(self) -> bool:
-        """True where Δ is known in 0 to 180 degrees only."""
-        return False
+        return self.transmission or self.simulated == "T"
 
     @property
     def grid(self) -> tuple[tuple[str, ...], ...]:
@@ -199,9 +217,9 @@ class Signal(ABC):
         return ()
 
     @property
-    def words(self) -> dict[str, Any]:
+    def words(self) -> dict[str, tuple[str, ...]]:
         """Arguments of `pellicle.Spectrum` that name this kind beside its word."""
-        return {}
+        return {self.named: self.parts} if self.named else {}
 
     @property
     def error_unit(self) -> str:
@@ -221,9 +239,9 @@ class Signal(ABC):
     # a spectrum
 
     @classmethod
-    @abstractmethod
     def of(cls, data: Any) -> Signal:
         """Return the kind of a spectrum, by its keywords."""
+        return cls(tuple(getattr(data, cls.named))) if cls.named else cls()
 
     @abstractmethod
     def check(self, data: Arrays, place: Place, remedy: str) -> None:
@@ -244,31 +262,31 @@ class Signal(ABC):
         return {"sigma": np.full(values.shape, float(noise))}
 
     @property
-    @abstractmethod
     def independent(self) -> int:
         """Independent numbers of one point."""
+        return max(len(self.parts), 1)
 
-    @abstractmethod
     def coordinates(self, data: Arrays) -> Float[np.ndarray, "points channels"]:
         """Return the values as repeated sweeps of them are averaged."""
+        return data.values.reshape(len(data), -1)
 
-    @abstractmethod
     def averaged(self, coordinates: Float[np.ndarray, "points channels"]) -> dict[str, np.ndarray]:
         """Return the arrays of a spectrum, of the mean of `coordinates`."""
+        return {"values": coordinates if self.parts else coordinates[:, 0]}
 
     # simulated light
 
-    @abstractmethod
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
         """Return the rows of the signal, of N, C and S, and of m22 and m44 of a cone of light (traced)."""
+        raise NotImplementedError
 
-    @abstractmethod
     def of_jones(self, jones: Any) -> list[Any]:
         """Return sums of intensities, of the Jones matrix of layers that mix s and p (traced)."""
+        raise NotImplementedError
 
-    @abstractmethod
     def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
         """Return the sums of `of_jones`, of a Mueller matrix (traced)."""
+        raise NotImplementedError
 
     @abstractmethod
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
@@ -278,9 +296,9 @@ class Signal(ABC):
         """Return the signal of the simulated R or T (points,), behind the averages (traced)."""
         return power
 
-    @abstractmethod
     def drawn(self, rows: Any) -> Any:
         """Return the quantities (quantities, points) of simulated rows (points, rows) (traced)."""
+        return rows.T
 
     @abstractmethod
     def synthetic(
@@ -290,7 +308,7 @@ class Signal(ABC):
 
     def chosen(self, parts: Sequence[str]) -> Signal:
         """Return the signal of some of its parts. Raises UsageError for unknown ones."""
-        raise NotImplementedError(parts)
+        return replace(self, parts=tuple(parts))
 
     def against(self, sample: Any, reference: Any) -> Any:
         """Return the signal of a reflectance and that of the reference (traced)."""
@@ -310,23 +328,23 @@ class Signal(ABC):
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
         """Return the channels (points · channels,) of simulated rows (points, rows) (traced)."""
 
-    @abstractmethod
     def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
         """Return the groups of `count` channels, in a frame or not, that have a noise of their own."""
+        return tuple(ChannelGroup((channel,), 1) for channel in range(count))
 
     @property
     def outwards(self) -> int:
         """Number of channels in a frame in which nothing is measured; they are the last."""
         return 0
 
-    @abstractmethod
     def rms(self, residual: Float[np.ndarray, "points columns"]) -> float:
         """Return the rms of residuals of the columns."""
+        return float(np.sqrt(np.mean(residual**2)))
 
-    @abstractmethod
     def offsets(self, columns: Float[np.ndarray, "*lanes points columns"], allowed: Any) -> list[Offset]:
         """Return the errors that a `pellicle.Uncertainty` allows the instrument, at simulated
         columns."""
+        return []
 
     def along(
         self, columns: Float[np.ndarray, "*lanes points columns"], change: np.ndarray, framed: bool
@@ -342,12 +360,14 @@ class Signal(ABC):
         """Return `quantities`, (*lanes, points, quantities), of simulated columns."""
         return columns
 
-    @abstractmethod
     def curves(
         self, data: np.ndarray, model: np.ndarray, weight: Float[np.ndarray, "points channels"]
     ) -> dict[str, np.ndarray]:
         """Return the arrays of a `fitting.curves.Curve`, of columns of data and model."""
+        columns = {"data": data, "model": model, "sigma": 1 / weight}
+        return columns if self.parts else {name: column.reshape(-1) for name, column in columns.items()}
 
-    @abstractmethod
     def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
-        """Return residuals of a fitted curve, over a given σ, else as they are."""
+        """Return residuals of a fitted curve, over a given σ, else as they are; each column is one noise."""
+        rows = curve.residual if data.sigma is None else curve.residual / data.sigma
+        return [Residuals(column[:, None], known, len(rows)) for column in rows.reshape(len(rows), -1).T]

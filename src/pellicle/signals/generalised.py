@@ -19,13 +19,12 @@ Source: M. Schubert, Phys. Rev. B 53, 4265 (1996), for the ratios and the order 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.errors import UsageError
 from pellicle.signals.base import (
     Arrays,
     Cell,
@@ -35,19 +34,10 @@ from pellicle.signals.base import (
     Place,
     Quantity,
     Residuals,
-    Signal,
 )
 from pellicle.signals.limits import check_psi_delta
-from pellicle.signals.sphere import (
-    ROUGH,
-    angle_changes,
-    ncs,
-    psi_delta,
-    rms_of_psi,
-    scattered,
-    sphere_frame,
-    sphere_sigma,
-)
+from pellicle.signals.psi_delta import CHANNELS, Ratios
+from pellicle.signals.sphere import ROUGH, angle_changes, ncs, scattered, sphere_frame, sphere_sigma
 
 RATIOS = ("ane", "aps", "asp")
 FORMULAS = {"ane": "r_pp/r_ss", "aps": "r_ps/r_pp", "asp": "r_sp/r_ss"}
@@ -55,8 +45,6 @@ FORMULAS = {"ane": "r_pp/r_ss", "aps": "r_ps/r_pp", "asp": "r_sp/r_ss"}
 NAMES = {"ane": "AnE", "aps": "Aps", "asp": "Asp"}
 """Ratios as Woollam's programs write them."""
 _IN_FIGURES = {"ane": "$r_{pp}/r_{ss}$", "aps": "$r_{ps}/r_{pp}$", "asp": "$r_{sp}/r_{ss}$"}
-CHANNELS = 3
-"""N, C and S."""
 _ALIKE = 1.5
 """Largest ratio of errors that are alike."""
 _POLE = 4.0
@@ -65,36 +53,23 @@ _POLE = 4.0
 
 @final
 @dataclass(frozen=True)
-class Generalised(Signal):
+class Generalised(Ratios):
     """Ψ and Δ of the ratios `parts`, all by default. Raises UsageError for unknown and repeated ones."""
 
     word: ClassVar[str] = "generalised-psi-delta"
     title: ClassVar[str] = "generalised ellipsometry, psi and delta of ratios"
     noun: ClassVar[str] = "generalised psi and delta"
-    simulated: ClassVar[str] = "Stokes"
-    ordinate: ClassVar[str] = "Ψ, Δ (°)"
     keywords: ClassVar[frozenset[str]] = frozenset({"ratios", "delta", "delta_sigma"})
     required: ClassVar[frozenset[str]] = frozenset({"ratios", "delta"})
-    degrees: ClassVar[bool] = True
     explored: ClassVar[bool] = False
+    named: ClassVar[str] = "ratios"
+    every: ClassVar[tuple[str, ...]] = RATIOS
+    expected: ClassVar[str] = "of generalised psi and delta must be among ane, aps, asp"
     parts: tuple[str, ...] = RATIOS
-
-    def __post_init__(self) -> None:
-        for name in self.parts:
-            if name not in RATIOS:
-                raise UsageError(
-                    f"`elements` of generalised psi and delta must be among ane, aps, asp, not {name!r}"
-                )
-        if len(set(self.parts)) < len(self.parts):
-            raise UsageError(f"`elements` are repeated: {', '.join(self.parts)}")
 
     @property
     def error_unit(self) -> str:
         return "degrees on the spheres of N, C, S"
-
-    @classmethod
-    def of(cls, data: Any) -> Generalised:
-        return Generalised(tuple(data.ratios))
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -121,26 +96,10 @@ class Generalised(Signal):
             places = place(f"`{name} values`"), place(f"`{name} delta`")
             check_psi_delta(psi, delta, False, *places, remedy)
 
-    @property
-    def words(self) -> dict[str, Any]:
-        return {"ratios": self.parts}
-
     def errors(self, values: np.ndarray, noise: float) -> dict[str, np.ndarray]:
         """One error along Ψ and across it."""
         sigma = np.full(values.shape, float(noise))
         return {"sigma": sigma, "delta_sigma": delta_sigma(values, sigma)}
-
-    @property
-    def independent(self) -> int:
-        return 2 * len(self.parts)
-
-    def coordinates(self, data: Arrays) -> np.ndarray:
-        assert data.delta is not None
-        return ncs(data.values, data.delta).reshape(len(data), -1)
-
-    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
-        values, delta = psi_delta(coordinates.reshape(len(coordinates), -1, CHANNELS))
-        return {"values": values, "delta": delta}
 
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
         from pellicle.signals import waves
@@ -161,29 +120,15 @@ class Generalised(Signal):
 
         return waves.ratio_sums_of_mueller(matrix)
 
-    def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
-        return waves.angles_of_sums(sums)
-
-    def drawn(self, rows: Any) -> Any:
-        from pellicle.signals import waves
-
-        return waves.drawn_angles(rows, False)
-
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         from pellicle.signals import waves
 
         sphere = rows.reshape(len(rows), -1, CHANNELS)
-        keep = [RATIOS.index(name) for name in self.parts]
         noisy, clean = (
-            waves.angles(own)[:, keep].reshape(len(rows), -1)
+            waves.angles(own)[:, self.positions].reshape(len(rows), -1)
             for own in (scattered(sphere, noise, seed), sphere)
         )
         return noisy, clean
-
-    def chosen(self, parts: Sequence[str]) -> Generalised:
-        return replace(self, parts=tuple(parts))
 
     def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:
         frames, spread = self._directions(data)
@@ -202,7 +147,7 @@ class Generalised(Signal):
         """N, C, S of the measured ratios, each brought to its sphere, in the frame of the data."""
         from pellicle.signals import waves
 
-        positions = [CHANNELS * RATIOS.index(name) + i for name in self.parts for i in range(CHANNELS)]
+        positions = [CHANNELS * place + i for place in self.positions for i in range(CHANNELS)]
         rows = waves.columns(rows, positions)
         rows = waves.on_spheres(rows) if depolarises else rows
         return waves.in_frame(frame, rows).reshape(-1)
@@ -214,9 +159,6 @@ class Generalised(Signal):
     @property
     def outwards(self) -> int:
         return len(self.parts)
-
-    def rms(self, residual: np.ndarray) -> float:
-        return rms_of_psi(residual, 2 * len(residual) * len(self.parts))
 
     def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
         """Offsets of Ψ and of Δ of each ratio."""
@@ -231,18 +173,6 @@ class Generalised(Signal):
                     Offset(f"offset of {angle} of {name}", size, "deg", change.reshape(columns.shape))
                 )
         return result
-
-    def in_quantities(self, columns: np.ndarray) -> np.ndarray:
-        spheres = columns.reshape(*columns.shape[:-1], -1, CHANNELS)
-        return np.stack(psi_delta(spheres), axis=-1).reshape(*columns.shape[:-1], -1)
-
-    def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
-        sigma = 1 / weight[:, [2 * i for i in range(len(self.parts))]]
-        (psi, delta), (psi_model, delta_model) = (
-            psi_delta(own.reshape(len(own), -1, CHANNELS)) for own in (data, model)
-        )
-        result = {"data": psi, "model": psi_model, "delta_data": delta, "delta_model": delta_model}
-        return result | {"sigma": np.rad2deg(sigma) / 2}
 
     def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
         frames, spread = self._directions(data)

@@ -5,27 +5,14 @@ m33 = m44 = C, m34 = −m43 = S, m22 = 1, the others 0, with N, C, S of `signals
 and Modine 1997, Appl. Opt. 36, 8184; CompleteEASE). Elements are those of the matrix divided by m11.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, final
 
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.errors import UsageError
-from pellicle.signals.base import (
-    Arrays,
-    Cell,
-    ChannelGroup,
-    Channels,
-    Offset,
-    Place,
-    Quantity,
-    Residuals,
-    Signal,
-)
+from pellicle.signals.base import Arrays, Cell, Channels, Offset, Place, Quantity, Signal
 from pellicle.signals.limits import Where, refuse_first
 from pellicle.signals.sphere import ROUGH
 
@@ -53,20 +40,10 @@ class Mueller(Signal):
     ordinate: ClassVar[str] = "normalised Mueller element"
     keywords: ClassVar[frozenset[str]] = frozenset({"elements"})
     required: ClassVar[frozenset[str]] = frozenset({"elements"})
+    named: ClassVar[str] = "elements"
+    every: ClassVar[tuple[str, ...]] = ELEMENTS
+    expected: ClassVar[str] = f"must be among {ELEMENTS[0]} to {ELEMENTS[-1]} without m11"
     parts: tuple[str, ...] = ELEMENTS
-
-    def __post_init__(self) -> None:
-        for name in self.parts:
-            if name not in ELEMENTS:
-                raise UsageError(
-                    f"`elements` must be among {ELEMENTS[0]} to {ELEMENTS[-1]} without m11, not {name!r}"
-                )
-        if len(set(self.parts)) < len(self.parts):
-            raise UsageError(f"`elements` are repeated: {', '.join(self.parts)}")
-
-    @classmethod
-    def of(cls, data: Any) -> Mueller:
-        return Mueller(tuple(data.elements))
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -87,20 +64,6 @@ class Mueller(Signal):
             sigma = None if data.sigma is None else data.sigma[:, i]
             check_element(data.values[:, i], sigma, element, place(f"`{element}`"), remedy)
 
-    @property
-    def words(self) -> dict[str, Any]:
-        return {"elements": self.parts}
-
-    @property
-    def independent(self) -> int:
-        return len(self.parts)
-
-    def coordinates(self, data: Arrays) -> np.ndarray:
-        return data.values
-
-    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
-        return {"values": coordinates}
-
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
         from pellicle.signals import waves
 
@@ -119,20 +82,9 @@ class Mueller(Signal):
 
         return waves.normalised_elements(sums)
 
-    def drawn(self, rows: Any) -> Any:
-        return rows.T
-
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         values = rows + noise * np.random.default_rng(seed).normal(0.0, 1.0, rows.shape)
-        keep = self._positions
-        return values[:, keep], rows[:, keep]
-
-    @property
-    def _positions(self) -> list[int]:
-        return [ELEMENTS.index(name) for name in self.parts]
-
-    def chosen(self, parts: Sequence[str]) -> Mueller:
-        return replace(self, parts=tuple(parts))
+        return values[:, self.positions], rows[:, self.positions]
 
     def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:
         return Channels(data.values, np.full(len(data), ROUGH) if data.sigma is None else data.sigma)
@@ -140,13 +92,7 @@ class Mueller(Signal):
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
         from pellicle.signals import waves
 
-        return waves.columns(rows, self._positions).reshape(-1)
-
-    def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
-        return tuple(ChannelGroup((channel,), 1) for channel in range(count))
-
-    def rms(self, residual: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(residual**2)))
+        return waves.columns(rows, self.positions).reshape(-1)
 
     def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
         """An offset of each element, and a depolarisation that mixes the phases of s and p: elements of the
@@ -161,13 +107,6 @@ class Mueller(Signal):
             change = -columns * mixed
             result.append(Offset("depolarisation", allowed.depolarisation, "", change, positive=True))
         return result
-
-    def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
-        return {"data": data, "model": model, "sigma": 1 / weight}
-
-    def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
-        rows = curve.residual if data.sigma is None else curve.residual / data.sigma
-        return [Residuals(column[:, None], known, len(rows)) for column in rows.T]  # each of its own noise
 
 
 def check_element(

@@ -1,33 +1,19 @@
-"""Signals of one column: powers, counts, and their change against a reference."""
+"""Signals of one column: reflectance, transmittance, raw counts, and their base."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, final
 
 import numpy as np
 
-from pellicle.errors import UsageError
-from pellicle.signals.base import (
-    Arrays,
-    ChannelGroup,
-    Channels,
-    Offset,
-    Place,
-    Quantity,
-    Residuals,
-    Signal,
-)
-from pellicle.signals.limits import Where
+from pellicle.signals.base import Arrays, Channels, Place, Quantity, Signal
+from pellicle.signals.limits import Where, check_power
 
 
 @dataclass(frozen=True)
 class OneColumn(Signal):
     """A signal of one number for each wavelength, which is compared as it is."""
-
-    @classmethod
-    def of(cls, data: Any) -> Signal:
-        return cls()
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -44,31 +30,9 @@ class OneColumn(Signal):
     ) -> None:
         """Refuse impossible values; `too_high` and `remedy` are advice. Raises DataError."""
 
-    @property
-    def independent(self) -> int:
-        return 1
-
-    def coordinates(self, data: Arrays) -> np.ndarray:
-        return data.values.reshape(len(data), -1)
-
-    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
-        return {"values": coordinates[:, 0]}
-
-    def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
-        raise UsageError(f"{self.word} has no N, C and S")
-
-    def of_jones(self, jones: Any) -> list[Any]:
-        raise UsageError(f"{self.word} is no comparison of polarisations")
-
-    def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
-        raise UsageError(f"{self.word} is no comparison of polarisations")
-
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
         """The mean over polarisations."""
         return sums if len(sums) == 1 else [0.5 * (sums[0] + sums[1])]
-
-    def drawn(self, rows: Any) -> Any:
-        return rows.T
 
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         clean = rows.reshape(-1)
@@ -82,18 +46,57 @@ class OneColumn(Signal):
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
         return rows.reshape(-1)
 
-    def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
-        return (ChannelGroup((0,), 1),)
 
-    def rms(self, residual: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(residual**2)))
+@dataclass(frozen=True)
+class _Power(OneColumn):
+    """A power: with fringes, a scale and an offset."""
 
-    def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
-        return []
+    has_scale: ClassVar[bool] = True
 
-    def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
-        return {"data": np.ravel(data), "model": np.ravel(model), "sigma": 1 / weight[:, 0]}
+    def check_values(
+        self, values: np.ndarray, sigma: np.ndarray | None, where: Where, too_high: str, remedy: str
+    ) -> None:
+        check_power(self.noun, values, sigma, where, too_high=too_high, remedy=remedy)
 
-    def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
-        rows = curve.residual if data.sigma is None else curve.residual / data.sigma
-        return [Residuals(rows[:, None], known, len(rows))]
+
+@final
+@dataclass(frozen=True)
+class Reflectance(_Power):
+    """Reflectance as a fraction."""
+
+    word: ClassVar[str] = "R"
+    title: ClassVar[str] = "reflectance R"
+    noun: ClassVar[str] = "reflectance"
+    simulated: ClassVar[str] = "R"
+    ordinate: ClassVar[str] = "R (fraction)"
+
+
+@final
+@dataclass(frozen=True)
+class Transmittance(_Power):
+    """Transmittance as a fraction."""
+
+    word: ClassVar[str] = "T"
+    title: ClassVar[str] = "transmittance T"
+    noun: ClassVar[str] = "transmittance"
+    simulated: ClassVar[str] = "T"
+    ordinate: ClassVar[str] = "T (fraction)"
+
+
+@final
+@dataclass(frozen=True)
+class Counts(OneColumn):
+    """Raw counts of a detector, which become a reflectance by a reference."""
+
+    word: ClassVar[str] = "counts"
+    title: ClassVar[str] = "raw counts"
+    noun: ClassVar[str] = "counts"
+    simulated: ClassVar[str] = ""
+    ordinate: ClassVar[str] = "counts"
+    has_scale: ClassVar[bool] = True
+    of_counts: ClassVar[bool] = True
+
+    def check_values(
+        self, values: np.ndarray, sigma: np.ndarray | None, where: Where, too_high: str, remedy: str
+    ) -> None:
+        """Accept any finite count."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, final
 
 import numpy as np
+from jaxtyping import Float
 
 from pellicle.signals.base import (
     Arrays,
@@ -34,33 +35,80 @@ from pellicle.signals.sphere import (
     with_third,
 )
 
-_SHARES = ("depolarisation", "depolarisation_sigma")
 DEPOLARISATION = Quantity("depolarisation", "depolarisation", array="depolarisation")
+CHANNELS = 3
+"""N, C and S."""
+
+
+@dataclass(frozen=True)
+class Ratios(Signal):
+    """Ψ and Δ of one ratio of amplitudes, or of several `parts`, each a point N, C, S of a unit sphere."""
+
+    simulated: ClassVar[str] = "Stokes"
+    ordinate: ClassVar[str] = "Ψ, Δ (°)"
+    degrees: ClassVar[bool] = True
+
+    @property
+    def measured(self) -> int:
+        """Of N, C and S those that were measured."""
+        return CHANNELS - self.folded
+
+    def points(self, columns: Float[np.ndarray, "*lanes columns"]) -> np.ndarray:
+        """Return N, C, S (or N, C) of columns: (*lanes, ratios, 3) of several ratios, (*lanes, 3) of one."""
+        if self.parts:
+            return columns.reshape(*columns.shape[:-1], -1, CHANNELS)
+        return columns[..., : self.measured]
+
+    @property
+    def independent(self) -> int:
+        return 2 * super().independent
+
+    def coordinates(self, data: Arrays) -> np.ndarray:
+        assert data.delta is not None
+        return ncs(data.values, data.delta)[..., : self.measured].reshape(len(data), -1)
+
+    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
+        values, delta = psi_delta(self.points(coordinates))
+        return {"values": values, "delta": delta}
+
+    def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
+        from pellicle.signals import waves
+
+        return waves.angles_of_sums(sums)
+
+    def drawn(self, rows: Any) -> Any:
+        from pellicle.signals import waves
+
+        return waves.drawn_angles(rows, self.folded)
+
+    def rms(self, residual: np.ndarray) -> float:
+        return rms_of_psi(self.points(residual), self.independent * len(residual))
+
+    def in_quantities(self, columns: np.ndarray) -> np.ndarray:
+        angles = np.stack(psi_delta(self.points(columns)), axis=-1).reshape(*columns.shape[:-1], -1)
+        return np.concatenate([angles, columns[..., -1:]], axis=-1) if self.depolarisation else angles
+
+    def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
+        (psi, delta), (psi_model, delta_model) = (psi_delta(self.points(x)) for x in (data, model))
+        along_psi = weight[:, [2 * i for i in range(len(self.parts))] if self.parts else 0]
+        result = {"data": psi, "model": psi_model, "delta_data": delta, "delta_model": delta_model}
+        return result | {"sigma": np.rad2deg(1 / along_psi) / 2}
 
 
 @final
 @dataclass(frozen=True)
-class PsiDelta(Signal):
+class PsiDelta(Ratios):
     """Ψ and Δ, of transmitted light in `transmission`. A `folded` Δ lies within 0 to 180 degrees, its sign
     unknown; `depolarisation_known` says that the noise of a measured depolarisation is."""
 
     word: ClassVar[str] = "psi-delta"
     title: ClassVar[str] = "ellipsometry, psi and delta"
     noun: ClassVar[str] = "psi and delta"
-    simulated: ClassVar[str] = "Stokes"
-    ordinate: ClassVar[str] = "Ψ, Δ (°)"
     keywords: ClassVar[frozenset[str]] = frozenset(
-        {"delta", "delta_sigma", "folded", *_SHARES, "transmission"}
+        {"delta", "delta_sigma", "folded", "depolarisation", "depolarisation_sigma", "transmission"}
     )
     required: ClassVar[frozenset[str]] = frozenset({"delta"})
-    degrees: ClassVar[bool] = True
-    transmission: bool = False
-    folded: bool = False
     depolarisation_known: bool = False
-
-    @property
-    def is_folded(self) -> bool:
-        return self.folded
 
     @property
     def error_unit(self) -> str:
@@ -70,10 +118,6 @@ class PsiDelta(Signal):
     def of(cls, data: Any) -> PsiDelta:
         share = data.depolarisation is not None, data.depolarisation_sigma is not None
         return PsiDelta((), share[0], data.transmission, bool(data.folded), share[1])
-
-    @property
-    def transmitted(self) -> bool:
-        return self.transmission
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -90,18 +134,6 @@ class PsiDelta(Signal):
     def errors(self, values: np.ndarray, noise: float) -> dict[str, np.ndarray]:
         return dict.fromkeys(("sigma", "delta_sigma"), np.full(values.shape, float(noise)))
 
-    @property
-    def independent(self) -> int:
-        return 2
-
-    def coordinates(self, data: Arrays) -> np.ndarray:
-        assert data.delta is not None
-        return ncs(data.values, data.delta)[:, : self._measured]
-
-    def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
-        values, delta = psi_delta(coordinates)
-        return {"values": values, "delta": delta}
-
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
         return rows[:3]
 
@@ -115,27 +147,12 @@ class PsiDelta(Signal):
 
         return waves.stokes_of_mueller(matrix)
 
-    def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
-        return waves.angles_of_sums(sums)
-
-    def drawn(self, rows: Any) -> Any:
-        from pellicle.signals import waves
-
-        return waves.drawn_angles(rows, self.folded)
-
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         from pellicle.signals import waves
 
         clean = waves.angles(rows)
         values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
         return np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1), clean
-
-    @property
-    def _measured(self) -> int:
-        """Of N, C and S those that were measured."""
-        return 2 if self.folded else 3
 
     def seen_in(self, scene: Any, depolarises: bool) -> PsiDelta:
         return self if depolarises else replace(self, depolarisation=False)
@@ -175,11 +192,11 @@ class PsiDelta(Signal):
         from pellicle.signals import waves
 
         if self.depolarisation:
-            rows = waves.with_depolarisation(rows, self._measured)
+            rows = waves.with_depolarisation(rows, self.measured)
         elif not self.folded and depolarises:
             rows = waves.on_spheres(rows)
         rows = waves.in_frame(frame, rows)
-        return rows[:, : self._measured + self.depolarisation].reshape(-1)
+        return rows[:, : self.measured + self.depolarisation].reshape(-1)
 
     def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
         every = tuple(range(count))
@@ -192,10 +209,6 @@ class PsiDelta(Signal):
     @property
     def outwards(self) -> int:
         return 1
-
-    def rms(self, residual: np.ndarray) -> float:
-        sphere = residual[:, :-1] if self.depolarisation else residual
-        return rms_of_psi(sphere, 2 * len(residual))
 
     def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
         """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share.
@@ -221,8 +234,8 @@ class PsiDelta(Signal):
 
     def _behind(self, change: np.ndarray) -> np.ndarray:
         """A change of N, C and S as one of the measured columns; the depolarisation stays."""
-        change = change[..., : self._measured]
-        return np.insert(change, self._measured, 0.0, axis=-1) if self.depolarisation else change
+        change = change[..., : self.measured]
+        return np.insert(change, self.measured, 0.0, axis=-1) if self.depolarisation else change
 
     def _sphere(self, columns: np.ndarray) -> np.ndarray:
         """N, C, S of columns, whose last is the depolarisation if that is measured."""
@@ -238,18 +251,9 @@ class PsiDelta(Signal):
     def polarised(self, columns: np.ndarray) -> np.ndarray:
         return self._sphere(columns) * np.sqrt(np.maximum(1 - columns[..., -1], 0.0))[..., None]
 
-    def in_quantities(self, columns: np.ndarray) -> np.ndarray:
-        sphere = columns[..., :-1] if self.depolarisation else columns
-        angles = np.stack(psi_delta(sphere), axis=-1)
-        return np.concatenate([angles, columns[..., sphere.shape[-1] :]], axis=-1)
-
     def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
-        result = {}
-        if self.depolarisation:
-            result["depolarisation_model"], data, model = model[:, -1], data[:, :-1], model[:, :-1]
-        (psi, delta), (psi_model, delta_model) = psi_delta(data), psi_delta(model)
-        result |= {"data": psi, "model": psi_model, "delta_data": delta, "delta_model": delta_model}
-        return result | {"sigma": np.rad2deg(1 / weight[:, 0]) / 2}
+        share = {"depolarisation_model": model[:, -1]} if self.depolarisation else {}
+        return super().curves(data, model, weight) | share
 
     def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
         """Residuals on the sphere, or those of Ψ and of Δ over their σ, and those of the depolarisation."""
