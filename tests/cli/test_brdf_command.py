@@ -10,9 +10,6 @@ from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.effects.surface_plan import exact
 from pellicle.fitting.curves import BrdfCurve
 from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Part, Rival, Status
-from pellicle.sampling.ensemble import STEPS, Subject, sampled
-from pellicle.sampling.modes import mixture
-from pellicle.sampling.result import Axis, Prediction
 from pellicle.scene.surface import surface_view
 
 RECIPE = """
@@ -115,52 +112,6 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, fits, pellicle):
     assert table[3].endswith("R,G,B,model_R,model_G,model_B")
     assert len(table) == 34
     assert (folder / "out" / "figure.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.fixture
-def posterior(monkeypatch, fits):
-    """A normal posterior of the thickness by the real ensemble, in place of that of the surface."""
-
-    def sample(samples, surface, *, walkers, seed, chain, progress, steps=STEPS, **options):
-        fit = verbs.fit(samples, surface, **options)
-        axis = Axis("rank_R", "samples", np.arange(30))
-        rows = 1.0 + np.random.default_rng(0).random((50, 30))
-        subject = Subject(
-            fit=fit,
-            names=("thickness",),
-            log_density=lambda units: -0.5 * ((units[:, 0] - 0.5) / 0.01) ** 2,
-            modes=mixture(np.array([[0.5]]), np.zeros(1), np.array([[[1e-4]]])),
-            values=lambda units: 10 + 690 * units,
-            fingerprint="paint",
-            points=90,
-            predict=lambda units, seed: (Prediction("R", "R (1/sr)", axis, rows[0], rows, rows, True),),
-            assumption="there is a layer",
-        )
-        return sampled(subject, walkers, steps, seed, chain, progress, 0.0)
-
-    monkeypatch.setattr(verbs, "sample", sample)
-
-
-@pytest.mark.slow
-def test_a_posterior_of_a_surface(folder, posterior, pellicle):
-    out = folder / "out"
-    ran = pellicle("sample", "--recipe", folder / "paint.toml", "--json", "--out", out, "--walkers", 32)
-    assert ran.code == 4  # by the fit's own status
-    [found] = ran.objects
-    at = found["posterior"]["parameters"]["thickness"]
-    assert found["posterior"]["trusted"] is True
-    assert at["mean"] == pytest.approx(355, abs=1)
-    assert at["sd"] == pytest.approx(6.9, rel=0.1)
-    assert found["parameters"]["thickness"]["stderr"] is None
-    report = (out / "report.txt").read_text()
-    assert "If there is a layer, with 95 % probability thickness lies between 34" in report
-    assert report.index("[[Verdict]]") < report.index("[[Posterior]]")
-    for name in ("result.json", "fit.csv", "posterior.nc", "corner.png", "predictive.png", "chain.h5"):
-        assert (out / name).stat().st_size > 0
-    again = pellicle("fit", "--recipe", folder / "paint.toml", "--posterior", code=4)
-    assert "[[Posterior]]" in again.out
-    short = pellicle("sample", "--recipe", folder / "paint.toml", "--steps", 10, "--json", code=5)
-    assert short.objects[0]["posterior"]["parameters"]["thickness"]["mean"] is None
 
 
 def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, fits, pellicle):

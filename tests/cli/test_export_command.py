@@ -50,19 +50,6 @@ def test_a_fit_is_exported_with_its_values(pellicle, tmp_path):
     pellicle("export", record, *out).refused(3, "is not JSON")
 
 
-@pytest.mark.slow  # a fit and two exports
-def test_what_a_fit_leaves_is_enough(pellicle, spectrum_file, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    ran = pellicle(
-        *("fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j"),
-        *("--thickness", "200:400", "--out", "fit"),
-        code=0,
-    )
-    for fit, out in (("fit/result.json", "film.glb"), ("fit", "again.glb")):
-        ran = pellicle("export", fit, "--to", "gltf", "--out", out, "--json", code=0)
-        assert ran.objects[0]["thickness_nm"][0] == pytest.approx(300, abs=0.5)
-
-
 def test_the_help_names_every_renderer(pellicle):
     words = pellicle("export", "--help").out.replace(",", " ").replace(".", " ").split()
     assert set(MODULES) <= set(words)

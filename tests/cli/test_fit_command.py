@@ -107,13 +107,6 @@ def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, scen
     assert by_recipe == by_flags == named
 
 
-@pytest.mark.slow
-def test_an_angle_beside_a_recipe_goes_before_its_own(pellicle, spectrum_file, scene_recipe):
-    file, recipe = spectrum_file(), scene_recipe("angle = 20")
-    (found,) = pellicle("fit", file, "--recipe", recipe, "--angle", "40", "--json").objects
-    assert next(row["why"] for row in found["plan"] if row["effect"] == "oblique") == "incidence at 40°"
-
-
 @pytest.mark.slow  # six fits; a scene of its own each
 def test_flags_reach_the_scene(pellicle, spectrum_file):
     """Angle, polarisation, range, ambient: each changes what is simulated, or it would be a decoration."""

@@ -31,14 +31,6 @@ def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
     assert not (out / "summary.csv").exists()
 
 
-@pytest.mark.slow
-def test_a_recipe_says_so_too(pellicle, files, scene_recipe):
-    path = scene_recipe("files = ['a.csv', 'b.csv']\njoint = true")
-    ran = pellicle("fit", "--recipe", path, code=0)
-    assert ran.out.count("[[Verdict]]") == 1
-    assert "rms residual of b" in ran.out
-
-
 def test_a_bad_file_is_one_failed_object(pellicle, files, scene, tmp_path):
     [found] = pellicle("fit", files[0], tmp_path / "gone.csv", *scene, "--joint", "--json", code=3).objects
     assert found["status"] == "failed"

@@ -108,14 +108,6 @@ def test_undecided_pixels_have_their_exit_code(pellicle, words, fits):
     assert pellicle(*words).code == 4
 
 
-@pytest.mark.slow  # four maps; tests/mapping/test_store.py has the refusals
-def test_another_map_is_kept_unless_it_is_to_be_replaced(pellicle, words, fits):
-    assert pellicle(*words).code == 0
-    pellicle(*words, "--signal-unit", "percent").refused(2, "another input", "--overwrite")
-    pellicle(*words, "--no-resume").refused(2, "--no-resume", "--overwrite")
-    assert pellicle(*words, "--signal-unit", "percent", "--overwrite").code == 0
-
-
 def test_a_preview_has_its_own_folder(pellicle, words, fits, tmp_path, monkeypatch):
     monkeypatch.setattr("pellicle.mapping.run.PREVIEW", 30)
     [record] = pellicle(*words, "--preview", "--json").objects
@@ -182,16 +174,6 @@ def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_pa
         np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0] / gain, rtol=1e-6)
         assert "lamp curve of region 4,2,5,6" in " ".join(map.attrs["notes"])
     pellicle(*words).refused(2, "another input")
-
-
-@pytest.mark.slow
-def test_counts_with_a_white_of_a_material(pellicle, words, fits, tmp_path):
-    np.save(tmp_path / "white.npy", np.full(30, 1.0))
-    with xarray.open_dataset(tmp_path / "wafer.nc") as cube:
-        counts = cube.R.values
-    pellicle(*words, "--white-frame", tmp_path / "white.npy", "--white-reflectance", "1.5+0.0j", code=0)
-    with xarray.open_dataset(tmp_path / "out/map.nc") as map:
-        np.testing.assert_allclose(map.thickness, 100 * 0.04 * counts[..., 0], rtol=1e-6)
 
 
 def test_lamp_curves_that_contradict(pellicle, words, fits, tmp_path):

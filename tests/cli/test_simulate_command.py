@@ -1,7 +1,5 @@
 """`pellicle simulate`: a file that says what it is, and whose fit finds the truth."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -63,32 +61,6 @@ def test_bad_wavelengths(pellicle, recipe, tmp_path, grid, said):
     recipe.write_text(RECIPE.replace("{ start = 400, stop = 796, step = 4 }", grid))
     pellicle("simulate", recipe, "--out", tmp_path / "film.csv").refused(3, said)
     assert not (tmp_path / "film.csv").exists()
-
-
-@pytest.mark.slow  # a fit of ellipsometry
-def test_ellipsometry_comes_back_as_psi_and_delta(pellicle, recipe, tmp_path):
-    """Columns as instruments write them, noise in degrees, and a fit that finds the truth."""
-    ellipsometric = RECIPE.replace(
-        'signal = "R"\nnoise = 0.002', 'signal = "psi-delta"\nangle = 65\nnoise = 0.05'
-    )
-    recipe.write_text(ellipsometric)
-    out = tmp_path / "film.csv"
-    assert pellicle("simulate", recipe, "--out", out, "--seed", 7).code == 0
-    assert out.read_text().splitlines()[4] == "wavelength_nm,angle_deg,psi_deg,delta_deg,sigma"
-    psi, delta = numbers(out)[:, 2], numbers(out)[:, 3]
-    exact = pl.ellipsometry(numbers(out)[:, 0], 321.5, 1.46, 3.9 + 0.02j, angle=65.0)
-    assert 0.03 < np.std(psi - exact[0]) < 0.07
-    assert 0.03 < np.std(delta - exact[1]) < 0.07
-    ran = pellicle(
-        "fit", out, "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:800", "--json"
-    )
-    found = json.loads(ran.out)
-    assert found["status"] == "converged"
-    thickness = found["parameters"]["thickness"]
-    assert abs(thickness["value"] - 321.5) < 4 * thickness["stderr_noise"]
-    recipe.write_text(ellipsometric.replace("angle = 65\n", ""))
-    pellicle("simulate", recipe, "--out", tmp_path / "none.csv").refused(3, "needs an angle of incidence")
-    assert not (tmp_path / "none.csv").exists()
 
 
 def test_a_depolarisation_is_a_column(pellicle, recipe, tmp_path):

@@ -69,25 +69,6 @@ def test_round_trip(path, spectrum, separator, unit, percent, falling, header, c
     np.testing.assert_array_equal(read.lines, expected[::-1] if falling else expected)
 
 
-@pytest.mark.slow
-@given(spectrum=spectra(), lo=st.floats(0, 3000), width=st.floats(1, 3000))
-def test_a_cut_keeps_what_lies_inside_and_nothing_else(path, spectrum, lo, width):
-    wavelength, values = spectrum
-    path.write_text(
-        "wavelength_nm,R\n"
-        + "".join(f"{w!r},{v!r}\n" for w, v in zip(wavelength.tolist(), values.tolist(), strict=True))
-    )
-    inside = (wavelength >= lo) & (wavelength <= lo + width)
-    if inside.sum() < 5:
-        with pytest.raises(DataError, match="`range"):
-            read_spectrum(path, range=(lo, lo + width))
-    else:
-        cut = read_spectrum(path, range=(lo, lo + width))
-        np.testing.assert_array_equal(cut.wavelength, wavelength[inside])
-        np.testing.assert_array_equal(cut.values, values[inside])
-        np.testing.assert_array_equal(cut.lines, np.flatnonzero(inside) + 2)
-
-
 @given(
     content=st.one_of(
         st.binary(max_size=80), st.text('0123456789.,;\t \n-+eER#>%"()nmTaf', max_size=80).map(str.encode)

@@ -150,16 +150,3 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     assert layer.roughness == 2.0
     assert isinstance(width, Free)
     assert width.lower == 0.0
-
-
-@pytest.mark.slow  # compiles a fit; the stubbed fit above covers the requests
-def test_a_fit_finds_the_thickness(session):
-    truth = pl.Scene(pl.Layer("SiO2", 432.1), "Si")
-    measured = pl.simulate(truth, NM, noise=0.002, seed=3)
-    session.answer("data", {"name": "film.csv", "text": csv("wavelength_nm,R", NM, measured.values)})
-    answer = session.answer("fit", {"values": {"thickness": 100.0}})
-    assert abs(answer["values"]["thickness"] - 432.1) < 3 * answer["errors"]["thickness"]
-    assert answer["errors"]["thickness"] < 5
-    assert answer["status"] == "converged"
-    [curve] = answer["curves"]
-    assert np.sqrt(np.mean((np.array(curve["y"]) - measured.values) ** 2)) < 0.0025

@@ -78,17 +78,6 @@ def test_a_bare_reference_and_a_plan_within_a_tolerance():
     assert plan(bare, 1e-3).error_bound <= 1e-3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("form", ["relative", "normalised"])
-def test_the_fit_finds_the_thickness(form):
-    data = pl.simulate(scene(form), NM, noise=0.004, seed=2)
-    fit = pl.fit(data, scene(form))
-    found = fit.parameters["flake.thickness"]
-    assert fit.status == "converged"
-    assert abs(found.value - 3.35) < 3 * found.stderr
-    assert "lamp between sample and reference" in str(fit.budget)
-
-
 def test_scene_and_data_are_checked():
     without = pl.Scene(pl.Layer(1.46, pl.Free(10, 300)), "Si", light=pl.Light(signal="contrast"))
     with pytest.raises(UsageError, match=r"contrast needs a reference: .*\[reference\]"):
