@@ -35,12 +35,9 @@ NONE = {}
 R = {"signal": "R"}
 DATA = [
     (NONE, "", "is empty", "expected rows"),
-    (NONE, "\n\n  \n", "is empty", "expected rows"),
     (NONE, "# nothing\n# here\n", "only comments", "expected rows"),
     (NONE, "wavelength,R\n", "line", "without any row of two numbers", "expected rows"),
     (NONE, "some words\nand more\n", "without any row of two numbers"),
-    (NONE, "400\n500\n600\n", "without any row of two numbers"),
-    (NONE, ">>>>>Begin\t1\t2\n", "without any row of two numbers"),
     (NONE, "wl,R\n400,5,0,11\n500,5,0,21\n", "4 values", "names 2 columns", "semicolons", "decimal commas"),
     (NONE, "wavelength,R\n400,0.1\n500, # dust\n600,0.3\n", "line 3", "is empty; fill"),
     *((NONE, f"wavelength,R\n{row}\n{GOOD}", "line 2, column") for row in ("400,abc", "abc,0.1", "400,nan")),
@@ -48,13 +45,11 @@ DATA = [
     (NONE, f"wavelength,R\n{GOOD}end of file\n", "line 5", "'end of file'"),
     ({"range": (400, 800)}, f"wavelength,R\n300,abc\n{GOOD}700,0.1\n800,0.1\n", "line 2", "'abc'"),
     (NONE, "wavelength,R\n400,0.1\n500,0,2\n600,0.3\n", "line 3 has 3 values", "decimal comma"),
-    (NONE, "wavelength,R\n400,0.1,nan?\n500,0.2\n600,0.3\n", "line 2 has 3 values"),
     (NONE, "wavelength,R\n400,0,1\n500,0,2\n", "line 2 has 3 values", "header on line 1"),
     (NONE, "wavelength;R\n1,050;0.49\n1,051;0.50\n", "'1,050'", "'0.49'", "decimal mark", "export it again"),
     (NONE, "nm,angle,R\n400,30,0.1\n400,60,0.1\n400,60,0.2\n", "line 4", "400 of line 3", "within one angle"),
     *((NONE, f"wl,R\n{value},0.1\n{GOOD}", "line 2", "not above zero", "delete") for value in (0, -500)),
     (NONE, "wavelength,R\n0.4,0.1\n0.5,0.2\n0.6,0.3\n", "is unlike nm", "`wavelength_unit="),
-    (R, "1.5,0.1\n2.5,0.2\n3.5,0.3\n", "is unlike nm", "`wavelength_unit="),
     (NONE, "wl,R\n400,12\n500,49.5\n", "line 3, column", "49.5 is above 1.5", '`signal_unit="percent"`'),
     ({"signal_unit": "fraction"}, "wavelength,R\n400,1\n500,49.5\n", "line 3", "above 1.5", "`range`"),
     (NONE, "wl,T (%)\n400,12\n500,151\n", "line 3", "1.51 is above 1.5 for a transmittance", "`range`"),
@@ -104,27 +99,21 @@ def test_refused(write, refused, error, row):
 
 
 @pytest.mark.parametrize(
-    ("row", "line", "column", "what"),
+    ("row", "column", "what"),
     [
-        ("500,abc", 3, "'R'", "found 'abc'"),
-        ("abc,0.2", 3, "'wavelength'", "found 'abc'"),
-        ("500,", 3, "'R'", "is empty"),
-        (",0.2", 3, "'wavelength'", "is empty"),
-        ("500", 3, "'R'", "is empty"),
-        ("500,nan", 3, "'R'", "not a finite number"),
-        ("500,NaN", 3, "'R'", "not a finite number"),
-        ("500,inf", 3, "'R'", "not a finite number"),
-        ("-inf,0.2", 3, "'wavelength'", "not a finite number"),
-        ("500,1e999", 3, "'R'", "not a finite number"),
-        ("500,NA", 3, "'R'", "found 'NA'"),
-        ("500,True", 3, "'R'", "found 'True'"),
-        ("500,0_2", 3, "'R'", "found '0_2'"),
-        ("500,0.2 0.3", 3, "'R'", "found '0.2 0.3'"),
+        ("abc,0.2", "'wavelength'", "found 'abc'"),
+        ("500,", "'R'", "is empty"),
+        ("500", "'R'", "is empty"),
+        ("-inf,0.2", "'wavelength'", "not a finite number"),
+        ("500,1e999", "'R'", "not a finite number"),
+        ("500,True", "'R'", "found 'True'"),
+        ("500,0_2", "'R'", "found '0_2'"),
+        ("500,0.2 0.3", "'R'", "found '0.2 0.3'"),
     ],
 )
-def test_a_cell_that_is_no_number(write, row, line, column, what, refused):
+def test_a_cell_that_is_no_number(write, row, column, what, refused):
     path = write(f"wavelength,R\n400,0.1\n{row}\n600,0.3\n700,0.4\n")
-    refused(path, DataError, f"line {line}", f"column {column}", what, "delete that row")
+    refused(path, DataError, "line 3", f"column {column}", what, "delete that row")
 
 
 @pytest.mark.parametrize(
@@ -171,26 +160,19 @@ def test_names_that_differ_by_case_are_different_quantities(write):
     assert spectrum.values.tolist() == [0.4, 0.5]
 
 
-def test_unknown_units(write):
-    path = write("wavelength,R\n" + GOOD)
-    for flag in ("wavelength_unit", "signal_unit"):
-        with pytest.raises(UsageError, match=f"`{flag}` must be one of .*, not 'furlong'"):
-            read_spectrum(path, **{flag: "furlong"})
-
-
-@pytest.mark.parametrize("noise", [0, -0.1, np.nan, np.inf])
-def test_noise_that_is_none(write, noise):
-    with pytest.raises(UsageError, match=r"`noise` must be .* above zero, as in `noise=0\.005`"):
-        read_spectrum(write("wl,R\n" + GOOD), noise=noise)
-
-
-def test_flags_with_unknown_words(write):
-    path = write("wl,R\n" + GOOD)
-    words = "R, T, psi-delta, mueller, generalised-psi-delta, contrast"
-    with pytest.raises(UsageError, match=f"`signal` must be one of {words}, not 'X'"):
-        read_spectrum(path, signal="X")
-    with pytest.raises(UsageError, match="`polarisation` must be one of s, p, unpolarised, not 'q'"):
-        read_spectrum(path, polarisation="q")
+@pytest.mark.parametrize(
+    ("flag", "value", "expected"),
+    [
+        ("wavelength_unit", "furlong", "one of .*, not 'furlong'"),
+        ("signal_unit", "furlong", "one of .*, not 'furlong'"),
+        ("signal", "X", "one of R, T, psi-delta, mueller, generalised-psi-delta, contrast, not 'X'"),
+        ("polarisation", "q", "one of s, p, unpolarised, not 'q'"),
+        *(("noise", noise, r".* above zero, as in `noise=0\.005`") for noise in (0, -0.1, np.nan, np.inf)),
+    ],
+)
+def test_flags_with_wrong_values(write, flag, value, expected):
+    with pytest.raises(UsageError, match=f"`{flag}` must be {expected}"):
+        read_spectrum(write("wl,R\n" + GOOD), **{flag: value})
 
 
 def test_a_range_that_leaves_too_little(write, refused):

@@ -93,8 +93,8 @@ REFUSED = {
     "grey": (lambda p: by_pillow(p / "a.png", PIXELS[..., 0]), "is grey"),
     "grey tiff": (lambda p: by_tifffile(p / "a.tif", PIXELS[..., 0], photometric="minisblack"), "is grey"),
     "transparent": (lambda p: by_pillow(p / "a.png", np.dstack([PIXELS, PIXELS[..., 0]])), "transparent"),
-    "bright float": (
-        lambda p: by_tifffile(p / "a.tif", PIXELS.astype(np.float32), photometric="rgb"),
+    "bright": (
+        lambda p: by_tifffile(p / "a.tif", PIXELS * np.float32(1), photometric="rgb"),
         "beyond 0 to 1",
     ),
     "truncated png": (lambda p: truncated(p / "a.png"), "cannot be decoded"),

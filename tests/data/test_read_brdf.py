@@ -84,10 +84,8 @@ def test_columns_by_flag_and_by_comment(write):
     ("row", "said"),
     [
         ("30,0,90.1,180,1,1,1", "theta_o: 90.1 degrees is below the horizon"),
-        ("-5,0,40,180,1,1,1", "theta_i: -5 degrees is below the horizon"),
         ("30,0,40,180,1,-0.001,1", "G: -0.001 is a BRDF below zero"),
         ("30,0,40,180,1,nan,1", "column 'G': nan is not a finite number"),
-        ("30,0,40,180,1,inf,1", "column 'G': inf is not a finite number"),
         ("30,0,x,180,1,1,1", "column 'theta_o': expected a number but found 'x'"),
         ("30,0,40,180,1,,1", "column 'G' is empty"),
         ("30,0,40,180,1,1", "column 'B' is empty"),
@@ -108,7 +106,6 @@ def test_a_row_that_cannot_be(write, row, said, refused):
         ("wavelength,R", "no column is theta_i, phi_i, theta_o, phi_o among"),
         ("theta_i (rad),phi_i,theta_o,phi_o,value", "'rad'; write directions in degrees"),
         ("theta_i,phi_i,theta_o,phi_o,value (%)", "'percent'; write the BRDF in 1/sr"),
-        ("theta_i,phi_i,theta_o,phi_o,value (lm)", "'lm'; write the BRDF in 1/sr"),
         ("theta_i,theta_i,theta_o,phi_o,value", "twice"),
     ],
 )
@@ -262,19 +259,14 @@ def test_intervals_and_cosines_of_alta(write, refused):
     [
         (ALTA.replace("#DIM 4 1\n", "") + "1 0 1 0 1\n", ("without #DIM",)),
         (ALTA.replace("SPHERICAL_TL_PL_TV_PV", "COS_TH") + "1 0 1 0 1\n", ("line 2", "COS_TH", "SPHERICAL")),
-        (
-            ALTA.replace("INV_STERADIAN", "XYZ_COLOR") + "1 0 1 0 1\n",
-            ("line 3", "XYZ_COLOR", "INV_STERADIAN"),
-        ),
+        (ALTA.replace("INV_STERADIAN", "XYZ") + "1 0 1 0 1\n", ("line 3", "XYZ", "INV_STERADIAN")),
         (ALTA.replace("4 1", "4 2") + "1 0 1 0 1 1\n", ("line 1: #DIM 4 2", "4 1 or 4 3")),
         (ALTA.replace("4 1", "3 1") + "1 0 1 1\n", ("line 1: #DIM 3 1", "4 1 or 4 3")),
         (ALTA + "#VS 3\n1 0 1 0 1\n", ("line 4: #VS 3", "0, 1 or 2")),
-        (ALTA, ("only comments",)),
         ("1 2\n" + ALTA, ("no rows",)),
         (ALTA + "1 0 1 0 -1\n", ("line 4: value: -1 is a BRDF below zero",)),
         (ALTA + "1 0 1.7 0 1\n", ("line 4: theta_o: 97.4028 degrees is below the horizon",)),
         (ALTA + "1 0 1 0 1\n1 0 1 x 1\n", ("line 5, column 'phi_v'", "'x'")),
-        (ALTA + "1 0 1 0 1\n1 0 1 0\n", ("line 5, column 'value' is empty",)),
         (ALTA + "1 0 1 0 1\n1 0 1 0 1 1\n", ("line 5 has 6 values",)),
     ],
 )

@@ -55,13 +55,10 @@ def test_light_and_range_of_the_data_replace_those_of_the_scene(session):
 BAD = {
     "words": "this is no spectrum\nat all",
     "empty": "",
-    "blank": "\n\n  \n",
-    "header": "wavelength_nm,R\n",
     "negative": csv("wavelength_nm,R", NM, -NM),
     "percent": csv("wavelength_nm,R", NM, 0 * NM + 40),
     "missing": "wavelength_nm,R\n500,0.2\n510,\n520,0.3\n",
     "html": "<html><body>not found</body></html>",
-    "json": '{"R": [1, 2, 3]}',
 }
 
 

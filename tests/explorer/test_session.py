@@ -115,7 +115,6 @@ def test_scene_describes_its_sliders(session):
         ("view", {"values": {"thickness": 5000.0}}, "thickness must be 0 to 1000 nm, got 5000"),
         ("view", {"values": {"thickness": float("nan")}}, "must be a number"),
         ("view", {"values": {"thickness": "1"}}, "must be a number"),
-        ("view", {"values": {"thickness": True}}, "must be a number"),
         ("view", {"values": [1]}, "numbers by name"),
         ("view", {"want": ["everything"]}, "want must be a list"),
         ("view", {"size": 10**9}, "size must be"),

@@ -30,14 +30,12 @@ def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
     ("text", "message"),
     [
         ("800:10", "reversed"),
-        ("10:10", "reversed"),
         ("-10:800", "negative"),
         ("-5", "negative"),
         ("a:b", "'a'"),
         ("1:2:3", "LO:HI"),
         ("nan", "finite"),
         ("1:inf", "finite"),
-        (":", "number"),
     ],
 )
 def test_thickness_refused(text, message):
@@ -153,13 +151,11 @@ def test_an_index_with_a_decimal_comma():
     ("layer", "item", "message"),
     [
         ("1.46", "q", "n and k can always be freed"),
-        ("SiO2", "A", "n and k can always be freed"),
         ("cauchy", "D", "A, B and C"),
         ("1.46", "k=-1:1", "negative"),
         ("1.46", "n=1.7:1.3", "reversed"),
         ("1.46", "n=1.7", "LO:HI"),
         ("SiO2", "n=1.3:1.7", "added to the index"),
-        ("cauchy", "n=1.3:1.7", "added to the index"),
     ],
 )
 def test_freeing_refused(layer, item, message):

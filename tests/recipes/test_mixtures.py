@@ -87,7 +87,6 @@ def test_splines(scene_of):
     [
         ('{ mix = "bruggemann", host = "SiO2", inclusion = "air", fraction = 0.1 }', "'bruggeman'"),
         ('{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = 1.2 }', "0 to 1, got 1.2"),
-        ('{ mix = "linear", host = "SiO2", inclusion = "air", fraction = -0.1 }', "0 to 1, got -0.1"),
         ('{ mix = "linear", host = 1, inclusion = 1, fraction = { lower = -0.2, upper = 1 } }', "got -0.2"),
         ('{ mix = "linear", host = "SiO2", inclusion = "air" }', "fraction missing"),
         ('{ mix = "linear", host = "SiO2", guest = "air", fraction = 0.1 }', "has no 'guest'"),
@@ -95,7 +94,6 @@ def test_splines(scene_of):
         ('{ mix = "linear", host = [1], inclusion = "air", fraction = 0.1 }', "host must be"),
         ('{ model = "lorentz", A = -1.0 }', "A must not be negative, got -1"),
         ('{ model = "tauc-lorentz", Eg = 5.0, E0 = 4.0 }', "Eg must lie below the resonance E0"),
-        ('{ model = "tauc-lorentz", Eq = 1.0 }', "did you mean 'Eg'"),
         ('{ model = "tauk-lorentz" }', "did you mean 'tauc-lorentz'"),
         ('{ model = "oscillators" }', "needs terms"),
         ('{ model = "oscillators", terms = [{ A = 1.0 }] }', "needs a kind"),

@@ -40,7 +40,6 @@ def test_a_byte_order_mark(write):
     [
         (b"\xff\xfe\x00", "is not UTF-8 text, and a recipe is a TOML file; data files are arguments"),
         ("[scene\n", "is not TOML, as a recipe must be: "),
-        ("[scene\n", "line 1"),
         ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
         (SURFACE.replace("model", "modle"), "scene.surface.model is missing"),
         (SURFACE.replace("noise", "noize"), "unknown key 'data.noize' (did you mean 'noise'?)"),

@@ -25,17 +25,13 @@ def rows(delimiter, decimal=".", end="\n"):
         ("波長 (nm),反射率 (%)\n" + rows(","), "R"),
         ('"Wavelength (nm)","R (%)"\n"400","10.5"\n"500","20.5"\n', "R"),
         ("wavelength (nm),R (%),\n" + rows(",", end=",\n"), "R"),
-        ("wavelength (nm);R (%);;\n" + rows(";", end=";;\n"), "R"),
         ("Sample 1\nmeasured by me, 2024\n\nwavelength (nm)\tR (%)\n" + rows("\t"), "R"),
-        ("Wavelength\tReflectance\n(nm)\t(%)\n" + rows("\t"), "R"),
         ("Wavelength;Reflectance\n[nm];[%]\n" + rows(";"), "R"),
         ("wavelength (nm),%R\n" + rows(",") + "\nMean,15\n", "R"),
-        ("wavelength (nm),%R\n" + rows(",") + "\nEnd of data\n", "R"),
         ("wavelength (nm),%R\n" + rows(",") + "[END]\n", "R"),
         ("wavelength (nm)  R (%)\n" + rows("   "), "R"),
         ("No,Wavelength (nm),R (%)\n1,400,10.5\n2,500,20.5\n", "R"),
         ("Wavelength (nm),Specular Reflectance (%)\n" + rows(","), "R"),
-        ("Wavelength (nm);Reflectance(%)\n" + rows(";", ","), "R"),
         ("Data Mode:\t%R\nStarting Wavelength:\t800.00 nm\nData Points\nnm\t%R\n" + rows("\t"), "R"),
         ("Nanometers,Percent Transmittance\n" + rows(","), "T"),
         ("Wavelength (nm),Transmittance (%T)\n" + rows(","), "T"),
@@ -81,14 +77,8 @@ def test_percent_of_several_samples(write, header):
         ("400,0.2,3.1\n500,0.3,4\n", ("third column", "`layer`"), {"signal": "R"}),
         ("X-axis: pixels\n400,0.1\n500,0.2\n", ("unknown unit 'pixels'",), {"signal": "R"}),
         ("X-axis: Raman shift (cm-1)\nwavelength,R\n400,0.1\n", ("'Raman shift",), {}),
-        (
-            "Data mode: CD\nnm\tmdeg\n400\t0.1\n500\t0.2\n",
-            ("'mdeg'", "neither a reflectance"),
-            {"signal": "T"},
-        ),
+        ("Data mode: CD\nnm\tmdeg\n400\t0.1\n500\t0.2\n", ("'mdeg'", "neither a"), {"signal": "T"}),
         ("nm,Kubelka-Munk\n400,0.1\n500,0.2\n", ("'Kubelka-Munk'",), {"signal": "R"}),
-        ("nm,Absorptance (%)\n400,1\n500,2\n", ("'Absorptance (%)'",), {"signal": "T"}),
-        ("nm,Irradiance (W/m2/nm)\n400,1\n500,2\n", ("'Irradiance",), {"signal": "T"}),
         ("nm,Absorption\n400,1\n500,2\n", ("'Absorption' states no quantity",), {}),
     ],
 )
@@ -171,7 +161,7 @@ def test_the_measured_column_is_read_beside_the_calculated_one(write):
     np.testing.assert_allclose(read_spectrum(write(text)).values, [0.31, 0.32])
 
 
-@pytest.mark.parametrize("header", ["Absorption (%)", "Re(rho),Im(rho)", "1-R", "-ln(T)"])
+@pytest.mark.parametrize("header", ["Absorption (%)", "Is,Ic", "Re(rho),Im(rho)", "1-R", "-ln(T)"])
 def test_shares_absorbed_and_ratios_of_amplitudes_are_no_reflectance(refused, header):
     row = ",0.5" * len(header.split(","))
     refused(f"nm,{header}\n400{row}\n500{row}\n", "neither", signal="R")
