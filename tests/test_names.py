@@ -43,13 +43,9 @@ def test_every_name_loads_and_type_checkers_see_the_same():
     assert all(callable(getattr(pl, name)) for name in pl.__all__ if name not in NAMESPACES)
     assert all(inspect.ismodule(getattr(pl, name)) for name in NAMESPACES)
     assert set(pl.__all__) < set(dir(pl))
-    imports = [x for x in ast.walk(ast.parse(inspect.getsource(pl))) if isinstance(x, ast.ImportFrom)]
-    typed = {
-        alias.asname or alias.name
-        for x in imports
-        if (x.module or "").startswith("pellicle")
-        for alias in x.names
-    }
+    stub = ast.parse(Path(pl.__file__).with_suffix(".pyi").read_text("utf-8")).body
+    typed = {alias.asname for x in stub if isinstance(x, ast.ImportFrom) for alias in x.names if alias.asname}
+    typed |= {ast.unparse(x.targets[0]) for x in stub if isinstance(x, ast.Assign)}
     assert typed == set(pl.__all__)
     with pytest.raises(AttributeError, match="Lorenz"):
         pl.Lorenz  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
