@@ -27,7 +27,7 @@ from pellicle.data.read_counts import read_counts
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.errors import DataError, UsageError
 from pellicle.materials import material
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 
 ROOT = Path(__file__).resolve().parents[1]
 SECONDS = 20

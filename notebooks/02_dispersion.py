@@ -22,7 +22,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.recipes.media_words import medium
+from pellicle.recipes.media import medium
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer points, for a quick run

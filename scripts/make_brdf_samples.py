@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pellicle
 from pellicle.data.brdf_samples import write_brdf_samples
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 from pellicle.simulation.brdf import default_directions, simulate_samples
 
 STUDIES = Path(__file__).resolve().parents[1] / "fits" / "brdf"

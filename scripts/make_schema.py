@@ -11,15 +11,14 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from pellicle.recipes import schema as recipe_tables
-from pellicle.recipes import surface
+from pellicle.recipes.schema import RecipeTable, SurfaceRecipeTable
 
 SCHEMA = Path(__file__).resolve().parents[1] / "docs" / "recipe.schema.json"
 
 
 def schema() -> dict[str, Any]:
     """Return one schema for both kinds of recipe."""
-    kinds = (recipe_tables.RecipeTable, surface.SurfaceRecipeTable)
+    kinds = (RecipeTable, SurfaceRecipeTable)
     schemas, definitions = models_json_schema([(kind, "validation") for kind in kinds])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import pellicle as pl
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "measurements"

@@ -12,7 +12,7 @@ from pellicle.dispersion.effective_medium import MIXTURES, Bruggeman, Linear, Lo
 from pellicle.dispersion.empirical import Cauchy, Constant
 from pellicle.materials import material, materials_in
 from pellicle.optics.pair import imag, is_real, real
-from pellicle.recipes import media_words
+from pellicle.recipes import media
 from pellicle.simulation.spectra import simulate_signal
 
 EVERY_RULE = pytest.mark.parametrize("rule", MIXTURES.values(), ids=MIXTURES)
@@ -145,8 +145,8 @@ def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
     truth = {"eps_inf": 1.5, "A": 120.0, "E0": 4.1, "C": 2.3, "Eg": 2.2, "thickness": 120.0}
     fit = _fit(
         tmp_path,
-        pl.Layer(media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)"), 120.0),
-        pl.Layer(media_words.medium("tauc-lorentz"), pl.Free(50, 300)),
+        pl.Layer(media.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)"), 120.0),
+        pl.Layer(media.medium("tauc-lorentz"), pl.Free(50, 300)),
     )
     assert fit.status.value == "converged"
     for name, value in truth.items():

@@ -11,7 +11,7 @@ from pellicle.accuracy.case import case
 from pellicle.accuracy.high_precision import signal
 from pellicle.errors import UsageError
 from pellicle.forward_model.film_signal import build
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import insert
 

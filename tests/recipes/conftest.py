@@ -3,7 +3,7 @@
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pellicle.dispersion.effective_medium import Bruggeman, Looyenga, MaxwellGar
 from pellicle.dispersion.oscillators import Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.parameters import fixed_numbers, parameters
-from pellicle.recipes import media_words
+from pellicle.recipes import media
 from pellicle.recipes.dispersion_models import KNOTS, MODELS, TERMS
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
@@ -116,7 +116,7 @@ def test_refused_in_one_sentence(scene_of, material, said):
 @pytest.mark.parametrize("name", MODELS)
 def test_every_bare_model_is_a_scene_whose_index_is_finite_over_its_bounds(name):
     """At both ends of every default bound and at the start; Sellmeier's pole is at 245 nm at most."""
-    scene = Scene(Layer(media_words.medium(name), 100.0), "Si")
+    scene = Scene(Layer(media.medium(name), 100.0), "Si")
     free = parameters(scene)
     assert len({p.name for p in free}) == len(free) > 0
     for choose in ("lower", "start", "upper"):
@@ -132,34 +132,34 @@ def _filled(tree, values):
 
 
 def test_calls_fix_in_the_order_of_the_table():
-    layer = media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)")
+    layer = media.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)")
     assert layer == Oscillators(1.5, (TaucLorentz(120.0, 4.1, 2.3, 2.2),))
-    bk7 = media_words.medium("sellmeier(1.03961212,6000.69867,0.231792344,20017.9144,1.01046945,103560653)")
+    bk7 = media.medium("sellmeier(1.03961212,6000.69867,0.231792344,20017.9144,1.01046945,103560653)")
     assert float(bk7.index(587.5618)) == pytest.approx(1.5168, abs=5e-7)
-    assert media_words.medium("spline(400,500,700)").knots == (400, 500, 700)
-    assert media_words.medium("spline").knots == KNOTS
+    assert media.medium("spline(400,500,700)").knots == (400, 500, 700)
+    assert media.medium("spline").knots == KNOTS
     with pytest.raises(UsageError, match="Eg must lie below"):
-        media_words.medium("tauc-lorentz(120,2,2.3,4)")
+        media.medium("tauc-lorentz(120,2,2.3,4)")
     with pytest.raises(UsageError, match="did you mean 'tauc-lorentz'"):
-        media_words.medium("tauc-lorenz")
+        media.medium("tauc-lorenz")
 
 
 def test_any_parameter_of_a_model_can_be_freed():
-    layer = media_words.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)", ["Eg", "E0=3.5:5", "k"])
+    layer = media.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)", ["Eg", "E0=3.5:5", "k"])
     free = names(Scene(Layer(layer, 100.0), "Si"))
     assert set(free) == {"Eg", "E0", "k"}
     usual = TERMS["tauc-lorentz"]["Eg"]
     assert (free["Eg"].start, free["Eg"].lower, free["Eg"].upper) == (2.2, usual.lower, usual.upper)
     assert (free["E0"].lower, free["E0"].upper) == (3.5, 5)
-    assert media_words.medium("sellmeier(1.1,8000)", ["B1"]).B[0].lower == 0.1
+    assert media.medium("sellmeier(1.1,8000)", ["B1"]).B[0].lower == 0.1
     with pytest.raises(UsageError, match="A must not be negative"):
-        media_words.medium("lorentz(1,3,0.5)", ["A=-1:1"])
+        media.medium("lorentz(1,3,0.5)", ["A=-1:1"])
     with pytest.raises(UsageError, match=r"the layer has .*gamma"):
-        media_words.medium("lorentz(1,3,0.5)", ["gama"])
+        media.medium("lorentz(1,3,0.5)", ["gama"])
 
 
 def test_numbers_of_two_layers_do_not_collide():
-    layers = [Layer(media_words.medium("lorentz"), 10.0, "top"), Layer(media_words.medium("lorentz"), 10.0)]
+    layers = [Layer(media.medium("lorentz"), 10.0, "top"), Layer(media.medium("lorentz"), 10.0)]
     found = [p.name for p in parameters(Scene(layers, "Si"))]
     assert len(set(found)) == len(found) == 8
     assert {"top.A", "layer2.A"} <= set(found)

@@ -5,8 +5,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError
-from pellicle.recipes.film import FilmRecipe
-from pellicle.recipes.surface import SurfaceRecipe
+from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
 
 FILM = '[data]\nfiles = ["oxide.csv"]\n[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\n'
 FILM += "thickness = { lower = 10, upper = 3000 }\n"

@@ -12,7 +12,7 @@ import pellicle as pl
 from pellicle.cli.reading import measured_scene
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import WithExtinction
-from pellicle.recipes.media_words import medium
+from pellicle.recipes.media import medium
 from pellicle.recipes.python_text import python_text
 from pellicle.recipes.read import checked
 from pellicle.recipes.write import recipe_text

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.result import Estimate, Rival
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.page.batch_page import batch_page
 from pellicle.reporting.page.fit_page import fit_page

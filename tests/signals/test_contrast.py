@@ -12,8 +12,8 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.effects.film_plan import exact, plan
 from pellicle.errors import DataError, UsageError
-from pellicle.recipes import read_recipe
 from pellicle.recipes.python_text import python_text
+from pellicle.recipes.read import read_recipe
 from pellicle.recipes.write import recipe_text
 from pellicle.reporting.figures import draw_spectrum
 from pellicle.scene.film import with_wavelength

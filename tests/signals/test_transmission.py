@@ -8,7 +8,7 @@ import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import UsageError
-from pellicle.recipes import read_recipe
+from pellicle.recipes.read import read_recipe
 from pellicle.recipes.write import recipe_text
 
 NM = np.linspace(450.0, 750.0, 64)

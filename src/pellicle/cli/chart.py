@@ -14,7 +14,7 @@ from pellicle.cli.session import say, start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe
     from pellicle.scene.film import Scene
 
 View = Literal["chart", "balls", "bubble", "methods"]
@@ -64,8 +64,7 @@ def chart(
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):

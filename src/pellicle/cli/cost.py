@@ -58,8 +58,7 @@ def cost(
 
     Example: pellicle cost film.toml --tolerance 0.001 --out cost
     """
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     methods.check()
     described = read_recipe(recipe)
@@ -105,8 +104,7 @@ def plan(
     Example: pellicle plan film.toml --tolerance 1e-3
     """
     from pellicle.effects import film_plan, surface_plan
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     if not 0 < tolerance < inf:
         raise UsageError(f"--tolerance must be above zero, got {tolerance:g}: give the largest error")

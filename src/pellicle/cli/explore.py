@@ -80,8 +80,7 @@ def _of_recipe(path: str) -> Session:
     """The session of a film's recipe, with the data of its first file."""
     from pellicle.cli.reading import read, wavelengths
     from pellicle.explorer.session import Session
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):

@@ -63,7 +63,7 @@ def export(
 
 def _described(film: str, recipe: str | None) -> Scene | Surface:
     """The scene of a recipe, or of a fit with its values."""
-    from pellicle.recipes import read_recipe
+    from pellicle.recipes.read import read_recipe
 
     if (Path(film) / "result.json").is_file():  # the folder of a fit
         film = str(Path(film) / "result.json")
@@ -97,7 +97,7 @@ def _record(path: str) -> dict[str, Any]:
 
 
 def _scene_of(path: str, source: dict[str, Any] | None, recipe: str | None) -> Scene | Surface:
-    from pellicle.recipes import read_recipe
+    from pellicle.recipes.read import read_recipe
 
     source = source or {}
     if recipe is None and "flags" in source:

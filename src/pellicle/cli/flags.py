@@ -14,7 +14,7 @@ from pellicle.data.options import CameraOptions, FileOptions, FitOptions, Option
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.film import FilmRecipe
+    from pellicle.recipes.read import FilmRecipe
     from pellicle.scene.film import Light, Scene
 
 
@@ -170,7 +170,7 @@ class SceneFlags(Flags):
 
     def scene(self, reading: FileOptions) -> Scene:
         """Build the scene that the flags describe, in the light of `reading`. Raises UsageError."""
-        from pellicle.recipes import media_words as w
+        from pellicle.recipes import media as w
         from pellicle.scene.film import Scene
         from pellicle.scene.free import Free
         from pellicle.scene.instrument import Instrument
@@ -223,9 +223,9 @@ def light(reading: FileOptions, azimuth: Any = None) -> Light:
 
     `azimuth` of the sample in degrees is that of a recipe: films that have one cannot be described by flags.
     """
-    from pellicle.recipes import film
+    from pellicle.recipes import read
 
-    return film.light(reading, reading.transmitted, azimuth)
+    return read.light(reading, reading.transmitted, azimuth)
 
 
 @dataclass(frozen=True)
@@ -340,7 +340,7 @@ def _reflectance(white: str, flags: CubeFlags) -> Any:
         if Path(white).is_file():
             return white
 
-    from pellicle.recipes.media_words import medium
+    from pellicle.recipes.media import medium
     from pellicle.simulation.functions import reflectance
 
     material = medium(white, name="`white_reflectance`")

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
-    from pellicle.recipes.film import FilmRecipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
     from pellicle.scene.film import Scene
     from pellicle.scene.surface import Surface
 
@@ -182,8 +181,7 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -
 
 
 def _by_recipe(files: list[str], path: str, scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     recipe = read_recipe(path)
     if scene_flags.given():

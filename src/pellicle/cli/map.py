@@ -17,7 +17,7 @@ from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map
-    from pellicle.recipes.film import FilmRecipe
+    from pellicle.recipes.read import FilmRecipe
     from pellicle.scene.film import Scene
 
 
@@ -136,8 +136,7 @@ def _fitted(
 
 def _known(path: str) -> Scene:
     """The scene of the recipe of a reference."""
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.film import FilmRecipe
+    from pellicle.recipes.read import FilmRecipe, read_recipe
 
     described = read_recipe(path)
     if not isinstance(described, FilmRecipe):
@@ -236,8 +235,7 @@ def map(
     Example: pellicle map blade.png --recipe oxide.toml --strip 20,60,420,60 --out blade
     """
     from pellicle.data.cubes.detect import is_photograph
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):

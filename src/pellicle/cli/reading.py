@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
-    from pellicle.recipes.film import FilmRecipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
     from pellicle.scene.film import Reference, Scene
     from pellicle.simulation.brdf import Directions
 
@@ -109,7 +108,7 @@ def _from_ratio(ratio: Spectrum, options: FileOptions, stack: Reference) -> Spec
 
 
 def _reference_reflectance(sample: Spectrum, options: FileOptions, stack: Reference | None) -> np.ndarray:
-    from pellicle.recipes.media_words import medium
+    from pellicle.recipes.media import medium
     from pellicle.scene.film import Light, Reference, Scene
     from pellicle.scene.layers import Layer
     from pellicle.simulation.spectra import simulate_spectrum

@@ -16,8 +16,7 @@ from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from pellicle.recipes.film import FilmRecipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
     from pellicle.scene.film import Scene
     from pellicle.signals.base import Signal
     from pellicle.simulation.spectra import SimulatedSignal
@@ -75,8 +74,7 @@ def simulate(
 
     Example: pellicle simulate film.toml --out film.csv --noise 0.002 --seed 1
     """
-    from pellicle.recipes import read_recipe
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     spread = _checked_spread(how, depth, json)
     described = read_recipe(recipe)
@@ -115,7 +113,7 @@ def _checked_spread(how: SimulationFlags, depth: str | None, json: bool) -> floa
 
 def _check_depolarisation(described: FilmRecipe | SurfaceRecipe, noise: float | None) -> None:
     """Raise UsageError where noise of a depolarisation is given that the signal does not have."""
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe
     from pellicle.signals.registry import KINDS
 
     if noise is None:
@@ -138,7 +136,7 @@ def _wavelengths_of(text: str) -> list[float]:
 
 
 def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, at: list[float], json: bool) -> None:
-    from pellicle.recipes.surface import SurfaceRecipe
+    from pellicle.recipes.read import SurfaceRecipe
 
     if isinstance(recipe, SurfaceRecipe) or recipe.tables.data.signal in SPACES:
         raise DataError(f"{recipe.path}: --depth is for a film and its spectrum")

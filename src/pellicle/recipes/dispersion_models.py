@@ -171,8 +171,7 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
 
 def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
     """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
-    if kind not in TERMS:
-        raise UsageError(f"no oscillator {kind!r}{did_you_mean(kind, TERMS)}; known: {', '.join(TERMS)}")
+    check_word(kind, TERMS, "oscillator")
     values = _with_defaults(kind, TERMS[kind], values)
     return _checked(lambda: KINDS[kind](**values))
 
@@ -255,12 +254,7 @@ def _built(name: str, values: Values) -> AbstractDispersion:
 def _with_defaults(
     name: str, specs: Mapping[str, ParameterSpec], values: Values, others: tuple[str, ...] = ()
 ) -> Values:
-    known = [*specs, *others]
-    for key in values:
-        if key not in known:
-            raise UsageError(
-                f"{name} has no parameter {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}"
-            )
+    check_keys(values, [*specs, *others], f"{name} has no parameter")
     return {key: spec.value for key, spec in specs.items()} | dict(values)
 
 
@@ -283,3 +277,19 @@ def _modules(tree: object) -> list[eqx.Module]:
     if not isinstance(tree, eqx.Module):
         return []
     return [tree, *(x for part in vars(tree).values() for x in _modules(part))]
+
+
+def check_word(word: str, known: Iterable[str], what: str) -> None:
+    """Raise UsageError for a word that is not known, with the nearest known one."""
+    if word not in known:
+        raise UsageError(f"no {what} {word!r}{did_you_mean(word, known)}; known: {', '.join(known)}")
+
+
+def check_keys(
+    keys: Iterable[str], known: Sequence[str], what_lacks: str, elsewhere: Sequence[str] = ()
+) -> None:
+    """Raise UsageError for the first unknown key, with the nearest known one, which may stand `elsewhere`."""
+    for key in keys:
+        if key not in known:
+            close = did_you_mean(key, [*known, *elsewhere])
+            raise UsageError(f"{what_lacks} {key!r}{close}; it has {', '.join(known)}")

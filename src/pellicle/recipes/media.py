@@ -1,23 +1,27 @@
-"""Media and numbers as recipes write them: names, models, sums of oscillators, mixtures."""
+"""Media and numbers of recipes and of the command line: words and tables to dispersions, fixed or free."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+import jax
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
-from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.data.options import parse_number, parse_range
+from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.oscillators import AbstractOscillator
+from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError, did_you_mean
+from pellicle.materials import UnknownMaterial, material
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
-from pellicle.recipes import media_words
 from pellicle.recipes.dispersion_models import (
     MODELS,
     SPLINES,
@@ -25,74 +29,148 @@ from pellicle.recipes.dispersion_models import (
     Parameter,
     build_model,
     build_oscillator,
+    check_dispersion,
+    check_keys,
+    check_word,
+    fixed_model,
+    free_by_default,
+    free_model,
     sum_of_oscillators,
 )
-from pellicle.scene.free import Free
+from pellicle.recipes.schema import (
+    BIAXIAL,
+    UNIAXIAL,
+    AnisotropicTable,
+    FreeTable,
+    GradedTable,
+    Medium,
+    MediumTable,
+    MixTable,
+    Number,
+)
+from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import Graded
-from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 
-UNIAXIAL, BIAXIAL = ("ordinary", "extraordinary"), ("x", "y", "z")
+_MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
 _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
-_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
-_NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
+_DECIMAL_COMMA = re.compile(r"\s*\d+,\d+\s*")
+_LIKE_AN_INDEX = 0.9
+"""A lower bound of what is added to an index beyond which the index itself is meant."""
+
+_CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
 
-def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
-    """A table of these keys and no other, in a schema."""
-    needed = {"required": [*required]} if required else {}
-    return {"properties": properties, **needed, "additionalProperties": False}
+def thickness(text: str) -> Free | float:
+    """Parse `LO:HI` in nm as a free thickness, or one number as a fixed one. Raises UsageError."""
+    if ":" not in text:
+        fixed = parse_number(text, "`thickness`", "LO:HI in nm, as in 10:3000, or a number")
+        if fixed < 0:
+            raise UsageError(f"`thickness` must not be negative, got {text} nm")
+        return fixed
+    low, high = parse_range(text, "`thickness`")
+    if low < 0:
+        raise UsageError(f"`thickness` must not be negative: its lower bound is {low:g} nm")
+    return Free(low, high)
 
 
-def _choose(schema: dict[str, Any], tables: Iterable[dict[str, Any]]) -> None:
-    """Replace the keys of a schema by several tables, one of which must fit."""
-    schema.pop("additionalProperties", None)
-    schema["anyOf"] = [*tables]
+def free_or_number(text: str, name: str, default: Free) -> Free | float:
+    """Parse `free` (the default), `LO:HI` or a number. Raises UsageError."""
+    if text == "free":
+        return default
+    if ":" in text:
+        return Free(*parse_range(text, name))
+    return parse_number(text, name)
 
 
-def _anisotropic_schema(schema: dict[str, Any]) -> None:
-    """List the keys of both kinds, for editors."""
-    medium = {"type": ["string", "number", "object"]}
-    tables = []
-    for keys in (UNIAXIAL, BIAXIAL):
-        axis = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": len(keys)}
-        tables.append(_table_schema({**dict.fromkeys(keys, medium), "axis": axis}, *keys))
-    _choose(schema, tables)
+def drift(text: str, name: str) -> str | float:
+    """Parse `free`, `slow` or a number, for scale and offset. Raises UsageError."""
+    return text if text in ("free", "slow") else parse_number(text, name)
 
 
-class AnisotropicTable(BaseModel):
-    """`{ ordinary = "TiO2-o", extraordinary = "TiO2-e", axis = [0, 0] }`, or `{ x = ..., y = ..., z = ... }`.
+def medium(
+    value: Medium, free: Iterable[str] = (), name: str = "`layer`", folder: Path | None = None
+) -> AbstractDispersion:
+    """Return the dispersion for a word of the command line, or for what a recipe has under the key `name`.
 
-    The principal media are media of any kind. `axis` is [theta, phi], of x, y and z [theta, phi, psi], each a
-    number of degrees or a table of bounds.
+    A word is a material or its file, a number (`1.46`, `2.9+0.1j`) or a model: `cauchy` leaves the model's
+    parameters free within the default bounds of `MODELS`; `cauchy(1.46,3000)` fixes them, in the order of
+    that table; `spline(400,500,600,800)` gives knots. Paths are relative to `folder`. `free` has items such
+    as `n`, `k`, `A` or `n=1.3:1.7`: see `free_numbers`.
+
+    Raises UsageError, or DataError for a file that cannot be read.
     """
+    if isinstance(value, AnisotropicTable):
+        dispersion: AbstractDispersion = _anisotropic(dict(value.model_extra or {}), folder)
+    elif isinstance(value, GradedTable):
+        dispersion = _graded(value, dict(value.model_extra or {}), folder)
+    elif isinstance(value, MixTable):
+        dispersion = _mixture(value.mix, dict(value.model_extra or {}), folder)
+    elif isinstance(value, MediumTable):
+        dispersion = _model(value.model, dict(value.model_extra or {}))
+    else:
+        word = str(value).strip()
+        if folder is not None and Path(word).suffix.lower() in MATERIAL_SUFFIXES:
+            word = str(folder / word)
+        dispersion = _word(word, name)
+    return free_numbers(dispersion, free)
 
-    model_config = ConfigDict(extra="allow", json_schema_extra=_anisotropic_schema)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _is_meant(cls, given: Any) -> Any:
-        known = (*UNIAXIAL, *BIAXIAL, "axis")
-        if not isinstance(given, dict) or not any(key in known or did_you_mean(key, known) for key in given):
-            raise ValueError("a birefringent material has ordinary and extraordinary, or x, y and z")
-        return given
+def scattering_back(
+    word: str, signal: str, part: tuple[Free | float | None, int | None]
+) -> tuple[AbstractDispersion, float]:
+    """Medium behind a back face that is `rough` or `taped`, and the share of its light that is collected: 0.
 
-
-def anisotropic_medium(
-    table: AnisotropicTable,
-    component: Callable[[str, Any], AbstractDispersion],
-    parameter: Callable[[str, Any], Any],
-) -> Anisotropic:
-    """Return the medium of a table.
-
-    `component` and `parameter` turn the value of a key into a medium and a number. Raises UsageError.
+    `part` is the share and the number of reflections that were given with it. Raises UsageError for either,
+    and for a transmittance.
     """
-    values = dict(table.model_extra or {})
+    if part != (None, None):
+        raise UsageError(f"`back` {word} returns no light: leave out `back_collected` and `back_reflections`")
+    if signal == "T":
+        raise UsageError(
+            f"light through a {word} back is scattered or blocked, and its transmittance is not simulated"
+        )
+    return Constant(1.0), 0.0
+
+
+def _word(text: str, name: str) -> AbstractDispersion:
+    try:
+        index = complex(re.sub("i$", "j", text.replace(" ", "")))
+    except ValueError:
+        return _model_or_material(text, name)
+    if not np.isfinite(index) or index.real < 0 or index.imag < 0:
+        raise UsageError(f"{name} must be an index n + ik with n and k finite and not negative, got {text}")
+    return Constant(index.real, index.imag if index.imag else None)
+
+
+def _model_or_material(text: str, name: str) -> AbstractDispersion:
+    match = _CALL.fullmatch(text)
+    if match is None or match[1].lower() not in MODELS:
+        return _material(text)
+    model, numbers = match[1].lower(), match[2]
+    if numbers is None:
+        return free_model(model)
+    label = f"{name}: a parameter of {model}"
+    return fixed_model(model, [parse_number(v, label) for v in numbers.split(",") if v.strip()], name)
+
+
+def _material(name: str) -> AbstractDispersion:
+    try:
+        return material(name)
+    except UnknownMaterial as error:
+        if name.lower() in (*MIXTURES, "oscillators"):
+            raise UsageError(f"{name} consists of several parts: describe it in a recipe") from None
+        if _DECIMAL_COMMA.fullmatch(name):
+            raise UsageError(
+                f"{name!r} is no material; an index has a decimal point: {name.replace(',', '.')}"
+            ) from None
+        close = did_you_mean(name.lower(), MODELS, 0.8)
+        raise UsageError(f"no material or model {name!r}{close}" if close else str(error)) from None
+
+
+def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     axis = values.pop("axis", [0.0, 0.0])
     keys = BIAXIAL if values.keys() & {*BIAXIAL} else UNIAXIAL
-    for key in values:
-        if key not in keys:
-            close = did_you_mean(key, [*keys, "axis"])
-            raise UsageError(f"a birefringent material has no {key!r}{close}; it has {', '.join(keys)}, axis")
+    check_keys(values, [*keys, "axis"], "a birefringent material has no")
     missing = [key for key in keys if key not in values]
     if missing:
         raise UsageError(f"a birefringent material lacks {' and '.join(missing)}: it has {', '.join(keys)}")
@@ -100,154 +178,96 @@ def anisotropic_medium(
     if not isinstance(axis, list) or not 2 <= len(axis) <= most:
         names = "[theta, phi]" if most == 2 else "[theta, phi] or [theta, phi, psi]"
         raise UsageError(f"axis must be {names} in degrees, each a number or a table of lower and upper")
-    angles = [parameter(name, each) for name, each in zip(_ANGLES, axis, strict=False)]
-    media = {key: component(key, values[key]) for key in keys}
-    return Anisotropic(**media, axis=angles)
+    angles: Any = [_parameter(name, angle) for name, angle in zip(_ANGLES, axis, strict=False)]
+    return Anisotropic(**{key: _component(key, values[key], folder) for key in keys}, axis=angles)
 
 
-def _profile_schema(schema: dict[str, Any]) -> None:
-    """Add to the schema which numbers each profile has, for editors."""
-    kinds: dict[str, Any] = {"values": {"type": "array", "minItems": 2, "items": _NUMBER}}
-    kinds["knots"] = {"type": "array", "minItems": 2, "items": {"type": "number"}}
-    own, tables = schema.pop("properties"), []
-    for name, kind in PROFILES.items():
-        numbers = {field.name: kinds.get(field.name, _NUMBER) for field in fields(kind)}
-        required = ["graded"] if name == "linear" else ["graded", "profile"]  # linear is the default
-        tables.append(_table_schema({**own, "profile": {"const": name}, **numbers}, *required))
-    _choose(schema, tables)
-    schema.pop("required", None)
-
-
-class GradedTable(BaseModel):
-    """`{ graded = ["SiO2", "Si3N4"], profile = "linear", top = 0.1, bottom = { lower = 0, upper = 1 } }`.
-
-    Further keys are the numbers of the profile. `mix` is the mixing rule, "bruggeman" by default.
-    """
-
-    model_config = ConfigDict(extra="allow", json_schema_extra=_profile_schema)
-    graded: list[Any] = Field(min_length=2, max_length=2)
-    profile: str = "linear"
-    mix: str = Field("bruggeman", json_schema_extra={"enum": [*MIXTURES]})
-
-
-def graded_medium(
-    table: GradedTable,
-    component: Callable[[str, Any], AbstractDispersion],
-    parameter: Callable[[str, Any], Any],
-) -> Graded:
-    """Return the graded medium of a table.
-
-    `component` and `parameter` turn the value of a key into a medium and a number. Raises UsageError.
-    """
-    name, values = table.profile, dict(table.model_extra or {})
-    for word, what, known in ((name, "profile", PROFILES), (table.mix, "mix", MIXTURES)):
-        if word not in known:
-            raise UsageError(f"no {what} {word!r}{did_you_mean(word, known)}; known: {', '.join(known)}")
-    kind = PROFILES[name]
-    keys = [field.name for field in fields(kind)]
-    for key in values:
-        if key not in keys:
-            close = did_you_mean(key, [*keys, "graded", "profile", "mix"])
-            raise UsageError(f"a {name} profile has no {key!r}{close}; it has {', '.join(keys)}")
+def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
+    name = table.profile
+    check_word(name, PROFILES, "profile")
+    check_word(table.mix, MIXTURES, "mix")
+    keys = [field.name for field in fields(PROFILES[name])]
+    check_keys(values, keys, f"a {name} profile has no", ("graded", "profile", "mix"))
     if name == "spline" and not isinstance(values.get("values"), list):
         raise UsageError("a spline profile needs values, a list of fractions, one for each knot")
-    numbers = {}
+    numbers: dict[str, Any] = {}
     for key, value in values.items():
         if key == "knots" and isinstance(value, list):
-            numbers[key] = [float(parameter(key, each)) for each in value]
-        elif isinstance(value, list):
-            numbers[key] = [parameter(f"{key}{i}", each) for i, each in enumerate(value, start=1)]
+            numbers[key] = [float(_parameter(key, knot)) for knot in value]  # pyright: ignore[reportArgumentType]
         else:
-            numbers[key] = parameter(key, value)
-    first, second = (component("graded", each) for each in table.graded)
-    return Graded(first, second, kind(**numbers), table.mix)
+            numbers[key] = _parameters(key, value)
+    first, second = (_component("graded", value, folder) for value in table.graded)
+    return Graded(first, second, PROFILES[name](**numbers), table.mix)
 
 
-class PriorTable(BaseModel):
-    """A prior in the parameter's unit, truncated at the bounds.
-
-    `{ mean = 100, sd = 5 }`, `{ half_normal = 0.01 }` (its standard deviation) or `{ log_uniform = true }`.
-    """
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    mean: float | None = None
-    sd: float | None = Field(None, gt=0)
-    half_normal: float | None = Field(None, gt=0)
-    log_uniform: Literal[True] | None = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> PriorTable:
-        keys = {name for name, value in vars(self).items() if value is not None}
-        if keys not in ({"mean", "sd"}, {"half_normal"}, {"log_uniform"}):
-            raise ValueError("give mean and sd, or half_normal, or log_uniform = true")
-        return self
-
-    def prior(self) -> Prior:
-        """Build the prior."""
-        if self.half_normal is not None:
-            return HalfNormal(self.half_normal)
-        if self.mean is None or self.sd is None:
-            return LogUniform()
-        return Normal(self.mean, self.sd)
+def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
+    if name == "oscillators":
+        return _oscillators(values)
+    check_word(name, [*MODELS, "oscillators"], "dispersion model")
+    parameter = _parameters if name in SPLINES else _parameter
+    return build_model(name, {key: parameter(key, value) for key, value in values.items()})
 
 
-class FreeTable(BaseModel):
-    """A free number by its bounds, with optional start value and prior; or a fixed one by its value.
-
-    `limits` mark default bounds, which a fit of spectra may widen up to them.
-    """
-
-    model_config = ConfigDict(extra="forbid")
-    value: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-    limits: tuple[float, float] | None = None
-    prior: PriorTable | None = None
-
-
-Number = float | FreeTable
+def _oscillators(values: dict[str, Any]) -> AbstractDispersion:
+    terms = values.pop("terms", None)
+    eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
+    check_keys(values, ("eps_inf", "terms"), "oscillators has no parameter")
+    if not isinstance(terms, list) or not terms or not all(isinstance(t, dict) for t in terms):
+        raise UsageError('oscillators needs terms, a list of tables like { kind = "lorentz", A = 1.0, ... }')
+    built = []
+    for term in terms:
+        if "kind" not in term:
+            raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(TERMS)}")
+        numbers = {key: _parameter(key, value) for key, value in term.items() if key != "kind"}
+        built.append(build_oscillator(str(term["kind"]), numbers))
+    return sum_of_oscillators(eps_inf, built)
 
 
-def _model_schema(schema: dict[str, Any]) -> None:
-    """Add to the schema which parameters each model has, for editors."""
-    choices: list[dict[str, Any]] = []
-    for name, specs in MODELS.items():
-        number = _NUMBER_PER_KNOT if name in SPLINES else _NUMBER
-        properties = {"model": {"const": name}, **dict.fromkeys(specs, number)}
-        if name in SPLINES:
-            properties["knots"] = {"type": "array", "items": {"type": "number"}}
-        choices.append(_table_schema(properties))
-    kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, specs in TERMS.items()]
-    term = [_table_schema(keys, "kind") for keys in kinds]
-    terms = {"type": "array", "minItems": 1, "items": {"anyOf": term}}
-    choices.append(
-        _table_schema({"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms}, "terms")
-    )
-    _choose(schema, choices)
+def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
+    check_word(rule, MIXTURES, "mix")
+    if "materials" in values:
+        both = values.pop("materials")
+        if not isinstance(both, list) or len(both) != 2 or values.keys() & {"host", "inclusion"}:
+            raise UsageError(f"{rule}: materials is a list of two, the host and the inclusion")
+        values |= {"host": both[0], "inclusion": both[1]}
+    known = ("host", "inclusion", "fraction")
+    check_keys(values, known, f"{rule} has no")
+    missing = [key for key in known if key not in values]
+    if missing:
+        raise UsageError(f"{rule}: {' and '.join(missing)} missing; it needs host, inclusion and fraction")
+    fraction = _parameter("fraction", values["fraction"])
+    host, inclusion = (_component(key, values[key], folder) for key in ("host", "inclusion"))
+    try:
+        return MIXTURES[rule](host, inclusion, fraction)
+    except ValueError as error:
+        raise UsageError(f"{rule}: {error}") from None
 
 
-class MediumTable(BaseModel):
-    """A dispersion model, `{ model = "cauchy", A = ..., B = ... }`: further keys are its parameters.
-
-    `{ model = "oscillators", eps_inf = ..., terms = [{ kind = "lorentz", ... }, ...] }` is a sum.
-    """
-
-    model_config = ConfigDict(extra="allow", json_schema_extra=_model_schema)
-    model: str
-
-
-class MixTable(BaseModel):
-    """`{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }`.
-
-    `host` and `inclusion` are media of any kind; `materials = [host, inclusion]` is another way to give them.
-    """
-
-    model_config = ConfigDict(extra="allow")
-    mix: str = Field(json_schema_extra={"enum": [*MIXTURES]})
+def _component(key: str, value: Any, folder: Path | None) -> AbstractDispersion:
+    try:
+        return medium(_MEDIUM.validate_python(value), name=key, folder=folder)
+    except ValidationError:
+        raise UsageError(
+            f"{key} must be a name, a number or a table with model or mix, got {value!r}"
+        ) from None
 
 
-Medium = str | float | MediumTable | MixTable | GradedTable | AnisotropicTable
-_MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
+def _parameters(key: str, value: Any) -> Parameter | list[Parameter]:
+    """A number of a model, or a list of one for each knot of a spline."""
+    if isinstance(value, list):
+        return [_parameter(f"{key}{i}", one) for i, one in enumerate(value, start=1)]
+    return _parameter(key, value)
+
+
+def _parameter(key: str, value: Any) -> Parameter:
+    """A model's parameter; without bounds it is fixed."""
+    try:
+        table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
+    except (ValidationError, TypeError, ValueError):
+        raise UsageError(
+            f"{key} must be a number or a table of value, lower and upper, got {value!r}"
+        ) from None
+    return number(table, key)
 
 
 def number(value: Number, name: str, minimum: float | None = None) -> float | Free:
@@ -275,99 +295,101 @@ def number(value: Number, name: str, minimum: float | None = None) -> float | Fr
     return result
 
 
-def medium(value: Medium, folder: Path, name: str = "material") -> AbstractDispersion:
-    """Return the dispersion that a recipe gives for the key `name`; paths are relative to `folder`.
+def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> AbstractDispersion:
+    """Free the named numbers of a dispersion: `n`, `k`, or a model's own, each with optional bounds.
 
-    Raises UsageError, or DataError for a table that cannot be read.
+    A constant index is replaced: n ± 0.5 but at least 1 (or 0.01, where it absorbs), k from 0 to 1. For any
+    other dispersion a constant is added: to n within ± 0.5 as long as the sum stays at least 1 (or a tenth of
+    its least value, for a metal), to k from 0 to 1. Raises UsageError.
     """
-    if isinstance(value, AnisotropicTable):
-        return anisotropic_medium(value, lambda key, each: _component(key, each, folder), _parameter)
-    if isinstance(value, GradedTable):
-        return graded_medium(value, lambda key, each: _component(key, each, folder), _parameter)
-    if isinstance(value, MixTable):
-        return _mixture(value.mix, dict(value.model_extra or {}), folder)
-    if isinstance(value, MediumTable):
-        return _model(value.model, dict(value.model_extra or {}))
-    if isinstance(value, str) and Path(value).suffix.lower() in MATERIAL_SUFFIXES:
-        value = str(folder / value)
-    return media_words.medium(str(value), name=name)
+    for item in items:
+        if isinstance(dispersion, Graded):
+            raise UsageError("cannot free numbers of a graded material: give bounds to those of its profile")
+        name, _, words = item.partition("=")
+        if isinstance(dispersion, Anisotropic) and (name in ("n", "k") or name.startswith("axis_")):
+            raise UsageError(
+                f"cannot free {name!r} of a birefringent layer: in the recipe, give bounds to its principal"
+                " media, or to the angles of its axis"
+            )
+        bounds = parse_range(words, f"the range of {name}") if words else None
+        if name in ("n", "k"):
+            dispersion = _free_index(dispersion, name, bounds)
+        else:
+            dispersion = _free_parameter(dispersion, name, bounds)
+    return dispersion
 
 
-def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
-    if name == "oscillators":
-        return _oscillators(values)
-    if name not in MODELS:
-        known = [*MODELS, "oscillators"]
+def _free_parameter(
+    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
+) -> AbstractDispersion:
+    """Free the model's own number of that name within `bounds` or the model's default ones."""
+    leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
+    numbers = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
+    known = {locate_parameter(dispersion, leaves[i][0]).name: i for i in numbers}
+    if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
+        raise UsageError(f"cannot free {name!r}: the layer has no such number; n and k can always be freed")
+    if name not in known:
+        *first, last = known
+        listed = f"{', '.join(first)} and {last}" if first else last
         close = did_you_mean(name, known)
-        raise UsageError(f"no dispersion model {name!r}{close}; known: {', '.join(known)}")
-    parameter = _parameter_per_knot if name in SPLINES else _parameter
-    return build_model(name, {key: parameter(key, value) for key, value in values.items()})
+        raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
+    path, leaf = leaves[known[name]]
+    free = Free(*bounds) if bounds else free_by_default(locate_parameter(dispersion, path), leaf)
+    if free is None:
+        raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
+    replaced = [leaf for _, leaf in leaves]
+    replaced[known[name]] = free
+    return check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
 
 
-def _oscillators(values: dict[str, Any]) -> AbstractDispersion:
-    terms = values.pop("terms", None)
-    eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
-    if values:
-        key = next(iter(values))
-        close = did_you_mean(key, ["eps_inf", "terms"])
-        raise UsageError(f"oscillators has no parameter {key!r}{close}; it has eps_inf, terms")
-    if not isinstance(terms, list) or not terms or not all(isinstance(t, dict) for t in terms):
-        raise UsageError('oscillators needs terms, a list of tables like { kind = "lorentz", A = 1.0, ... }')
-    return sum_of_oscillators(eps_inf, [_term(dict(t)) for t in terms])
-
-
-def _term(values: dict[str, Any]) -> AbstractOscillator:
-    if "kind" not in values:
-        raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(TERMS)}")
-    kind = str(values.pop("kind"))
-    return build_oscillator(kind, {key: _parameter(key, value) for key, value in values.items()})
-
-
-def _mixture(rule: str, values: dict[str, Any], folder: Path) -> AbstractDispersion:
-    if rule not in MIXTURES:
-        raise UsageError(f"no mix {rule!r}{did_you_mean(rule, MIXTURES)}; known: {', '.join(MIXTURES)}")
-    if "materials" in values:
-        both = values.pop("materials")
-        if not isinstance(both, list) or len(both) != 2 or values.keys() & {"host", "inclusion"}:
-            raise UsageError(f"{rule}: materials is a list of two, the host and the inclusion")
-        values |= {"host": both[0], "inclusion": both[1]}
-    known = ("host", "inclusion", "fraction")
-    for key in values:
-        if key not in known:
-            raise UsageError(f"{rule} has no {key!r}{did_you_mean(key, known)}; it has {', '.join(known)}")
-    missing = [key for key in known if key not in values]
-    if missing:
-        raise UsageError(f"{rule}: {' and '.join(missing)} missing; it needs host, inclusion and fraction")
-    fraction = _parameter("fraction", values["fraction"])
-    host, inclusion = (_component(key, values[key], folder) for key in ("host", "inclusion"))
-    try:
-        return MIXTURES[rule](host, inclusion, fraction)
-    except ValueError as error:
-        raise UsageError(f"{rule}: {error}") from None
-
-
-def _component(key: str, value: Any, folder: Path) -> AbstractDispersion:
-    try:
-        return medium(_MEDIUM.validate_python(value), folder, key)
-    except ValidationError:
+def _free_index(
+    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
+) -> AbstractDispersion:
+    if isinstance(dispersion, Constant):
+        n, k = _start(dispersion.n), _start(dispersion.k or 0.0)
+        if name == "k":
+            return Constant(dispersion.n, _free_k(k, bounds))
+        least, most = (1.0, 5.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
+        low, high = max(least, n - 0.5), max(least, n) + 0.5
+        default = Free(low, high, start=max(n, low), limits=(least, max(most, high)))
+        return Constant(_within(bounds, default), dispersion.k)
+    shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
+    if name == "k":
+        return Shifted(shifted.base, shifted.n, _free_k(0.0, bounds))
+    if bounds and bounds[0] >= _LIKE_AN_INDEX:
+        low, high = bounds
         raise UsageError(
-            f"{key} must be a name, a number or a table with model or mix, got {value!r}"
-        ) from None
+            f"cannot free 'n' within {low:g} to {high:g}: it is added to the index of this material; write "
+            "n=-0.1:0.1 for an index near the given one, or take the model cauchy for an unknown one"
+        )
+    return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 
 
-def _parameter_per_knot(key: str, value: Any) -> Parameter | list[Parameter]:
-    """A spline's parameter, or a list of one for each knot."""
-    if isinstance(value, list):
-        return [_parameter(f"{key}{i}", each) for i, each in enumerate(value, start=1)]
-    return _parameter(key, value)
+def _start(number: Parameter) -> float:
+    return number.start if isinstance(number, Free) else float(number)
 
 
-def _parameter(key: str, value: Any) -> Parameter:
-    """A model's parameter; without bounds it is fixed."""
-    try:
-        table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
-    except (ValidationError, TypeError, ValueError):
-        raise UsageError(
-            f"{key} must be a number or a table of value, lower and upper, got {value!r}"
-        ) from None
-    return number(table, key)
+def _within(bounds: tuple[float, float] | None, default: Free) -> Free:
+    """A number free within the bounds that the user gives, else the default."""
+    if bounds is None:
+        return default
+    low, high = bounds
+    return Free(low, high, start=min(max(default.start, low), high))
+
+
+def _free_k(value: float, bounds: tuple[float, float] | None) -> Free:
+    low, high = bounds or (0.0, 1.0)
+    if low < 0:
+        raise UsageError(f"cannot free 'k': an extinction coefficient must not be negative, got {low:g}")
+    start = value if value > low else low + 0.05 * (high - low)
+    return Free(low, high, start=min(start, high), limits=None if bounds else (0.0, 20.0))
+
+
+def _free_shift(dispersion: AbstractDispersion) -> Free:
+    """A constant that is added to n. With more than 2 of it the material is another one."""
+    low, high = getattr(dispersion, "wavelength_range", (380.0, 780.0))
+    wavelength = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
+    rises = wavelength[0] < wavelength[-1]
+    least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
+    lowest = 1.0 - least if least >= 1 else -0.9 * least
+    return Free(max(-0.5, lowest), 0.5, start=0.0, limits=(lowest, 2.0))

@@ -25,11 +25,18 @@ from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
-from pellicle.recipes import media_words
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, fixed_model, free_model
-from pellicle.recipes.media import FreeTable, Medium, Number, medium, number
-from pellicle.recipes.media_words import free_numbers
-from pellicle.recipes.schema import InstrumentTable, LayerTable, PlateTable, ReferenceTable, SceneTable
+from pellicle.recipes.media import free_numbers, medium, number, scattering_back
+from pellicle.recipes.schema import (
+    FreeTable,
+    InstrumentTable,
+    LayerTable,
+    Medium,
+    Number,
+    PlateTable,
+    ReferenceTable,
+    SceneTable,
+)
 from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
@@ -252,7 +259,7 @@ def layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
     if table.between is not None:
         return _part(Interface, table, mix=table.between)
     stated: Any = table.material  # LayerTable has checked that it is there
-    material = media_words.free_numbers(medium(stated, folder), table.free)
+    material = medium(stated, table.free, "material", folder)
     return _part(Layer if table.plate_mm is None else Plate, table, material=material)
 
 
@@ -273,13 +280,13 @@ def layer_keys(layer: Layer | Interface | Plate, position: int, folder: Path) ->
 def substrate(value: Medium | PlateTable, folder: Path, signal: str) -> Substrate:
     """The substrate of a table or a medium, for light of a signal. Raises UsageError."""
     if not isinstance(value, PlateTable):
-        return Substrate(medium(value, folder, "substrate"))
-    given: dict[str, Any] = {"material": medium(value.material, folder)}
+        return Substrate(medium(value, name="substrate", folder=folder))
+    given: dict[str, Any] = {"material": medium(value.material, name="material", folder=folder)}
     if isinstance(value.back, str) and value.back in SCATTERING_BACKS:
         part = optional(value.back_collected, "back_collected"), value.back_reflections
-        given["back"], given["back_collected"] = media_words.scattering_back(value.back, signal, part)
+        given["back"], given["back_collected"] = scattering_back(value.back, signal, part)
     elif value.back is not None:
-        given["back"] = medium(value.back, folder, "back")
+        given["back"] = medium(value.back, name="back", folder=folder)
     return _part(Substrate, value, **given)
 
 

@@ -1,17 +1,38 @@
 """Reading recipes: TOML files that describe a film, or a surface by its BRDF."""
 
+from __future__ import annotations
+
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError
+import numpy as np
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.cameras import Camera, Sight, sight
+from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
+from pellicle.data.read_brdf import read_brdf_samples
+from pellicle.data.sensors import band_sensor
 from pellicle.errors import DataError, UsageError, did_you_mean
-from pellicle.recipes import film, surface
-from pellicle.recipes.film import FilmRecipe
-from pellicle.recipes.surface import SurfaceRecipe
+from pellicle.recipes import parts
+from pellicle.recipes.media import medium, number
+from pellicle.recipes.schema import (
+    BACK,
+    FileTable,
+    Number,
+    PlateTable,
+    ReadingTable,
+    RecipeTable,
+    SurfaceRecipeTable,
+    SurfaceTable,
+)
+from pellicle.scene.film import Light, Scene
+from pellicle.scene.free import check_free_count, free_leaves
+from pellicle.scene.surface import Surface
 
 
 def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
@@ -36,8 +57,8 @@ def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:
     data, scene = loaded.get("data"), loaded.get("scene")
     by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
     if by_signal or (isinstance(scene, dict) and "surface" in scene):
-        return SurfaceRecipe(path, _validated(loaded, surface.TABLES))
-    return FilmRecipe(path, _validated(loaded, film.TABLES))
+        return SurfaceRecipe(path, _validated(loaded, SurfaceRecipeTable))
+    return FilmRecipe(path, _validated(loaded, RecipeTable))
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -58,15 +79,12 @@ def _load(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
 
 
-def _validated(loaded: dict[str, Any], tables: Mapping[str, type[BaseModel]]) -> Any:
-    """Check a parsed recipe against the table of the key "", whose sub-tables `tables` lists by their keys.
-
-    Raises UsageError: which key, what was expected, the nearest known one.
-    """
+def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
+    """Check a parsed recipe. Raises UsageError: which key, what was expected, the nearest known one."""
     try:
-        return tables[""].model_validate(loaded)
+        return table.model_validate(loaded)
     except ValidationError as error:
-        raise UsageError(_first_error(error, tables)) from None
+        raise UsageError(_first_error(error, _tables_by_key(table))) from None
 
 
 def _is_branch(part: str) -> bool:
@@ -95,3 +113,221 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     if chosen["type"] == "value_error":
         return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
     return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
+
+
+def _tables_by_key(table: type[BaseModel], key: str = "") -> dict[str, type[BaseModel]]:
+    """Tables that refuse unknown keys, by their own keys: this one and all below it."""
+    tables = {key: table}
+    for name, field in table.model_fields.items():
+        for kind in _classes(field.annotation):
+            if issubclass(kind, BaseModel) and kind.model_config.get("extra") == "forbid":
+                tables |= _tables_by_key(kind, name)
+    return tables
+
+
+def _classes(annotation: Any) -> Iterator[type]:
+    for part in get_args(annotation):
+        yield from _classes(part)
+    if isinstance(annotation, type):
+        yield annotation
+
+
+@dataclass(frozen=True)
+class FilmRecipe:
+    """A recipe of a film: its path and its checked tables."""
+
+    path: str
+    tables: RecipeTable
+
+    @property
+    def files(self) -> list[str]:
+        """Data files, relative to the recipe."""
+        data = self.tables.data
+        names = [*data.files, *(file.path for file in data.file)]
+        return [os.path.normpath(Path(self.path).parent / name) for name in names]
+
+    @property
+    def each(self) -> list[FilmRecipe]:
+        """One recipe for each `[[data.file]]`, with the keys of that table; empty without such tables."""
+        return [FilmRecipe(self.path, _of_file(self.tables, file)) for file in self.tables.data.file]
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """The keys of `[camera]` that the recipe gives, with paths of files."""
+        return self.with_paths(self.tables.camera)
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """The options of `[data]` and `[camera]` for reading files that the recipe gives."""
+        given = self.with_paths(self.tables.data)
+        return {name: x for name, x in given.items() if name in ReadingOptions.declared()} | self.camera
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of reading and fitting that the recipe gives."""
+        return self.reading | FitOptions().over(self.tables.data.given()).given()
+
+    def with_files(self, table: FileTable) -> dict[str, Any]:
+        """The files that a table of `[[data.file]]` names, from the working folder."""
+        files = {name for name, (_, option) in table.declared().items() if option.is_file}
+        paths = {name: x for name, x in self.with_paths(table).items() if name in files}
+        return paths | ({"camera": camera} if (camera := self.with_paths(table.camera)) else {})
+
+    def with_paths(self, table: Options) -> dict[str, Any]:
+        """The options that a table gives, with paths of files from the working folder."""
+        declared, folder = table.declared(), Path(self.path).parent
+        return {
+            name: os.path.normpath(folder / x) if declared[name][1].is_file else x
+            for name, x in table.given().items()
+        }
+
+    def sight(self) -> Sight:
+        """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""
+        names = {field.name for field in fields(Camera)}
+        camera = Camera(**{name: value for name, value in self.camera.items() if name in names})
+        try:
+            return sight(camera, self.tables.data.signal or "srgb")
+        except UsageError as error:
+            raise DataError(f"{self.path}: camera: {error}".replace("`", "")) from None
+
+    def scene(self) -> Scene:
+        """Build the scene. Raises DataError, the recipe's path in front."""
+        try:
+            return _scene(self.tables, Path(self.path).parent)
+        except ValueError as error:
+            # without backticks, which the command line would turn into flags
+            raise DataError(f"{self.path}: {error}".replace("`", "")) from None
+        except RecursionError:
+            raise DataError(f"{self.path}: its materials are nested too deeply") from None
+
+
+def light_signal(signal: str | None, transmitted: bool | None) -> str:
+    """Return the signal of the light: "R" or "T" where colours are measured."""
+    if signal in SPACES:
+        return "T" if transmitted else "R"
+    return signal or "R"
+
+
+def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
+    """Light by the options `signal`, `angle`, `polarisation` and `transmission` of reading.
+
+    `azimuth` of the sample is in degrees. Raises UsageError.
+    """
+    several = isinstance(given.angle, list)
+    angle = np.array(given.angle) if several else parts.optional(given.angle, "angle") or 0.0
+    signal, through = light_signal(given.signal, transmitted), bool(given.transmission and given.signal)
+    return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
+
+
+def _scene(tables: RecipeTable, folder: Path) -> Scene:
+    scene, data = tables.scene, tables.data
+    azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
+    lit = light(data, tables.camera.transmitted, azimuth)
+    built = Scene(
+        [parts.layer(layer, folder) for layer in scene.layer],
+        parts.substrate(scene.substrate, folder, lit.signal),
+        ambient=medium(scene.ambient, name="ambient", folder=folder),
+        light=lit,
+        instrument=parts.instrument(tables.instrument),
+        uncertainty=parts.uncertainty(scene, tables.instrument),
+        reference=None if tables.reference is None else parts.reference(tables.reference, folder),
+    )
+    check_free_count(len(free_leaves(built)), least=0)
+    return built
+
+
+_NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
+
+
+def _of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
+    """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
+    words = {name: getattr(file, name) for name in ReadingTable.model_fields}
+    said = {name: value for name, value in words.items() if value is not None}
+    data = tables.data.model_copy(update={**said, "file": [file]})
+    own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
+    instrument = tables.instrument.model_copy(update=own)
+    camera = tables.camera.model_copy(
+        update={name: getattr(file.camera, name) for name in file.camera.model_fields_set}
+    )
+    scene, plate = tables.scene, tables.scene.substrate
+    if file.back is False and isinstance(plate, PlateTable):
+        scene = scene.model_copy(
+            update={"substrate": plate.model_copy(update=dict.fromkeys(("back", *BACK)))}
+        )
+    return tables.model_copy(
+        update={"data": data, "instrument": instrument, "camera": camera, "scene": scene}
+    )
+
+
+@dataclass(frozen=True)
+class SurfaceRecipe:
+    """A recipe of a surface: its path and its checked tables."""
+
+    path: str
+    tables: SurfaceRecipeTable
+
+    @property
+    def files(self) -> list[str]:
+        """Data files, relative to the recipe."""
+        return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
+
+    def scene(self) -> Surface:
+        """Build the surface. Raises DataError, the recipe's path in front."""
+        try:
+            return _surface(self.tables.scene.surface, Path(self.path).parent)
+        except ValueError as error:
+            # without backticks, which the command line would turn into flags
+            raise DataError(f"{self.path}: scene.surface: {error}".replace("`", "")) from None
+        except RecursionError:
+            raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
+
+    def read(self, file: str) -> BrdfSamples:
+        """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError.
+
+        Spectra are taken at the surface's wavelengths, or integrated over the bands of its sensor.
+        """
+        data, surface = self.tables.data, self.scene()
+        sensor = surface.sensor
+        samples = read_brdf_samples(
+            file,
+            columns=data.columns,
+            samples=data.samples,
+            max_theta=data.max_theta,
+            wavelengths=surface.channel_wavelengths,
+            bands=None if sensor is None else (sensor.wavelength, sensor.weights),
+        )
+        if data.noise is None:
+            return samples
+        try:
+            return samples.with_noise(data.noise)
+        except UsageError as error:
+            raise DataError(f"{self.path}: data.{error}".replace("`", "")) from None
+
+    def with_data(self, **keys: Any) -> SurfaceRecipe:
+        """The recipe with these keys of `[data]` replaced."""
+        data = self.tables.data.model_copy(update=keys)
+        return replace(self, tables=self.tables.model_copy(update={"data": data}))
+
+
+def _surface(table: SurfaceTable, folder: Path) -> Surface:
+    surface = Surface(
+        table.model,
+        {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
+        None if table.wavelengths is None else tuple(table.wavelengths),
+        band_sensor(table.sensor, table.illuminant, table.lamp, folder),
+        None if table.film is None else medium(table.film, name="film", folder=folder),
+        None if table.base is None else medium(table.base, name="base", folder=folder),
+    )
+    check_free_count(len(surface.free_numbers()), least=0)
+    return surface
+
+
+def _number(value: Any, key: str) -> Any:
+    try:
+        table = _NUMBERS.validate_python(value)
+    except ValidationError:
+        raise UsageError(
+            f"{key}: a number, a list of one for each channel, or {{ lower = ..., upper = ... }} was"
+            f" expected, got {value!r}"
+        ) from None
+    return table if isinstance(table, list) else number(table, key)

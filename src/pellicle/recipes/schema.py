@@ -1,11 +1,175 @@
 """The tables of a recipe, and what may stand in them."""
 
-from typing import Annotated, Literal
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.options import CameraOptions, FitOptions, ReadingOptions
-from pellicle.recipes.media import FreeTable, Medium, Number
+from pellicle.dispersion.effective_medium import MIXTURES
+from pellicle.dispersion.profiles import PROFILES
+from pellicle.errors import did_you_mean
+from pellicle.recipes.dispersion_models import MODELS, SPLINES, TERMS
+from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
+
+UNIAXIAL, BIAXIAL = ("ordinary", "extraordinary"), ("x", "y", "z")
+_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
+_NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
+
+
+def _table_schema(properties: dict[str, Any], *required: str) -> dict[str, Any]:
+    """A table of these keys and no other, in a schema."""
+    needed = {"required": [*required]} if required else {}
+    return {"properties": properties, **needed, "additionalProperties": False}
+
+
+def _choose(schema: dict[str, Any], tables: Iterable[dict[str, Any]]) -> None:
+    """Replace the keys of a schema by several tables, one of which must fit."""
+    schema.pop("additionalProperties", None)
+    schema["anyOf"] = [*tables]
+
+
+def _anisotropic_schema(schema: dict[str, Any]) -> None:
+    """List the keys of both kinds, for editors."""
+    medium = {"type": ["string", "number", "object"]}
+    tables = []
+    for keys in (UNIAXIAL, BIAXIAL):
+        axis = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": len(keys)}
+        tables.append(_table_schema({**dict.fromkeys(keys, medium), "axis": axis}, *keys))
+    _choose(schema, tables)
+
+
+class AnisotropicTable(BaseModel):
+    """`{ ordinary = "TiO2-o", extraordinary = "TiO2-e", axis = [0, 0] }`, or `{ x = ..., y = ..., z = ... }`.
+
+    The principal media are media of any kind. `axis` is [theta, phi], of x, y and z [theta, phi, psi], each a
+    number of degrees or a table of bounds.
+    """
+
+    model_config = ConfigDict(extra="allow", json_schema_extra=_anisotropic_schema)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_meant(cls, given: Any) -> Any:
+        known = (*UNIAXIAL, *BIAXIAL, "axis")
+        if not isinstance(given, dict) or not any(key in known or did_you_mean(key, known) for key in given):
+            raise ValueError("a birefringent material has ordinary and extraordinary, or x, y and z")
+        return given
+
+
+def _profile_schema(schema: dict[str, Any]) -> None:
+    """Add to the schema which numbers each profile has, for editors."""
+    kinds: dict[str, Any] = {"values": {"type": "array", "minItems": 2, "items": _NUMBER}}
+    kinds["knots"] = {"type": "array", "minItems": 2, "items": {"type": "number"}}
+    own, tables = schema.pop("properties"), []
+    for name, kind in PROFILES.items():
+        numbers = {field.name: kinds.get(field.name, _NUMBER) for field in fields(kind)}
+        required = ["graded"] if name == "linear" else ["graded", "profile"]  # linear is the default
+        tables.append(_table_schema({**own, "profile": {"const": name}, **numbers}, *required))
+    _choose(schema, tables)
+    schema.pop("required", None)
+
+
+class GradedTable(BaseModel):
+    """`{ graded = ["SiO2", "Si3N4"], profile = "linear", top = 0.1, bottom = { lower = 0, upper = 1 } }`.
+
+    Further keys are the numbers of the profile. `mix` is the mixing rule, "bruggeman" by default.
+    """
+
+    model_config = ConfigDict(extra="allow", json_schema_extra=_profile_schema)
+    graded: list[Any] = Field(min_length=2, max_length=2)
+    profile: str = "linear"
+    mix: str = Field("bruggeman", json_schema_extra={"enum": [*MIXTURES]})
+
+
+class PriorTable(BaseModel):
+    """A prior in the parameter's unit, truncated at the bounds.
+
+    `{ mean = 100, sd = 5 }`, `{ half_normal = 0.01 }` (its standard deviation) or `{ log_uniform = true }`.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    mean: float | None = None
+    sd: float | None = Field(None, gt=0)
+    half_normal: float | None = Field(None, gt=0)
+    log_uniform: Literal[True] | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> PriorTable:
+        keys = {name for name, value in vars(self).items() if value is not None}
+        if keys not in ({"mean", "sd"}, {"half_normal"}, {"log_uniform"}):
+            raise ValueError("give mean and sd, or half_normal, or log_uniform = true")
+        return self
+
+    def prior(self) -> Prior:
+        """Build the prior."""
+        if self.half_normal is not None:
+            return HalfNormal(self.half_normal)
+        if self.mean is None or self.sd is None:
+            return LogUniform()
+        return Normal(self.mean, self.sd)
+
+
+class FreeTable(BaseModel):
+    """A free number by its bounds, with optional start value and prior; or a fixed one by its value.
+
+    `limits` mark default bounds, which a fit of spectra may widen up to them.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+    value: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    limits: tuple[float, float] | None = None
+    prior: PriorTable | None = None
+
+
+Number = float | FreeTable
+
+
+def _model_schema(schema: dict[str, Any]) -> None:
+    """Add to the schema which parameters each model has, for editors."""
+    choices: list[dict[str, Any]] = []
+    for name, specs in MODELS.items():
+        number = _NUMBER_PER_KNOT if name in SPLINES else _NUMBER
+        properties = {"model": {"const": name}, **dict.fromkeys(specs, number)}
+        if name in SPLINES:
+            properties["knots"] = {"type": "array", "items": {"type": "number"}}
+        choices.append(_table_schema(properties))
+    kinds = [{"kind": {"const": kind}, **dict.fromkeys(specs, _NUMBER)} for kind, specs in TERMS.items()]
+    term = [_table_schema(keys, "kind") for keys in kinds]
+    terms = {"type": "array", "minItems": 1, "items": {"anyOf": term}}
+    choices.append(
+        _table_schema({"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms}, "terms")
+    )
+    _choose(schema, choices)
+
+
+class MediumTable(BaseModel):
+    """A dispersion model, `{ model = "cauchy", A = ..., B = ... }`: further keys are its parameters.
+
+    `{ model = "oscillators", eps_inf = ..., terms = [{ kind = "lorentz", ... }, ...] }` is a sum.
+    """
+
+    model_config = ConfigDict(extra="allow", json_schema_extra=_model_schema)
+    model: str
+
+
+class MixTable(BaseModel):
+    """`{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }`.
+
+    `host` and `inclusion` are media of any kind; `materials = [host, inclusion]` is another way to give them.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    mix: str = Field(json_schema_extra={"enum": [*MIXTURES]})
+
+
+Medium = str | float | MediumTable | MixTable | GradedTable | AnisotropicTable
 
 
 class _Table(BaseModel):
@@ -16,7 +180,7 @@ Uncertain = Annotated[float, Field(ge=0)] | None
 """Standard uncertainty of a number that is taken as known; None leaves the usual one."""
 
 
-_BACK = ("back_collected", "back_reflections")
+BACK = ("back_collected", "back_reflections")
 """Keys of a plate: which part of the light from beneath it reaches the detector."""
 
 
@@ -57,24 +221,16 @@ class LayerTable(_Table):
             raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
         if (self.thickness is None) == (self.plate_mm is None):
             raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
-        rejected = self.model_fields_set & self._foreign()
-        if rejected:
-            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {self._kind()}")
+        of_layer = {"thickness_spread", "roughness", "index_uncertainty"}
+        if self.between is not None:
+            kind, foreign = "between, a mixed interface", {*of_layer, *BACK, "plate_mm", "free"}
+        elif self.plate_mm is not None:
+            kind, foreign = "plate_mm, an incoherent plate", {*of_layer, "steps", "fraction"}
+        else:
+            kind, foreign = "a coherent layer", {*BACK, "steps", "fraction"}
+        if rejected := self.model_fields_set & foreign:
+            raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {kind}")
         return self
-
-    def _kind(self) -> str:
-        if self.between is not None:
-            return "between, a mixed interface"
-        return "plate_mm, an incoherent plate" if self.plate_mm is not None else "a coherent layer"
-
-    def _foreign(self) -> set[str]:
-        if self.between is not None:
-            return {"plate_mm", *_BACK, "thickness_spread", "roughness", "index_uncertainty", "free"}
-        return (
-            {"steps", "fraction", "thickness_spread", "roughness", "index_uncertainty"}
-            if self.plate_mm is not None
-            else {"steps", "fraction", *_BACK}
-        )
 
 
 class GridTable(_Table):
@@ -115,7 +271,7 @@ _Angle = Annotated[
 _Noise = Annotated[float | None, Field(gt=0)]
 
 
-class _Reading(_Table, ReadingOptions):  # pyright: ignore[reportGeneralTypeIssues]
+class ReadingTable(_Table, ReadingOptions):  # pyright: ignore[reportGeneralTypeIssues]
     """Options of reading data files, named as the flags of the command line."""
 
     azimuth: float | list[float] | None = None
@@ -125,7 +281,7 @@ class CameraTable(_Table, CameraOptions):  # pyright: ignore[reportGeneralTypeIs
     """`[camera]`: what sees the colours of a film, and under which light; files are CSV."""
 
 
-class FileTable(_Reading):
+class FileTable(ReadingTable):
     """One `[[data.file]]`: its keys override those of `[data]`, `[instrument]` and `[camera]`."""
 
     angle: _Angle = None  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -148,7 +304,7 @@ class FileTable(_Reading):
         return given
 
 
-class DataTable(_Reading, FitOptions):  # pyright: ignore[reportGeneralTypeIssues]
+class DataTable(ReadingTable, FitOptions):  # pyright: ignore[reportGeneralTypeIssues]
     """`[data]`."""
 
     angle: _Angle = None  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -200,21 +356,46 @@ class RecipeTable(_Table):
     camera: CameraTable = CameraTable()
 
 
-def of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
-    """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
-    words = {name: getattr(file, name) for name in _Reading.model_fields}
-    said = {name: value for name, value in words.items() if value is not None}
-    data = tables.data.model_copy(update={**said, "file": [file]})
-    own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
-    instrument = tables.instrument.model_copy(update=own)
-    camera = tables.camera.model_copy(
-        update={name: getattr(file.camera, name) for name in file.camera.model_fields_set}
-    )
-    scene, plate = tables.scene, tables.scene.substrate
-    if file.back is False and isinstance(plate, PlateTable):
-        scene = scene.model_copy(
-            update={"substrate": plate.model_copy(update=dict.fromkeys(("back", *_BACK)))}
-        )
-    return tables.model_copy(
-        update={"data": data, "instrument": instrument, "camera": camera, "scene": scene}
-    )
+class SurfaceDataTable(_Table, FitOptions):  # pyright: ignore[reportGeneralTypeIssues]
+    """`[data]`: `noise` is a standard deviation (1/sr) or a share of the signal ("2 %"), for all channels or
+    for each; `residual` is the scale of the comparison, `samples` the most to keep of a file, `max_theta` the
+    largest angle from the normal (degrees) of samples to keep."""
+
+    signal: Literal["brdf"] = "brdf"
+    files: list[str] = []
+    columns: str | list[str] | None = None
+    noise: float | str | list[float | str] | None = None
+    residual: Literal["linear", "cosine", "log", "cube-root"] | None = None
+    samples: int | None = Field(default=None, gt=0)
+    max_theta: float | None = Field(default=None, gt=0, le=90)
+
+
+class SurfaceTable(_Table):
+    """`[scene.surface]`: further keys are the model's own numbers.
+
+    `sensor` gives each channel its band: an observer of the CIE, "srgb", or a file of a camera's
+    sensitivities; the light is an `illuminant` of the CIE or a `lamp`, a file of its spectrum. `film` and
+    `base` are media.
+    """
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    model: str = Field(json_schema_extra={"enum": [*BRDF_MODELS]})
+    wavelengths: list[float] | None = Field(default=None, min_length=1)
+    sensor: str | None = None
+    illuminant: Literal["E", "A", "D50", "D55", "D65", "D75"] | None = None
+    lamp: str | None = None
+    film: Medium | None = None
+    base: Medium | None = None
+
+
+class SurfaceSceneTable(_Table):
+    """`[scene]`."""
+
+    surface: SurfaceTable
+
+
+class SurfaceRecipeTable(_Table):
+    """A whole recipe of a surface."""
+
+    data: SurfaceDataTable = SurfaceDataTable()
+    scene: SurfaceSceneTable

@@ -8,7 +8,7 @@ import pytest
 
 from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
 from pellicle.errors import UsageError
-from pellicle.recipes import media_words
+from pellicle.recipes import media
 from pellicle.recipes.dispersion_models import MODELS, TERMS, build_model
 from pellicle.scene.free import Free, free_leaves
 
@@ -20,10 +20,10 @@ def free_part(free: Free):
 
 
 def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
-    assert free_part(media_words.thickness("10:3000")) == (1505, 10, 3000)
-    assert media_words.thickness("120.5") == 120.5
-    assert media_words.thickness("0") == 0
-    assert free_part(media_words.thickness("0:1e3"))[1:] == (0, 1000)
+    assert free_part(media.thickness("10:3000")) == (1505, 10, 3000)
+    assert media.thickness("120.5") == 120.5
+    assert media.thickness("0") == 0
+    assert free_part(media.thickness("0:1e3"))[1:] == (0, 1000)
 
 
 @pytest.mark.parametrize(
@@ -40,54 +40,52 @@ def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
 )
 def test_thickness_refused(text, message):
     with pytest.raises(UsageError, match=message):
-        media_words.thickness(text)
+        media.thickness(text)
 
 
 def test_numbers_are_media():
-    assert media_words.medium("1.46") == Constant(1.46)
+    assert media.medium("1.46") == Constant(1.46)
     for text in ("2.9+0.1j", "2.9 + 0.1j", "2.9+0.1i"):
-        np.testing.assert_allclose(media_words.medium(text)(AT), 2.9 + 0.1j)
+        np.testing.assert_allclose(media.medium(text)(AT), 2.9 + 0.1j)
 
 
 @pytest.mark.parametrize("text", ["-1.5", "1.5-0.1j", "nan"])
 def test_impossible_indices(text):
     with pytest.raises(UsageError, match="`layer` must be an index n"):
-        media_words.medium(text)
+        media.medium(text)
 
 
 def test_names_and_tables(write):
-    np.testing.assert_allclose(media_words.medium("SiO2")(np.array([633.0])), 1.457, atol=1e-3)
-    np.testing.assert_allclose(media_words.medium("air")(AT), 1.0)
+    np.testing.assert_allclose(media.medium("SiO2")(np.array([633.0])), 1.457, atol=1e-3)
+    np.testing.assert_allclose(media.medium("air")(AT), 1.0)
     table = write("wavelength_nm,n,k\n400,1.6,0.02\n600,1.5,0.0\n900,1.5,0.0\n", "resin.csv")
     np.testing.assert_allclose(
-        media_words.medium(str(table))(np.array([400.0, 500.0])), [1.6 + 0.02j, 1.55 + 0.01j]
+        media.medium(str(table))(np.array([400.0, 500.0])), [1.6 + 0.02j, 1.55 + 0.01j]
     )
     with pytest.raises(UsageError, match="SiO2"):
-        media_words.medium("SiO3")
+        media.medium("SiO3")
 
 
 def test_a_bare_model_frees_its_parameters_within_documented_bounds():
-    cauchy = media_words.medium("cauchy")
+    cauchy = media.medium("cauchy")
     assert isinstance(cauchy, Cauchy)
     assert free_part(cauchy.A)[1:] == (1.2, 3.0)
     assert free_part(cauchy.B)[1:] == (0.0, 1e5)
     assert cauchy.C == 0
-    sellmeier = media_words.medium("sellmeier")
+    sellmeier = media.medium("sellmeier")
     assert isinstance(sellmeier, Sellmeier)
     assert free_part(sellmeier.B[0])[1:] == (0.1, 6.0)
 
 
 def test_a_call_fixes_them():
     n = 1.324188 + 3102.06 / AT**2
-    np.testing.assert_allclose(media_words.medium("cauchy(1.324188,3102.06)")(AT), n)
+    np.testing.assert_allclose(media.medium("cauchy(1.324188,3102.06)")(AT), n)
     np.testing.assert_allclose(
-        media_words.medium("Cauchy( 1.4 , 3000 , 1e8 )")(AT), 1.4 + 3000 / AT**2 + 1e8 / AT**4
+        media.medium("Cauchy( 1.4 , 3000 , 1e8 )")(AT), 1.4 + 3000 / AT**2 + 1e8 / AT**4
     )
-    np.testing.assert_allclose(media_words.medium("cauchy(1.4)")(AT), 1.4)
+    np.testing.assert_allclose(media.medium("cauchy(1.4)")(AT), 1.4)
     um2 = AT**2
-    np.testing.assert_allclose(
-        media_words.medium("sellmeier(1.1,8000)")(AT) ** 2, 1 + 1.1 * um2 / (um2 - 8000)
-    )
+    np.testing.assert_allclose(media.medium("sellmeier(1.1,8000)")(AT) ** 2, 1 + 1.1 * um2 / (um2 - 8000))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +93,7 @@ def test_a_call_fixes_them():
 )
 def test_calls_refused(text, message):
     with pytest.raises(UsageError, match=message):
-        media_words.medium(text)
+        media.medium(text)
 
 
 def test_models_by_name():
@@ -107,44 +105,44 @@ def test_models_by_name():
 
 def test_freeing_a_number_replaces_it():
     """n ± 0.5 but at least 1 where nothing is absorbed, k from 0 to 1, started where the number was."""
-    layer = media_words.medium("1.46", ["n", "k"])
+    layer = media.medium("1.46", ["n", "k"])
     assert isinstance(layer, Constant)
     assert free_part(layer.n) == pytest.approx((1.46, 1.0, 1.96))
     assert free_part(layer.k)[1:] == (0, 1)
-    assert free_part(media_words.medium("2.9+0.1j", ["n", "k"]).n) == pytest.approx((2.9, 2.4, 3.4))
-    assert media_words.medium("2.9+0.1j", ["k"]).k.start == 0.1
-    assert media_words.medium("2.9+0.1j", ["n"]).k == 0.1
-    assert free_part(media_words.medium("0.2+3j", ["n"]).n) == pytest.approx((0.2, 0.01, 0.7))
+    assert free_part(media.medium("2.9+0.1j", ["n", "k"]).n) == pytest.approx((2.9, 2.4, 3.4))
+    assert media.medium("2.9+0.1j", ["k"]).k.start == 0.1
+    assert media.medium("2.9+0.1j", ["n"]).k == 0.1
+    assert free_part(media.medium("0.2+3j", ["n"]).n) == pytest.approx((0.2, 0.01, 0.7))
 
 
 def test_own_bounds():
-    assert free_part(media_words.medium("1.46", ["n=1.3:1.7"]).n) == (1.46, 1.3, 1.7)
-    assert free_part(media_words.medium("1.2", ["n=1.3:1.7"]).n) == (1.3, 1.3, 1.7)
-    assert free_part(media_words.medium("1.46", ["k=0:0.01"]).k)[1:] == (0, 0.01)
-    cauchy = media_words.medium("cauchy(1.4,3000)", ["A=1.3:1.5"])
+    assert free_part(media.medium("1.46", ["n=1.3:1.7"]).n) == (1.46, 1.3, 1.7)
+    assert free_part(media.medium("1.2", ["n=1.3:1.7"]).n) == (1.3, 1.3, 1.7)
+    assert free_part(media.medium("1.46", ["k=0:0.01"]).k)[1:] == (0, 0.01)
+    cauchy = media.medium("cauchy(1.4,3000)", ["A=1.3:1.5"])
     assert free_part(cauchy.A)[1:] == (1.3, 1.5)
     assert cauchy.B == 3000
-    assert free_part(media_words.medium("cauchy(1.4)", ["C"]).C)[1:] == (-1e10, 1e10)
+    assert free_part(media.medium("cauchy(1.4)", ["C"]).C)[1:] == (-1e10, 1e10)
 
 
 def test_freeing_a_table_adds_a_constant():
     """As far as the sum stays at least 1."""
-    layer = media_words.medium("SiO2", ["n", "k"])
+    layer = media.medium("SiO2", ["n", "k"])
     assert isinstance(layer, Shifted)
     value, lower, upper = free_part(layer.n)
     assert (value, upper) == (0, 0.5)
     assert lower == pytest.approx(1 - 1.44, abs=0.01)
     assert free_part(layer.k)[1:] == (0, 1)
-    titania = media_words.medium("TiO2", ["n"])
+    titania = media.medium("TiO2", ["n"])
     assert free_part(titania.n) == (0, -0.5, 0.5)
-    gold = media_words.medium("Au", ["n"])  # below 1 as it is
+    gold = media.medium("Au", ["n"])  # below 1 as it is
     assert -0.5 < gold.n.lower < 0
-    assert free_part(media_words.medium("SiO2", ["n=0.01:0.1"]).n) == (0.01, 0.01, 0.1)
+    assert free_part(media.medium("SiO2", ["n=0.01:0.1"]).n) == (0.01, 0.01, 0.1)
 
 
 def test_an_index_with_a_decimal_comma():
     with pytest.raises(UsageError, match=r"an index has a decimal point: 1\.46"):
-        media_words.medium("1,46")
+        media.medium("1,46")
 
 
 @pytest.mark.parametrize(
@@ -160,22 +158,22 @@ def test_an_index_with_a_decimal_comma():
 )
 def test_freeing_refused(layer, item, message):
     with pytest.raises(UsageError, match=message):
-        media_words.medium(layer, [item])
+        media.medium(layer, [item])
 
 
 def test_scale_and_offset():
-    assert media_words.drift("free", "`scale`") == "free"
-    assert media_words.drift("slow", "`scale`") == "slow"
-    assert media_words.drift("0.98", "`scale`") == 0.98
+    assert media.drift("free", "`scale`") == "free"
+    assert media.drift("slow", "`scale`") == "slow"
+    assert media.drift("0.98", "`scale`") == 0.98
     with pytest.raises(UsageError, match="`scale` must be a number, not 'loose'"):
-        media_words.drift("loose", "`scale`")
+        media.drift("loose", "`scale`")
 
 
 def test_free_or_a_number():
     default = Free(0.0, 20.0, start=2.0, limits=(0.0, 50.0))
-    assert media_words.free_or_number("free", "`bandwidth`", default) is default
-    assert free_part(media_words.free_or_number("1:3", "`bandwidth`", default)) == (2, 1, 3)
-    assert media_words.free_or_number("4", "`bandwidth`", default) == 4
+    assert media.free_or_number("free", "`bandwidth`", default) is default
+    assert free_part(media.free_or_number("1:3", "`bandwidth`", default)) == (2, 1, 3)
+    assert media.free_or_number("4", "`bandwidth`", default) == 4
 
 
 @pytest.mark.parametrize(("name", "specs"), MODELS.items())
@@ -222,11 +220,11 @@ def limits_in(dispersion):
     ],
 )
 def test_only_default_bounds_may_be_widened(layer, free, limits):
-    assert limits_in(media_words.medium(layer, free)) == limits
+    assert limits_in(media.medium(layer, free)) == limits
 
 
 def test_a_shift_of_a_known_index_may_not_go_below_vacuum():
-    [(lower, upper)] = limits_in(media_words.medium("SiO2", ["n"]))
-    least = float(np.real(media_words.medium("SiO2")(np.linspace(250.0, 1700.0, 200))).min())
+    [(lower, upper)] = limits_in(media.medium("SiO2", ["n"]))
+    least = float(np.real(media.medium("SiO2")(np.linspace(250.0, 1700.0, 200))).min())
     assert lower == pytest.approx(1 - least, abs=1e-3)
     assert upper == 2.0
