@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
@@ -52,10 +52,6 @@ def test_standard_deviations(write):
     own = read_spectrum(write(f"nm,{NAMES},{names}", *COLUMNS, *errors))
     np.testing.assert_allclose(own.sigma[0], errors[::2], rtol=1e-8)
     np.testing.assert_allclose(own.delta_sigma[0], errors[1::2], rtol=1e-8)
-    with pytest.raises(DataError, match="of some of the columns only"):
-        read_spectrum(write(f"nm,{NAMES},sigma_psi_ane", *COLUMNS, 0.1))
-    with pytest.raises(DataError, match="is a standard deviation not above zero"):
-        read_spectrum(write(f"nm,{NAMES},sigma", *COLUMNS, 0.0))
 
 
 def test_one_noise_is_that_of_psi_and_the_same_across_it(write):
@@ -84,22 +80,6 @@ def test_impossible_values_name_their_place(write):
         Spectrum(NM, PSI[:, :1], "psi-delta", delta=DELTA[:, :1], ratios=("ane",))
     with pytest.raises(ValueError, match="`values`: expected 2 numbers per wavelength"):
         Spectrum(NM, PSI, SIGNAL, delta=DELTA, ratios=("ane", "aps"))
-
-
-def test_psi_and_delta_come_first(write):
-    path = write(f"nm,psi_deg,delta_deg,{NAMES}", 45.0, np.linspace(100, 170, 6), *COLUMNS)
-    assert read_spectrum(path).signal == "psi-delta"
-    assert read_spectrum(path, signal=SIGNAL).ratios == RATIOS
-    assert read_spectrum(path, elements=["aps"]).ratios == ("aps",)
-    with pytest.raises(UsageError, match='has generalised psi and delta, which contradicts `signal="R"`'):
-        read_spectrum(write(f"nm,{NAMES}", *COLUMNS), signal="R")
-
-
-def test_reflectance_beside_them_is_of_the_same_film(write):
-    found = read_spectra(write(f"nm,{NAMES},R", *COLUMNS, 0.3))
-    assert [one.signal for one in found] == [SIGNAL, "R"]
-    with pytest.raises(UsageError, match="has generalised psi and delta as well as R"):
-        read_spectrum(write(f"nm,{NAMES},R", *COLUMNS, 0.3))
 
 
 def test_repeats_are_averaged_on_the_spheres():
