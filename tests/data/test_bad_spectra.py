@@ -90,9 +90,10 @@ USAGE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("error", "row"), [*((DataError, row) for row in DATA), *((UsageError, row) for row in USAGE)]
-)
+ROWS = [*((DataError, row) for row in DATA), *((UsageError, row) for row in USAGE)]
+
+
+@pytest.mark.parametrize(("error", "row"), ROWS)
 def test_refused(write, refused, error, row):
     options, text, *parts = row
     refused(write(text), error, *parts, **options)
@@ -145,10 +146,7 @@ def test_remedies_for_a_whole_axis(write, nm, remedy, refused):
     refused(write(text), DataError, "within one angle", remedy)
 
 
-@pytest.mark.parametrize(
-    ("header", "row"),
-    [("R", "-0.06"), ("R (%)", "-6"), ("R,sigma", "-0.02,0.001"), ("R,sigma", "-0.11,0.02")],
-)
+@pytest.mark.parametrize(("header", "row"), [("R", "-0.06"), ("R (%)", "-6"), ("R,sigma", "-0.11,0.02")])
 def test_negative_beyond_noise(write, header, row, refused):
     good = "0.1,0.001" if "sigma" in header else "0.1"
     path = write(f"wavelength,{header}\n400,{good}\n500,{row}\n600,{good}\n")

@@ -33,9 +33,8 @@ def test_one_analyser_for_all(write_columns):
 
 def test_noise_may_take_the_contrast_above_one(write_columns):
     """At Δ = 180 it does so every other time; α, and with it Ψ, is kept."""
-    spectrum = read_spectrum(
-        write_columns("wl,alpha,beta", NM, [0.6, 0.6, 1.0], [-0.81, -0.8, -0.01]), analyser=45
-    )
+    path = write_columns("wl,alpha,beta", NM, [0.6, 0.6, 1.0], [-0.81, -0.8, -0.01])
+    spectrum = read_spectrum(path, analyser=45)
     np.testing.assert_allclose(spectrum.values, np.rad2deg(np.arctan([2.0, 2.0, np.inf])), rtol=1e-12)
     np.testing.assert_allclose(spectrum.delta, 180.0, atol=1e-5)
     assert any("at 2 points whose contrast is above 1" in note for note in spectrum.notes)

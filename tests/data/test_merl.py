@@ -87,9 +87,8 @@ def test_what_is_left_out_is_counted(numbered):
     number = np.round(read.values[:, 0]).astype(int)
     valid = np.flatnonzero(above & ~invalid)
     for axis, size in enumerate(SHAPE):
-        shares = [
-            np.bincount(np.unravel_index(n, SHAPE)[axis], minlength=size) / n.size for n in (number, valid)
-        ]
+        both = (np.unravel_index(n, SHAPE)[axis] for n in (number, valid))
+        shares = [np.bincount(cells, minlength=size) / cells.size for cells in both]
         assert np.abs(np.cumsum(shares[0] - shares[1])).max() < 1.63 / np.sqrt(len(read))
 
 

@@ -61,13 +61,11 @@ def test_what_is_written_is_read_again(place, parts):
 
 
 def test_a_csv_says_what_was_read(write):
-    path = write(
-        "theta_i_deg;phi_i;theta_o (deg);phi_o;R (1/sr);G;B;value_cos;sigma\n30;0;40;180;1;2;3;9;0.5\n"
-    )
+    path = write("theta_i_deg;phi_i;theta_o (deg);phi_o;R (1/sr);G;B;x;sigma\n30;0;40;180;1;2;3;9;0.5\n")
     read = pl.read_brdf_samples(path)
     assert_read(read, values=[[1, 2, 3]], sigma=[[0.5, 0.5, 0.5]])
     assert (read.theta_o[0], read.phi_o[0], read.lines[0]) == (40, 180, 2)
-    assert "ignored: 'value_cos'" in read.notes
+    assert "ignored: 'x'" in read.notes
     assert str(read) == f"{path}: 1 samples of R, G, B"
     assert not read.values.flags.writeable
 
@@ -231,9 +229,8 @@ def test_alta_without_its_meaning_is_known_by_its_columns(write, values, names):
 
 
 def test_samples_near_grazing_are_left_out(write, refused):
-    path = write(
-        "theta_i,phi_i,theta_o,phi_o,value\n10,0,20,180,1\n80,0,20,180,2\n20,0,75,180,3\n60,0,5,0,4\n"
-    )
+    rows = "10,0,20,180,1\n80,0,20,180,2\n20,0,75,180,3\n60,0,5,0,4\n"
+    path = write(f"theta_i,phi_i,theta_o,phi_o,value\n{rows}")
     read = read_brdf_samples(path, max_theta=75)
     assert read.values.ravel().tolist() == [1, 3, 4]
     assert read.notes[-1] == "left out: 1 samples more than 75 degrees from the normal"
@@ -283,9 +280,8 @@ def test_files_beside_the_repository(shared_data, tmp_path, name):
     expected = np.loadtxt(path, delimiter=",", skiprows=1)
     read = read_brdf_samples(path)
     assert len(read) == MEASURED[name]
-    np.testing.assert_array_equal(
-        np.stack([read.theta_i, read.phi_i, read.theta_o, read.phi_o], 1), expected[:, :4]
-    )
+    directions = np.stack([read.theta_i, read.phi_i, read.theta_o, read.phi_o], 1)
+    np.testing.assert_array_equal(directions, expected[:, :4])
     np.testing.assert_array_equal(read.values, expected[:, 4:7])
     if name.startswith("alta"):  # its raw column as ALTA would write it gives the same BRDF
         alta = tmp_path / "tape.alta"

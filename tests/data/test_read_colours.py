@@ -56,9 +56,8 @@ def test_division_by_a_white_in_linear_light(photo):
     expected = coded(np.minimum(linear(pixels[10, 10]) / linear(WHITE), 1))
     np.testing.assert_allclose(film.values[0], expected, atol=2e-4)
     assert film.sigma is None  # one pixel has no scatter
-    film = read_colours(
-        photo(pixels), region=[8, 8, 5, 5], white="26,16,4,4", space="rgb", gamma=2.2, noise=0.01
-    )
+    about = {"space": "rgb", "gamma": 2.2, "noise": 0.01}
+    film = read_colours(photo(pixels), region=[8, 8, 5, 5], white="26,16,4,4", **about)
     inside = (pixels[8:13, 8:13].reshape(-1, 3) / 255.0) ** 2.2
     expected = (inside.mean(axis=0) / (WHITE / 255.0) ** 2.2) ** (1 / 2.2)
     np.testing.assert_allclose(film.values[0], expected, atol=1e-5)
@@ -103,9 +102,8 @@ def test_floating_point_values_are_taken_as_coded_and_the_note_says_so(tmp_path)
     [note] = [note for note in assumed.notes if "floating-point" in note]
     assert 'coded in sRGB: give `space="rgb"`' in note
     assert not any("floating-point" in note for note in (*stated.notes, *linear.notes))
-    np.testing.assert_allclose(
-        linear.values[0], PIXELS[6:9, 6:9].reshape(-1, 3).mean(axis=0) / 255, atol=1e-6
-    )
+    inside = PIXELS[6:9, 6:9].reshape(-1, 3)
+    np.testing.assert_allclose(linear.values[0], inside.mean(axis=0) / 255, atol=1e-6)
 
 
 @pytest.fixture
@@ -115,9 +113,8 @@ def camera(tmp_path):
     lamp = 1 + (nm - 400) / 320
     rows = zip(nm, *bands.T, lamp, strict=True)
     table = [",".join(f"{x:.8g}" for x in row) for row in rows]
-    (tmp_path / "camera.csv").write_text(
-        "\n".join(["wavelength_nm,R,G,B", *(row.rpartition(",")[0] for row in table)])
-    )
+    bare = [row.rpartition(",")[0] for row in table]
+    (tmp_path / "camera.csv").write_text("\n".join(["wavelength_nm,R,G,B", *bare]))
     (tmp_path / "lamp.csv").write_text("wavelength_nm,power\n380,0.9375\n780,2.1875\n")
     (tmp_path / "c.csv").write_text("angle_deg,R,G,B\n0,.2,.3,.4\n")
     return tmp_path, nm, bands, lamp
@@ -125,9 +122,8 @@ def camera(tmp_path):
 
 def test_a_camera_and_its_lamp_from_files(camera):
     folder, nm, bands, lamp = camera
-    film = pl.read_colours(
-        folder / "c.csv", space="rgb", sensitivities=folder / "camera.csv", lamp=folder / "lamp.csv"
-    )
+    tables = {"sensitivities": folder / "camera.csv", "lamp": folder / "lamp.csv"}
+    film = pl.read_colours(folder / "c.csv", space="rgb", **tables)
     at, weights = film.sensor
     fine = np.linspace(400, 720, 32_001)
     seen = np.stack([np.interp(fine, nm, band) for band in bands.T]) * np.interp(fine, nm, lamp)

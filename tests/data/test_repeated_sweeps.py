@@ -37,9 +37,7 @@ def test_the_mean_of_complete_sweeps(write, order):
     assert found.sigma is None
     pooled = np.sqrt(np.mean(SWEEPS.var(axis=0, ddof=1)))
     assert repeatability(found.sweeps) == pytest.approx(pooled)
-    assert (
-        found.notes[-1] == f"3 sweeps over the same wavelengths, averaged; a point scatters by {pooled:.2g}"
-    )
+    assert found.notes[-1].endswith(f"averaged; a point scatters by {pooled:.2g}")
 
 
 def test_standard_deviations_and_ranges_follow(tmp_path):
@@ -135,9 +133,8 @@ def test_noise_is_no_difference(tmp_path):
 
 
 def test_sweeps_of_raw_counts(write):
-    path = write(
-        "wavelength_nm,counts\n" + rows(NM, 1000 * SWEEPS[0]) + rows(NM, 1000 * SWEEPS[1]), "counts.csv"
-    )
+    text = rows(NM, 1000 * SWEEPS[0]) + rows(NM, 1000 * SWEEPS[1])
+    path = write(f"wavelength_nm,counts\n{text}", "counts.csv")
     reference = pl.Spectrum(NM, np.full(NM.size, 2000.0), "counts")
     found = reflectance_from_counts(read_counts(path), reference, np.full(NM.size, 0.5), noise=0.002)
     np.testing.assert_allclose(found.values, 0.25 * SWEEPS[:2].mean(axis=0), atol=1e-9)

@@ -27,9 +27,8 @@ SIGNALS = {
 @pytest.mark.parametrize("names", SIGNALS)
 def test_several_azimuths_are_one_measurement(write_columns, names, tmp_path):
     """An anisotropic sample has another spectrum at each azimuth: rows at one wavelength are no repeats."""
-    spectrum = read_spectrum(
-        write_columns(f"nm,{names},angle_deg,azimuth_deg", NM, *SIGNALS[names], ANGLE, AZIMUTH)
-    )
+    header = f"nm,{names},angle_deg,azimuth_deg"
+    spectrum = read_spectrum(write_columns(header, NM, *SIGNALS[names], ANGLE, AZIMUTH))
     assert not spectrum.sweeps
     assert len(spectrum) == 24
     assert "'azimuth_deg' read as the azimuth of the sample in degrees" in spectrum.notes

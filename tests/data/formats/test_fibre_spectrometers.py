@@ -41,15 +41,12 @@ def test_avantes_facts(write):
 
 def test_absorbance(write):
     text = AVASOFT_7.replace("Reflectance", "Absorbance").replace("[%]", "[A.U.]")
-    values = read_spectrum(
-        write(text.replace("50.0", "0.5").replace("25.0", "1.0").replace("12.5", "2.0"))
-    ).values
+    text = text.replace("50.0", "0.5").replace("25.0", "1.0").replace("12.5", "2.0")
+    values = read_spectrum(write(text)).values
     np.testing.assert_allclose(values, [10**-0.5, 0.1, 0.01])
 
 
-@pytest.mark.parametrize(
-    "names", ["Welle;Probe;Dunkel;Referenz;Reflexion", "Wave;Échantillon;Noir;Réf;Réflexion"]
-)
+@pytest.mark.parametrize("names", ["Welle;Probe;Dunkel;Referenz;Reflexion", "Wave;Éch;Noir;Réf;Réflexion"])
 def test_names_of_other_languages(write, names):
     text = AVASOFT_7.replace("Wave   ;Sample   ;Dark     ;Reference;Reflectance", names)
     assert_read(read_spectrum(write(text)), signal="R", values=[0.5, 0.25, 0.125])
@@ -61,9 +58,8 @@ def test_counts_alone(write, refused):
     spectrum = read_spectrum(write(COUNTS), signal="T")
     np.testing.assert_allclose(spectrum.values, [0.5, 0.25, 0.125], rtol=1e-15)
     assert read_counts(write(COUNTS)).values[0] == 110
-    assert [
-        read_counts_beside(write(COUNTS), f"{part} counts").values[2] for part in ("reference", "dark")
-    ] == [100, 20]
+    beside = [read_counts_beside(write(COUNTS), f"{part} counts") for part in ("reference", "dark")]
+    assert [counts.values[2] for counts in beside] == [100, 20]
 
 
 @pytest.mark.parametrize(

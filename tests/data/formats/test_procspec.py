@@ -81,9 +81,7 @@ def test_several_spectra(write):
     np.testing.assert_allclose(second.values, [0.01, 0.02, 0.03])
 
 
-ENTITIES = (
-    '<!DOCTYPE a [<!ENTITY x "xxxxxxxxxx"><!ENTITY y "&x;&x;&x;&x;&x;&x;&x;&x;"><!ENTITY z "&y;&y;&y;&y;">]>'
-)
+ENTITIES = '<!DOCTYPE a [<!ENTITY x "xxxxxxxxxx"><!ENTITY y "&x;&x;&x;&x;&x;&x;&x;"><!ENTITY z "&y;&y;">]>'
 OUTSIDE = '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/hostname">]>'
 
 

@@ -161,9 +161,7 @@ def test_spectra_are_taken_at_wavelengths(tmp_path):
     rows = load_rgl(path).evaluate(light, viewer)
     expected = [np.interp([625.0, 500.0, 437.5], WAVELENGTHS, row) for row in rows]
     np.testing.assert_allclose(all_three.values, expected, rtol=1e-5)
-    with pytest.raises(
-        DataError, match="go from 400 to 700 nm; choose one or three `wavelengths` there, not 900"
-    ):
+    with pytest.raises(DataError, match=r"go from 400 to 700 nm; .* `wavelengths` there, not 900"):
         read_brdf_samples(path, wavelengths=[900.0])
 
 

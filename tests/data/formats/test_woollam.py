@@ -41,16 +41,13 @@ def test_units_of_the_axis(write, unit, first, second):
 
 def test_a_file_for_wvase_whose_angle_has_no_name(write):
     rows = "658.0\t55.0\t27.7\t170.2\n658.0\t60.0\t23.25\t166.5\n"
-    assert_read(
-        read_spectrum(write(f"brush\nnm\t\tPsi\tDelta\n{rows}")), angle=[55, 60], delta=[170.2, 166.5]
-    )
+    spectrum = read_spectrum(write(f"brush\nnm\t\tPsi\tDelta\n{rows}"))
+    assert_read(spectrum, angle=[55, 60], delta=[170.2, 166.5])
 
 
 def test_an_axis_in_energies_and_depolarisation_in_percent(write):
     spectrum = read_spectrum(write(COMPLETE_EASE))
-    assert_read(
-        spectrum, wavelength=1239.8419843320026 / np.array([3, 2]), delta=[170.25, 265.5], lines=[5, 6]
-    )
+    assert_read(spectrum, wavelength=1239.8419843320026 / np.r_[3, 2], delta=[170.25, 265.5], lines=[5, 6])
     assert_read(spectrum, depolarisation=[0.015, -0.0025], depolarisation_sigma=[0.001, 0.002])
 
 
