@@ -26,7 +26,7 @@ from pellicle.colour import srgb
 from pellicle.rendering import gltf as gltf_formula
 from pellicle.rendering import mitsuba_plugin
 from pellicle.rendering.appearance import appearance
-from pellicle.rendering.mitsuba_tables import lookup
+from pellicle.rendering.mitsuba import lookup
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pellicle.rendering.targets import MODULES
+from pellicle.rendering.targets import TARGETS
 
 pytest.importorskip("pygltflib")
 
@@ -52,4 +52,4 @@ def test_a_fit_is_exported_with_its_values(pellicle, tmp_path):
 
 def test_the_help_names_every_renderer(pellicle):
     words = pellicle("export", "--help").out.replace(",", " ").replace(".", " ").split()
-    assert set(MODULES) <= set(words)
+    assert set(TARGETS) <= set(words)

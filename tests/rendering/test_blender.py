@@ -13,7 +13,7 @@ from PIL import Image
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.rendering.effective import physical
+from pellicle.rendering.formula import physical
 
 STEEL = pl.Scene(pl.Layer(2.9, 40.0), 2.7 + 2.8j)
 SOAP = pl.Scene(pl.Layer(1.33, pl.Free(0, 600)), 1.0)

@@ -9,7 +9,7 @@ from pellicle.colour.observers import columns
 from pellicle.optics.pair import Pair
 from pellicle.rendering.appearance import appearance
 from pellicle.rendering.blender import DIELECTRIC, METAL, cycles_formula, film
-from pellicle.rendering.effective import effective, physical
+from pellicle.rendering.formula import effective, physical
 
 COMPILED = jax.jit(film)
 COSINE = np.cos(np.deg2rad([0.0, 45.0, 75.0]))

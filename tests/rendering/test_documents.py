@@ -7,9 +7,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.rendering.appearance import appearance
-from pellicle.rendering.effective import physical
-from pellicle.rendering.material import Material, Solved
-from pellicle.rendering.targets import target
+from pellicle.rendering.formula import physical
+from pellicle.rendering.targets import Material, Solved, target
 
 MaterialX = pytest.importorskip("MaterialX")
 pxr = pytest.importorskip("pxr")

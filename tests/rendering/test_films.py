@@ -7,7 +7,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
-from pellicle.rendering.films import film_of, with_values
+from pellicle.rendering.export import film_of, with_values
 from pellicle.scene.free import start_values
 
 NM = np.array([450.0, 550.0, 650.0])

@@ -9,7 +9,7 @@ import pellicle as pl
 from pellicle.colour import film_colour
 from pellicle.rendering import gltf
 from pellicle.rendering.appearance import ANGLES, appearance
-from pellicle.rendering.effective import effective, error, physical
+from pellicle.rendering.formula import effective, error, physical
 from pellicle.rendering.gltf import GLTF
 
 TO_REC709 = [

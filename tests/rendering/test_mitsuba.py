@@ -11,8 +11,7 @@ import pytest
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
-from pellicle.rendering.mitsuba import ALPHA
-from pellicle.rendering.mitsuba_tables import write_surface
+from pellicle.rendering.mitsuba import ALPHA, write_surface
 
 mi = pytest.importorskip("mitsuba")
 

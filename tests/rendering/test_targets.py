@@ -5,10 +5,10 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.rendering import targets
-from pellicle.rendering.targets import MODULES, Target, target
+from pellicle.rendering.targets import TARGETS, Target, target
 
 
-@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("name", TARGETS)
 def test_a_target_bears_its_name(name):
     found = target(name, package_check=False)
     assert found.name == name
@@ -17,7 +17,7 @@ def test_a_target_bears_its_name(name):
 
 
 def test_the_documentation_of_python_names_every_target():
-    assert [name for name in MODULES if f'"{name}"' not in (pl.export.__doc__ or "")] == []
+    assert [name for name in TARGETS if f'"{name}"' not in (pl.export.__doc__ or "")] == []
 
 
 def test_an_absent_package_is_named_with_its_extra(monkeypatch):

@@ -72,7 +72,7 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
             raise UsageError("--recipe goes with the result.json of a fit; give the recipe alone")
         return read_recipe(film).scene()
     record = _record(film)
-    from pellicle.rendering.films import with_values
+    from pellicle.rendering.export import with_values
 
     values = {name: each["value"] for name, each in record["parameters"].items()}
     try:

@@ -79,7 +79,10 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     no data between 380 and 730 nm.
     """
     position = varied_layer(scene, layer)
-    scene = _in_reflection(insert(scene, start_values(scene)))
+    scene = insert(scene, start_values(scene))
+    # without what belongs to the measurement, not to the sample
+    of_sample = Light(), Instrument(thickness_spread=scene.instrument.thickness_spread)
+    scene = eqx.tree_at(lambda s: (s.light, s.instrument), scene, of_sample)
     film: Any = scene.layers[position]
     nm = np.unique(np.asarray(film.thickness if thickness is None else thickness, float))
     # without the others' names, so that it is found by its own
@@ -109,14 +112,6 @@ def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
     """n + ik at wavelengths in nm."""
     re, im = parts(known_index(medium, wavelength))
     return np.broadcast_to(re + (0j if im is None else 1j * np.asarray(im)), wavelength.shape)
-
-
-def _in_reflection(scene: Scene) -> Scene:
-    """The scene without what belongs to the measurement, not to the sample."""
-    spread = scene.instrument.thickness_spread
-    return eqx.tree_at(
-        lambda s: (s.light, s.instrument), scene, (Light(), Instrument(thickness_spread=spread))
-    )
 
 
 def _notes(scene: Scene, film: Layer) -> tuple[str, ...]:

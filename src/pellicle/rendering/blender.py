@@ -36,8 +36,7 @@ from pellicle.optics.pair import Pair, abs2, real
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers
 from pellicle.rendering.gltf import XYZ_TO_REC709
-from pellicle.rendering.material import Material
-from pellicle.rendering.targets import Target
+from pellicle.rendering.targets import Material, Target, write_grey_image
 
 ORDERS = 3
 _POINTS = 1022
@@ -95,35 +94,25 @@ def film(index: Any, base: Pair, thickness: Any, cosine: Any) -> Float[Array, ".
     return jnp.clip(total, 0.0, 1.0)
 
 
-def _on_metal(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
-    base = Pair(jnp.asarray(numbers["base_ior"]), jnp.asarray(numbers["base_extinction"]))
-    return film(jnp.asarray(numbers["ior"]), base, *jnp.broadcast_arrays(thickness, cosine))
-
-
-def _on_dielectric(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
-    base = jnp.full(3, 1.0) * jnp.asarray(numbers["base_ior"])
-    return film(
-        jnp.asarray(numbers["ior"]), Pair(base, jnp.zeros(3)), *jnp.broadcast_arrays(thickness, cosine)
-    )
-
-
-def _metal(look: Appearance) -> Numbers:
-    return {"ior": look.index, "base_ior": np.real(look.base), "base_extinction": np.imag(look.base)}
-
-
-def _dielectric(look: Appearance) -> Numbers:
-    return {"ior": look.index, "base_ior": look.base[1].real}
+def _colour(numbers: Numbers, thickness: Any, cosine: Any) -> Float[Array, "... 3"]:
+    """Linear sRGB of a film on a metal, or on a dielectric, whose base has no extinction."""
+    n = jnp.broadcast_to(jnp.asarray(numbers["base_ior"]), 3)
+    k = jnp.asarray(numbers.get("base_extinction", jnp.zeros(3)))
+    return film(jnp.asarray(numbers["ior"]), Pair(n, k), *jnp.broadcast_arrays(thickness, cosine))
 
 
 _FILM = Key("ior", 1.0, 4.0)
 METAL = Formula(
     "film of Cycles 5 on a metal",
     (_FILM, Key("base_ior", 0.05, 8.0, 3), Key("base_extinction", 0.0, 10.0, 3)),
-    _on_metal,
-    _metal,
+    _colour,
+    lambda look: {"ior": look.index, "base_ior": np.real(look.base), "base_extinction": np.imag(look.base)},
 )
 DIELECTRIC = Formula(
-    "film of Cycles 5 on a dielectric", (_FILM, Key("base_ior", 1.0, 4.0)), _on_dielectric, _dielectric
+    "film of Cycles 5 on a dielectric",
+    (_FILM, Key("base_ior", 1.0, 4.0)),
+    _colour,
+    lambda look: {"ior": look.index, "base_ior": look.base[1].real},
 )
 
 
@@ -146,7 +135,8 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     written = [script]
     write_text(script, script_text(material, path.stem))
     if material.thickness_map is not None:
-        written.append(_write_image(path.with_name(f"{path.stem}_thickness.png"), material.thickness_map))
+        image = path.with_name(f"{path.stem}_thickness.png")
+        written.append(write_grey_image(image, material.thickness_map))
     if path != script:
         written.insert(0, _save(script, path))
     return tuple(written)
@@ -168,17 +158,6 @@ def script_text(material: Material, stem: str) -> str:
     body = [f"{key} = {pformat(value, width=100, sort_dicts=False)}" for key, value in constants.items()]
     template = files("pellicle.rendering").joinpath("blender_script.txt").read_text("utf-8")
     return template.replace("# ERRORS", fill(heading, 100), 1).replace("# CONSTANTS", "\n".join(body), 1)
-
-
-def _write_image(path: Path, thickness: np.ndarray) -> Path:
-    """Write a grey image of 16 bits from the least thickness (0) to the largest (65535)."""
-    from PIL import Image  # a requirement of Matplotlib
-
-    span = np.ptp(thickness)
-    share = (thickness - thickness.min()) / (span if span > 0 else 1.0)
-    with replacing(path) as temporary:
-        Image.fromarray(np.round(65535 * share).astype(np.uint16)).save(temporary, format="PNG")
-    return path
 
 
 def _save(script: Path, path: Path) -> Path:

@@ -22,8 +22,7 @@ import numpy as np
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers, series
-from pellicle.rendering.material import Material
-from pellicle.rendering.targets import Target
+from pellicle.rendering.targets import Material, Target, share_of_range
 
 XYZ_TO_REC709 = np.array(
     [
@@ -116,10 +115,6 @@ def sphere_mesh(rows: int = 48, columns: int = 96) -> Mesh:
     return Mesh(positions, texture, np.concatenate([first, second]))
 
 
-_FLOAT, _INDEX = 5126, 5123
-_VERTICES, _ELEMENTS = 34962, 34963
-
-
 def write(path: Path, material: Material) -> tuple[Path, ...]:
     """Write a `.gltf` with its buffers inside, or a `.glb`."""
     import pygltflib
@@ -163,11 +158,17 @@ def extensions(material: Material) -> dict[str, dict[str, Any]]:
 
 def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> bytes:
     """Add the material, and return the image of its thickness for the buffer."""
+    from PIL import Image  # a requirement of Matplotlib
+
     look, added = material.look, extensions(material)
     colour = np.asarray(material.drawn.chosen.numbers["base"]).tolist() if look.metallic else [1.0] * 3
     image = b""
     if material.thickness_map is not None:
-        image = _thickness_image(material.thickness_map)
+        pixels = np.zeros((*material.thickness_map.shape, 3), np.uint8)
+        pixels[..., 1] = np.round(255 * share_of_range(material.thickness_map))  # in the green channel
+        file = BytesIO()
+        Image.fromarray(pixels).save(file, format="PNG")
+        image = file.getvalue()
         model.bufferViews.append(gltf.BufferView(buffer=0, byteOffset=offset, byteLength=len(image)))
         model.images = [gltf.Image(bufferView=len(model.bufferViews) - 1, mimeType="image/png")]
         model.samplers = [gltf.Sampler(magFilter=9729, minFilter=9987, wrapS=10497, wrapT=33071)]
@@ -189,30 +190,18 @@ def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> byt
     return image
 
 
-def _thickness_image(thickness: np.ndarray) -> bytes:
-    """PNG whose green channel is the thickness between the least (0) and the largest (255)."""
-    from PIL import Image  # a requirement of Matplotlib
-
-    span = np.ptp(thickness)
-    share = (thickness - thickness.min()) / (span if span > 0 else 1.0)
-    pixels = np.zeros((*thickness.shape, 3), np.uint8)
-    pixels[..., 1] = np.round(255 * share)
-    written = BytesIO()
-    Image.fromarray(pixels).save(written, format="PNG")
-    return written.getvalue()
-
-
 def _add_sphere(model: Any, gltf: Any) -> bytes:
     """Add a sphere of radius 1, and return its arrays for the buffer."""
     mesh, blob = sphere_mesh(), b""
+    vertices = gltf.FLOAT, "<f4", gltf.ARRAY_BUFFER
     arrays = (
-        (mesh.positions, "VEC3", _FLOAT, _VERTICES),
-        (mesh.positions, "VEC3", _FLOAT, _VERTICES),  # normals of the unit sphere
-        (mesh.texture, "VEC2", _FLOAT, _VERTICES),
-        (mesh.triangles.reshape(-1), "SCALAR", _INDEX, _ELEMENTS),
+        (mesh.positions, "VEC3", *vertices),
+        (mesh.positions, "VEC3", *vertices),  # normals of the unit sphere
+        (mesh.texture, "VEC2", *vertices),
+        (mesh.triangles.reshape(-1), "SCALAR", gltf.UNSIGNED_SHORT, "<u2", gltf.ELEMENT_ARRAY_BUFFER),
     )
-    for number, (array, kind, component, use) in enumerate(arrays):
-        content = array.astype("<u2" if component == _INDEX else "<f4").tobytes()
+    for number, (array, kind, component, dtype, use) in enumerate(arrays):
+        content = array.astype(dtype).tobytes()
         model.bufferViews.append(
             gltf.BufferView(buffer=0, byteOffset=len(blob), byteLength=len(content), target=use)
         )
@@ -229,8 +218,4 @@ def _add_sphere(model: Any, gltf: Any) -> bytes:
     return blob
 
 
-def _formula(look: Appearance) -> Any:
-    return GLTF
-
-
-TARGET = Target("gltf", "glTF", (".gltf", ".glb"), ("pygltflib",), _formula, write, takes_map=True)
+TARGET = Target("gltf", "glTF", (".gltf", ".glb"), ("pygltflib",), lambda look: GLTF, write, takes_map=True)

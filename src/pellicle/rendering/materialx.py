@@ -1,8 +1,9 @@
-"""MaterialX 1.39: a film on a conductor or a dielectric, and the same as a Standard Surface.
+"""MaterialX 1.39 and OpenPBR 1.1: a film on a conductor or a dielectric, and as a Standard Surface.
 
 Thicknesses are in nm. A metal has its n and k per channel, which Standard Surface writes as the colours of
 O. Gulbrandsen (2014, JCGT 3(4), 64), of which MaterialX computes n and k again. Both sets of numbers are in
-the attribute `pellicle` of the material.
+the attribute `pellicle` of the material. OpenPBR has a document of its own, of `open_pbr_surface`: its metals
+have no complex index, but a reflectance at normal incidence and near 82 degrees.
 
 The film colour is Belcour and Barla's formula, with polarisation and a complex base per channel. It is
 `mx_fresnel_airy` of MaterialX 1.39's hardware shaders, which OpenPBR and Standard Surface share. The wave of
@@ -23,11 +24,9 @@ import numpy as np
 
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
-from pellicle.rendering.effective import ColourError
-from pellicle.rendering.effective import error as colour_error
-from pellicle.rendering.formula import Formula, Key, Numbers, series
-from pellicle.rendering.material import Material
-from pellicle.rendering.targets import Target
+from pellicle.rendering.formula import ColourError, Formula, Key, Numbers, series
+from pellicle.rendering.formula import error as colour_error
+from pellicle.rendering.targets import Material, Target
 
 XYZ_TO_RGB = np.array(
     [
@@ -134,14 +133,6 @@ def schlick(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
     return bare + numbers["weight"] * (with_film - bare)
 
 
-def _physical_conductor(look: Appearance) -> Numbers:
-    return {"ior": look.index, "n": np.real(look.base), "k": np.imag(look.base)}
-
-
-def _physical_dielectric(look: Appearance) -> Numbers:
-    return {"ior": look.index, "base": float(np.real(look.base)[1]), "tint": np.ones(3)}
-
-
 def _physical_metal(look: Appearance) -> Numbers:
     """F0, and F82 relative to Schlick's, of the bare base."""
     at = 1 / 7
@@ -156,13 +147,13 @@ CONDUCTOR = Formula(
     "MaterialX's conductor with a film",
     (_FILM, Key("n", 0.05, 8.0, 3), Key("k", 0.0, 8.0, 3)),
     conductor,
-    _physical_conductor,
+    lambda look: {"ior": look.index, "n": np.real(look.base), "k": np.imag(look.base)},
 )
 DIELECTRIC = Formula(
     "MaterialX's dielectric with a film",
     (_FILM, Key("base", 1.0, 4.0), Key("tint", 0.0, 1.0, 3)),
     dielectric,
-    _physical_dielectric,
+    lambda look: {"ior": look.index, "base": float(look.base[1].real), "tint": np.ones(3)},
 )
 METAL = Formula(
     "OpenPBR's metal with a film",
@@ -318,6 +309,39 @@ def standard_surface_error(material: Material) -> ColourError:
     return colour_error(drawn.formula, look, {**drawn.chosen.numbers, "n": n, "k": k}, drawn.chosen.scale)
 
 
+def write_open_pbr(path: Path, material: Material) -> tuple[Path, ...]:
+    """Write a document with one material, an `open_pbr_surface`."""
+    document = new_document()
+    surface = document.addNode("open_pbr_surface", "film_open_pbr", "surfaceshader")
+    set_inputs(surface, open_pbr(material))
+    add_material(document, surface, material, material.drawn.chosen.error)
+    return save(document, path)
+
+
+def open_pbr(material: Material) -> dict[str, tuple[str, Any]]:
+    """Inputs of an OpenPBR surface, by name as type and value; its thickness is in µm."""
+    solution, look = material.drawn.chosen, material.look
+    numbers = solution.numbers
+    values: dict[str, tuple[str, Any]] = {
+        "specular_roughness": ("float", float(np.sqrt(look.roughness))),  # squared to GGX's α
+        "thin_film_weight": ("float", float(numbers.get("weight", 1.0))),
+        "thin_film_thickness": ("float", 1e-3 * solution.scale * material.thickness),
+        "thin_film_ior": ("float", float(numbers["ior"])),
+    }
+    if look.metallic:
+        return values | {
+            "base_color": ("color3", np.asarray(numbers["base"]).tolist()),
+            "base_metalness": ("float", 1.0),
+            "specular_color": ("color3", np.asarray(numbers["edge"]).tolist()),
+        }
+    return values | {
+        "base_weight": ("float", 0.0),
+        "specular_color": ("color3", np.asarray(numbers["tint"]).tolist()),
+        "specular_ior": ("float", float(numbers["base"])),
+        "transmission_weight": ("float", 1.0),
+    }
+
+
 def _list(value: Any) -> list[float]:
     return np.broadcast_to(np.asarray(value, float), 3).tolist()
 
@@ -328,3 +352,4 @@ def _library() -> Any:
 
 
 TARGET = Target("materialx", "MaterialX", (".mtlx",), ("MaterialX",), formula, write)
+OPEN_PBR = Target("openpbr", "OpenPBR", (".mtlx",), ("MaterialX",), open_pbr_formula, write_open_pbr)

@@ -13,7 +13,7 @@ from pellicle.accuracy.colour_methods import Films, compiled, one_film
 from pellicle.accuracy.registry import Method
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.rendering.appearance import appearance
-from pellicle.rendering.effective import effective, physical
+from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import target
 from pellicle.scene.film import Scene
 from pellicle.scene.layers import Layer

@@ -1,18 +1,115 @@
-"""Formats and renderers that a film can be exported to, one module each.
+"""Formats and renderers that a film can be exported to, and the material that they write.
 
-A module has a `TARGET`. To add one, write it and add its name to `MODULES`.
+A module has a `TARGET`. To add one, write it and add its place to `TARGETS`.
 """
 
 from collections.abc import Callable
-from importlib import import_module
+from dataclasses import dataclass
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
+from pkgutil import resolve_name
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
 
 from pellicle.errors import UsageError, did_you_mean, install_command
-from pellicle.rendering.appearance import Appearance
-from pellicle.rendering.formula import Formula
-from pellicle.rendering.material import Material
+from pellicle.files import replacing
+from pellicle.rendering.appearance import ANGLES, Appearance
+from pellicle.rendering.formula import Formula, Solution
+
+SCHEMA = "pellicle.export/1"
+SETS = ("effective", "physical")
+"""Sets of numbers: solved for the exact colours, and those of the film as they are."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A renderer's formula with both sets of numbers of a film; `used` names the one that is drawn."""
+
+    formula: Formula
+    physical: Solution
+    effective: Solution
+    used: str
+
+    @property
+    def chosen(self) -> Solution:
+        """The set that is drawn."""
+        return self.effective if self.used == "effective" else self.physical
+
+    @property
+    def sets(self) -> dict[str, Solution]:
+        """Both sets by name."""
+        return {"effective": self.effective, "physical": self.physical}
+
+
+@dataclass(frozen=True)
+class Material:
+    """A film for a renderer.
+
+    `solved` is None for a target without a formula of its own, which tabulates the exact colours.
+    `thickness_map` (rows, columns) is in nm, None for an even film.
+    """
+
+    name: str
+    look: Appearance
+    solved: Solved | None
+    thickness_map: np.ndarray | None = None
+
+    @property
+    def thickness(self) -> float:
+        """Thickness in nm: the largest of an uneven film."""
+        return float(self.look.thickness[-1])
+
+    @property
+    def drawn(self) -> Solved:
+        """The solved formula. Raises TypeError for a target that has none."""
+        if self.solved is None:
+            raise TypeError("this target tabulates the exact colours and has no formula")
+        return self.solved
+
+    def record(self) -> dict[str, Any]:
+        """The sets of numbers with their errors, as JSON: for metadata, and beside the file."""
+        entries: dict[str, Any] = {
+            "schema": SCHEMA,
+            "name": self.name,
+            "thickness_nm": [float(x) for x in (self.look.thickness[0], self.look.thickness[-1])],
+            "angles_deg": [float(ANGLES[0]), float(ANGLES[-1])],
+            "colours": "CIE 1931, D65",
+            "notes": list(self.look.notes),
+            "pellicle": version("pellicle"),
+        }
+        if self.solved is None:
+            return entries
+        return entries | {
+            "formula": self.solved.formula.name,
+            "used": self.solved.used,
+            **{name: self._set(solution) for name, solution in self.solved.sets.items()},
+        }
+
+    def _set(self, solution: Solution) -> dict[str, Any]:
+        return {
+            "thickness_nm": [float(solution.scale * x) for x in (self.look.thickness[0], self.thickness)],
+            **{key: np.asarray(x).tolist() for key, x in solution.numbers.items()},
+            "delta_e2000": {"mean": solution.error.mean, "largest": solution.error.largest},
+        }
+
+
+def share_of_range(thickness: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "rows columns"]:
+    """A map of thickness from 0 at its least to 1 at its largest thickness."""
+    span = np.ptp(thickness)
+    return (thickness - thickness.min()) / (span if span > 0 else 1.0)
+
+
+def write_grey_image(path: Path, thickness: Float[np.ndarray, "rows columns"]) -> Path:
+    """Write a map as a grey PNG of 16 bits from the least thickness (0) to the largest (65535)."""
+    from PIL import Image  # a requirement of Matplotlib
+
+    with replacing(path) as temporary:
+        pixels = np.round(65535 * share_of_range(thickness)).astype(np.uint16)
+        Image.fromarray(pixels).save(temporary, format="PNG")
+    return path
 
 
 class Target(NamedTuple):
@@ -32,15 +129,15 @@ class Target(NamedTuple):
     takes_map: bool = False
 
 
-MODULES = {
-    "blender": "pellicle.rendering.blender",
-    "gltf": "pellicle.rendering.gltf",
-    "materialx": "pellicle.rendering.materialx",
-    "mitsuba": "pellicle.rendering.mitsuba",
-    "openpbr": "pellicle.rendering.openpbr",
-    "usd": "pellicle.rendering.usd",
+TARGETS = {
+    "blender": "pellicle.rendering.blender:TARGET",
+    "gltf": "pellicle.rendering.gltf:TARGET",
+    "materialx": "pellicle.rendering.materialx:TARGET",
+    "mitsuba": "pellicle.rendering.mitsuba:TARGET",
+    "openpbr": "pellicle.rendering.materialx:OPEN_PBR",
+    "usd": "pellicle.rendering.usd:TARGET",
 }
-"""The module of each target."""
+"""The place of each target, imported when it is used."""
 
 
 def target(name: str, package_check: bool = True) -> Target:
@@ -48,10 +145,10 @@ def target(name: str, package_check: bool = True) -> Target:
 
     **Raises:** UsageError for an unknown name, and where a package that it needs is absent.
     """
-    if name not in MODULES:
-        known = ", ".join(MODULES)
-        raise UsageError(f"no renderer or format {name!r}{did_you_mean(name, MODULES)}; known: {known}")
-    chosen: Target = import_module(MODULES[name]).TARGET
+    if name not in TARGETS:
+        known = ", ".join(TARGETS)
+        raise UsageError(f"no renderer or format {name!r}{did_you_mean(name, TARGETS)}; known: {known}")
+    chosen: Target = resolve_name(TARGETS[name])
     absent = [package for package in chosen.packages if find_spec(package) is None]
     if package_check and absent:
         raise UsageError(f"{chosen.title} needs the package {absent[0]}: {install_command('render')}")

@@ -15,9 +15,8 @@ import numpy as np
 from pellicle.colour import linear_srgb, sensor
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
-from pellicle.rendering.material import Material
 from pellicle.rendering.materialx import bsdf_of, formula
-from pellicle.rendering.targets import Target
+from pellicle.rendering.targets import Material, Target
 
 
 def write(path: Path, material: Material) -> tuple[Path, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.brdf.directions import direction, frame
 from pellicle.brdf.models import model
 from pellicle.programs.cache import kept
-from pellicle.rendering.films import with_values
+from pellicle.rendering.export import with_values
 from pellicle.reporting.drawable import CHANNELS, Line, Panel, Section, Table
 from pellicle.reporting.page.document import picture
 from pellicle.reporting.page.figures import label
