@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from logging import getLogger
 from typing import Any, NamedTuple
@@ -18,9 +17,8 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.forward_model.plan import Row
-from pellicle.mapping.neighbours import Neighbourhood, grid, scattered
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
-from pellicle.mapping.unwrapping import Field, field_of, grow
+from pellicle.mapping.unwrapping import Field, Neighbourhood, field_of, grow, neighbourhood
 
 log = getLogger(__name__)
 
@@ -98,55 +96,89 @@ def evidence(dataset: Any) -> Continuity | None:
 def decided_by_neighbours(
     dataset: Any,
     *,
-    parameter: str | None = None,
-    sites: Sequence[str] = ("x", "y"),
-    margin: float = MARGIN,
     limit: float = LIMIT,
 ) -> Any:
     """Choose the orders of undecided pixels of a map by their neighbours.
 
-    Undecided are ambiguous pixels, and converged ones with a rival within `margin`. Their neighbours are
-    those in the image, in time, or the nearest sites. A pixel whose order they decide has the status
-    `by-neighbours`; all its numbers are those of the chosen minimum, with negative Δχ² where another fits
-    better, except `chi2_reduced` and `rms`, which stay those of the best one. Converged pixels keep their
-    status where the neighbours confirm them or are not clear.
+    Undecided are ambiguous pixels, and converged ones with a rival within `MARGIN`. Their neighbours are
+    those in the image, in time, or the nearest sites by their coordinates x and y. A pixel whose order they
+    decide has the status `by-neighbours`; all its numbers are those of the chosen minimum, with negative Δχ²
+    where another fits better, except `chi2_reduced` and `rms`, which stay those of the best one. Converged
+    pixels keep their status where the neighbours confirm them or are not clear.
 
     **Arguments:**
 
     - `dataset`: of a map, with `status`, each parameter, `<parameter>_stderr_noise`, `rival_delta_chi2`,
-      `order_<parameter>` and `order_delta_chi2`. Other parameters whose minima were not kept become NaN.
-    - `parameter`: name of the thickness, by default the one whose minima lie farthest apart.
-    - `sites`: names of the coordinates of a map with an axis `site`.
-    - `margin`, `limit`: Δχ² within which a rival makes a pixel undecided, and up to which the neighbours may
-      choose.
+      `order_<parameter>` and `order_delta_chi2`. Other parameters whose minima were not kept become NaN. The
+      thickness is the one whose minima lie farthest apart.
+    - `limit`: Δχ² up to which the neighbours may choose.
 
     **Returns:** a new dataset with the attribute `neighbours` (see `evidence`) and, for the pixels that
     neighbours decided, `neighbours_delta_chi2`, the Δχ² that was set aside, and `neighbours_number`.
 
-    **Raises:** UsageError for a map without a thickness whose minima were kept.
+    **Raises:** UsageError for a map without a thickness whose minima were kept, and for sites without
+    coordinates.
     """
     names = [str(name).removeprefix("order_") for name in dataset.data_vars if str(name).startswith("order_")]
     names = [name for name in names if name in dataset.data_vars]
-    name = parameter or _widest(dataset, names)
-    if name is None or f"order_{name}" not in dataset:
+    thicknesses = [name for name in names if name.split("_")[-1] == "thickness"]
+    if not thicknesses:
         raise UsageError("neighbours choose between the minima of a thickness, and this map has kept none")
-    near = neighbourhood(dataset, tuple(map(str, dataset["status"].dims)), sites)
-    pixels, field, continuous = _field(dataset, name, near, margin)
-    test = _tested(dataset, name, field, near)
-    choice = _choice(dataset, name, pixels, field, near, limit, test.weight)
-    result = _summary(len(pixels), choice, test, continuous, field.roughness, margin, limit)
+    name = max(thicknesses, key=lambda name: _distance_of_minima(dataset, name))
+    near = _neighbourhood(dataset)
+    pixels, field, continuous = _field(dataset, name, near)
+    test = _hidden_test(dataset, name, field, near)
+    choice = _choice(dataset, name, pixels, field, near, limit, test["weight"])
+    against = choice.overruled[choice.overruled > 0]
+    result = Continuity(
+        undecided=len(pixels),
+        decided=len(choice.pixels),
+        changed=len(against),
+        overruled=float(against.max(initial=0.0)),
+        median_overruled=float(np.median(against)) if len(against) else 0.0,
+        neighbours=int(np.median(choice.number)) if len(choice.number) else 0,
+        continuous=continuous if math.isfinite(continuous) else 0.0,
+        roughness=field.roughness,
+        margin=MARGIN,
+        limit=limit,
+        **test,
+    )
     log.info("neighbours: %s", result)
     return _with_choice(dataset, names, choice, result)
 
 
-def _field(dataset: Any, name: str, near: Neighbourhood, margin: float) -> tuple[np.ndarray, Field, float]:
+def _distance_of_minima(dataset: Any, name: str) -> float:
+    """Largest distance of the two best minima of a pixel in a parameter."""
+    minima = np.asarray(dataset[f"order_{name}"][..., :2], float)
+    return float(np.nanmax(np.abs(minima[..., 1:] - minima[..., :1]), initial=0.0))
+
+
+def _neighbourhood(dataset: Any) -> Neighbourhood:
+    """The neighbours of the pixels of a map; a map of sites has their coordinates. Raises UsageError."""
+    dims = tuple(map(str, dataset["status"].dims))
+    shape = tuple(dataset.sizes[dim] for dim in dims)
+    along = [dataset.coords.get(dim) for dim in dims if dim != "site"]
+    ordered = tuple(
+        None if array is None or array.dtype.kind not in "iufmM" else np.asarray(array.values).astype(float)
+        for array in along
+    )
+    if "site" not in dims:
+        return neighbourhood(shape, ordered)
+    present = [name for name in ("x", "y") if name in dataset.coords and dataset[name].dims == ("site",)]
+    if not present:
+        raise UsageError("sites have neighbours by their coordinates: give x and y of each site")
+    where = np.stack([np.asarray(dataset[key], float) for key in present], axis=-1)
+    return neighbourhood(shape, ordered, dims.index("site"), where)
+
+
+def _field(dataset: Any, name: str, near: Neighbourhood) -> tuple[np.ndarray, Field, float]:
     """Flat positions of the undecided pixels, the field of the decided ones, and the share on its planes."""
     state = np.asarray(dataset["status"]).ravel()
     thickness, stderr, rival = (
         np.asarray(dataset[key], float).ravel() for key in (name, f"{name}_stderr_noise", "rival_delta_chi2")
     )
     known = np.isfinite(thickness) & np.isfinite(stderr)
-    close = np.nan_to_num(rival, nan=np.inf) < margin
+    close = np.nan_to_num(rival, nan=np.inf) < MARGIN
     converged, again = state == CODES["converged"], state == CODES[BY_NEIGHBOURS]
     undecided = known & ((state == CODES["ambiguous"]) | (converged & close) | again)
     decided = known & converged & ~undecided
@@ -184,32 +216,6 @@ def _choice(
     return _Decisions(pixels[changes], order, delta[changes, order], choice.number[changes])
 
 
-def _summary(
-    undecided: int,
-    choice: _Decisions,
-    test: _Test,
-    continuous: float,
-    roughness: float,
-    margin: float,
-    limit: float,
-) -> Continuity:
-    against = choice.overruled[choice.overruled > 0]
-    return Continuity(
-        undecided=undecided,
-        decided=len(choice.pixels),
-        changed=len(against),
-        overruled=float(against.max(initial=0.0)),
-        median_overruled=float(np.median(against)) if len(against) else 0.0,
-        neighbours=int(np.median(choice.number)) if len(choice.number) else 0,
-        **test._asdict(),
-        continuous=continuous if math.isfinite(continuous) else 0.0,
-        roughness=roughness,
-        weight=test.weight,
-        margin=margin,
-        limit=limit,
-    )
-
-
 def _with_choice(dataset: Any, names: list[str], choice: _Decisions, result: Continuity) -> Any:
     """The dataset with these decisions, in its plan too."""
     made = exchanged(dataset, names, choice.pixels, choice.order)
@@ -230,71 +236,17 @@ def _with_choice(dataset: Any, names: list[str], choice: _Decisions, result: Con
     return made
 
 
-def neighbourhood(dataset: Any, dims: tuple[str, ...], sites: Sequence[str] = ("x", "y")) -> Neighbourhood:
-    """The neighbours of the pixels of a map with these `dims`; a map of sites has their coordinates `sites`.
-
-    **Raises:** UsageError for sites without coordinates.
-    """
-    shape = tuple(dataset.sizes[dim] for dim in dims)
-
-    def position(dim: str) -> np.ndarray | None:
-        along = dataset.coords.get(dim)
-        if along is None or along.dtype.kind not in "iufmM":
-            return None
-        return np.asarray(along.values).astype(float)
-
-    if "site" not in dims:
-        return grid(shape, tuple(map(position, dims)))
-    present = [name for name in sites if name in dataset.coords and dataset[name].dims == ("site",)]
-    if not present:
-        raise UsageError(
-            f"sites have neighbours by their coordinates: give {' and '.join(sites)} of each site"
-        )
-    where = np.stack([np.asarray(dataset[key], float) for key in present], axis=-1)
-    rest = tuple(position(dim) for dim in dims if dim != "site")
-    return scattered(shape, dims.index("site"), where, rest)
-
-
-def _widest(dataset: Any, names: list[str]) -> str | None:
-    """The thickness whose minima lie farthest apart."""
-    thicknesses = [name for name in names if name.split("_")[-1] == "thickness"]
-
-    def spread(name: str) -> float:
-        minima = np.asarray(dataset[f"order_{name}"][..., :2], float)
-        return float(np.nanmax(np.abs(minima[..., 1:] - minima[..., :1]), initial=0.0))
-
-    return max(thicknesses, key=spread) if len(thicknesses) > 1 else next(iter(thicknesses), None)
-
-
-class _Test(NamedTuple):
-    """Decided pixels that were `hidden`, those for which neighbours `found` an order, and a `wrong` one."""
-
-    hidden: int
-    found: int
-    wrong: int
-
-    @property
-    def weight(self) -> float:
-        """Largest weight of neighbours against Δχ²: they are worth no more than they are seen to be.
-
-        The odds of a right order by Jeffreys' rule, as a difference of χ².
-        """
-        return max(2 * math.log((self.found - self.wrong + 0.5) / (self.wrong + 0.5)), 0.0)
-
-
-def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> _Test:
+def _hidden_test(dataset: Any, name: str, field: Field, near: Neighbourhood) -> dict[str, Any]:
     """Hide decided pixels and seek their orders by their neighbours alone, a tenth of the map at a time.
 
-    The pixels are hidden in patches, the same for the same map.
+    The pixels are hidden in patches, the same for the same map. Returns the fields of `Continuity` on them.
     """
     pixels = np.flatnonzero(field.decided)
-    if not len(pixels):
-        return _Test(0, 0, 0)
     place = np.unravel_index(pixels, near.shape)
     width = [1 if axis == near.site_axis else _PATCH for axis in range(len(near.shape))]
     patch = np.ravel_multi_index(tuple(p // w for p, w in zip(place, width, strict=True)), near.shape)
     patches = np.random.default_rng(0).permutation(np.unique(patch))
-    share = min(_SHARE, _HIDDEN / len(pixels))
+    share = min(_SHARE, _HIDDEN / max(len(pixels), 1))
     counts = np.zeros(3, int)
     for part in np.array_split(patches, math.ceil(1 / share)):
         hidden = pixels[np.isin(patch, part)]
@@ -308,7 +260,10 @@ def _tested(dataset: Any, name: str, field: Field, near: Neighbourhood) -> _Test
         counts += len(hidden), np.count_nonzero(chosen >= 0), np.count_nonzero(chosen > 0)
         if counts[0] >= _HIDDEN:
             break
-    return _Test(*map(int, counts))
+    tried, found, wrong = map(int, counts)
+    # they are worth no more than they are seen to be: odds of a right order by Jeffreys' rule, as Δχ²
+    weight = max(2 * math.log((found - wrong + 0.5) / (wrong + 0.5)), 0.0)
+    return {"hidden": tried, "found": found, "wrong": wrong, "weight": weight}
 
 
 def minima_at(dataset: Any, name: str, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -367,22 +322,20 @@ def exchanged(dataset: Any, names: list[str], pixels: np.ndarray, order: np.ndar
 
 def _replaced(array: Any, where: tuple[np.ndarray, ...], rows: np.ndarray) -> Any:
     """An array with other rows at some pixels; a dask array is changed chunk by chunk when it is computed."""
+
+    def in_chunk(chunk: np.ndarray, block_info: Any = None) -> np.ndarray:
+        """A chunk with its rows replaced, which dask places by `block_info`."""
+        if not block_info or not chunk.size:
+            return chunk
+        low, high = np.array(block_info[0]["array-location"])[: len(where)].T
+        place = np.stack(where, axis=-1)
+        inside = np.all((place >= low) & (place < high), axis=1)
+        changed = chunk.copy()
+        changed[tuple((place[inside] - low).T)] = rows[inside]
+        return changed
+
     if hasattr(array, "map_blocks"):
-        return array.map_blocks(_in_chunk, where=where, rows=rows, dtype=array.dtype)
+        return array.map_blocks(in_chunk, dtype=array.dtype)
     whole = np.array(array)
     whole[where] = rows
     return whole
-
-
-def _in_chunk(
-    chunk: np.ndarray, *, where: tuple[np.ndarray, ...], rows: np.ndarray, block_info: Any = None
-) -> np.ndarray:
-    """A chunk of `_replaced`, which dask places by `block_info`."""
-    if not block_info or not chunk.size:
-        return chunk
-    ends = np.array(block_info[0]["array-location"])[: len(where)]
-    place = np.stack(where, axis=-1)
-    inside = np.all((place >= ends[:, 0]) & (place < ends[:, 1]), axis=1)
-    changed = chunk.copy()
-    changed[tuple((place[inside] - ends[:, 0]).T)] = rows[inside]
-    return changed

@@ -12,7 +12,6 @@ to 8 % of the processor time of a fit (4096 pixels of 100 bands), and finds the 
 (enlargement of errors by the square root of the reduced chi-square).
 """
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,10 +22,11 @@ from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 TIME = "time"
 RATES = ("no-data", "constant", "not-constant")
 """Words of `<parameter>_rate_status`: too few times; a straight line fits; it does not."""
-_CODE = {word: code for code, word in enumerate(RATES)}
 _ONE_IN_A_THOUSAND = 3.09
 """Quantile of the normal distribution above which χ² is too large for a line."""
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+_SPELLED = {"seconds": "s", "second": "s", "sec": "s", "minutes": "min", "minute": "min"}
+_SPELLED |= {"hours": "h", "hour": "h", "days": "d", "day": "d"}
 _PIXELS = 100_000
 """Pixels that are computed at a time."""
 
@@ -49,11 +49,10 @@ class Line(NamedTuple):
 def growth(
     dataset: Any,
     *,
-    parameters: Sequence[str] | None = None,
     window: int | None = None,
     unit: str | None = None,
 ) -> Any:
-    """Compute rates of change of a map's parameters, with errors and the χ² of a constant rate.
+    """Compute rates of change of a map's thicknesses, with errors and the χ² of a constant rate.
 
     Times are used where a pixel has converged or its neighbours decide. Orders that jump from one time to the
     next are best decided before (`pellicle.mapping.continuity`, for which time is a direction as any other).
@@ -61,13 +60,12 @@ def growth(
     **Arguments:**
 
     - `dataset`: of a map with the axis `time`: dates, or numbers with the attribute `units`.
-    - `parameters`: by default every thickness.
     - `window`: number of times, at least 3, for a rate at each time from those around it; None for one rate
       of the whole series.
     - `unit` of time of the rates: "s", "min", "h" or "d"; by default the one in which the series is longer
       than one and shorter than the next, for dates and for numbers in such a unit.
 
-    **Returns:** a new dataset with, for each parameter, `<parameter>_rate`, `_rate_stderr` (noise, systematic
+    **Returns:** a new dataset with, for each thickness, `<parameter>_rate`, `_rate_stderr` (noise, systematic
     part, and scatter beyond noise), `_rate_stderr_noise`, `_rate_chi2_reduced`, `_rate_points`, and
     `_rate_status`: "no-data" for fewer than three times, "constant", or "not-constant" where χ² of the line,
     or a parabola's gain on it, occurs by chance in one case of a thousand. One rate for each pixel, or with
@@ -81,8 +79,9 @@ def growth(
         raise UsageError("a rate needs a map with an axis `time` of at least three times")
     if window is not None and window < 3:
         raise UsageError(f"`window` must be at least 3 times, got {window}")
-    names = list(parameters or _thicknesses(dataset))
-    if not names or any(f"{name}_stderr_noise" not in dataset for name in names):
+    names = [str(name).removesuffix("_stderr_noise") for name in dataset.data_vars]
+    names = [n for n in names if n.split("_")[-1] == "thickness" and f"{n}_stderr_noise" in dataset]
+    if not names:
         raise UsageError("a rate needs a free thickness with its standard error, and this map has none")
     time, unit = _times(dataset[TIME], unit)
     made = dataset.copy()
@@ -97,31 +96,35 @@ def _rate_variables(
 ) -> dict[str, tuple[Any, np.ndarray, dict[str, Any]]]:
     """Variables of the rate of one parameter: axes, values and attributes by name."""
     dims = dataset["status"].dims
-    rest = tuple(dim for dim in dims if dim != TIME)
     keys = ("status", name, f"{name}_stderr", f"{name}_stderr_noise")
     arrays = [np.moveaxis(np.asarray(dataset[key]), dims.index(TIME), 0) for key in keys]
-    shape = arrays[0].shape if window is not None else arrays[0].shape[1:]
-    state, value, stderr, noise = (array.reshape(len(time), -1) for array in arrays)
-    parts = [slice(i, i + _PIXELS) for i in range(0, max(state.shape[1], 1), _PIXELS)]
-    columns = [_rates(time, state[:, p], value[:, p], stderr[:, p], noise[:, p], window) for p in parts]
+    count, *rest = arrays[0].shape
+    columns = [array.reshape(count, -1) for array in arrays]
+    width = min(window or count, count)
+    starts = range(count if window else 1)
+    windows = [slice(i, i + width) for i in (min(max(k - width // 2, 0), count - width) for k in starts)]
+    parts = [slice(i, i + _PIXELS) for i in range(0, max(columns[0].shape[1], 1), _PIXELS)]
+    rates = [[_rates(time[w], *(array[w, part] for array in columns)) for part in parts] for w in windows]
+    axes, shape = tuple(dim for dim in dims if dim != TIME), tuple(rest)
+    if window:
+        axes, shape = (TIME, *axes), (count, *shape)
     of = f"{dataset[name].attrs.get('units', 'nm')}/{unit}"
-    attributes: dict[str, dict[str, Any]] = {
-        key: {"long_name": f"{words} of {name}", "units": units}
-        for key, words, units in (
-            ("rate", "rate of change", of),
-            ("rate_stderr", "standard error of the rate, of noise, model and scatter", of),
-            ("rate_stderr_noise", "standard error of the rate, of the noise alone", of),
-            ("rate_chi2_reduced", "reduced chi-square of a constant rate", "1"),
-            ("rate_points", "number of times of the rate", "1"),
+    variables = {}
+    for i, (key, dtype, words, units) in enumerate(
+        (
+            ("rate", np.float64, "rate of change", of),
+            ("rate_stderr", np.float32, "standard error of the rate, of noise, model and scatter", of),
+            ("rate_stderr_noise", np.float32, "standard error of the rate, of the noise alone", of),
+            ("rate_chi2_reduced", np.float32, "reduced chi-square of a constant rate", "1"),
+            ("rate_points", np.uint16, "number of times of the rate", "1"),
+            ("rate_status", np.uint8, "", ""),
         )
-    }
-    words = " ".join(RATES)
-    attributes["rate_status"] = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": words}
-    axes = rest if window is None else (TIME, *rest)
-    return {
-        key: (axes, np.concatenate([column[key] for column in columns], axis=-1).reshape(shape), about)
-        for key, about in attributes.items()
-    }
+    ):
+        values = np.stack([np.concatenate([part[i] for part in row]) for row in rates]).reshape(shape)
+        about = {"long_name": f"{words} of {name}", "units": units}
+        variables[key] = axes, values.astype(dtype), about
+    flags = {"flag_values": np.arange(len(RATES), dtype=np.uint8), "flag_meanings": " ".join(RATES)}
+    return variables | {"rate_status": (*variables["rate_status"][:2], flags)}
 
 
 def straight_line(
@@ -157,53 +160,23 @@ def straight_line(
 
 
 def _rates(
-    time: np.ndarray,
-    state: np.ndarray,
-    value: np.ndarray,
-    stderr: np.ndarray,
-    noise: np.ndarray,
-    window: int | None,
-) -> dict[str, np.ndarray]:
-    """Variables of some pixels: arrays (pixels,), or with a window (times, pixels)."""
+    time: np.ndarray, state: np.ndarray, value: np.ndarray, stderr: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Rates of some pixels (pixels,) in a window: value, errors, reduced χ², number of times and status."""
     value, stderr, noise = (array.astype(float) for array in (value, stderr, noise))
     used = np.isin(state, [CODES["converged"], CODES[BY_NEIGHBOURS]])
     used &= np.isfinite(value) & np.isfinite(stderr) & (noise > 0) & np.isfinite(noise)
-    systematic = np.sqrt(np.maximum(stderr**2 - noise**2, 0.0))
-    if window is None:
-        return _variables(straight_line(time, value, noise, systematic, used))
-    count = len(time)
-    lines = []
-    for at in range(count):
-        first = min(max(at - window // 2, 0), max(count - window, 0))
-        part = slice(first, first + window)
-        lines.append(
-            _variables(straight_line(time[part], *(a[part] for a in (value, noise, systematic, used))))
-        )
-    return {key: np.stack([line[key] for line in lines]) for key in lines[0]}
-
-
-def _variables(line: Line) -> dict[str, np.ndarray]:
+    line = straight_line(time, value, noise, np.sqrt(np.maximum(stderr**2 - noise**2, 0.0)), used)
     free = np.maximum(line.points - 2, 1)
     reduced = line.chi2 / free
     # χ² to a normal variable: Wilson and Hilferty 1931, PNAS 17, 684
     part = 2 / (9 * free)
     excess = (np.cbrt(reduced) - (1 - part)) / np.sqrt(part)
     bent = (excess > _ONE_IN_A_THOUSAND) | (np.abs(line.curvature) > _ONE_IN_A_THOUSAND)
-    status = np.where(np.isfinite(line.rate), np.where(bent, _CODE["not-constant"], _CODE["constant"]), 0)
-    enlarged = line.noise * np.sqrt(np.maximum(reduced, 1.0))
-    return {
-        "rate": line.rate,
-        "rate_stderr": np.hypot(enlarged, line.systematic).astype(np.float32),
-        "rate_stderr_noise": line.noise.astype(np.float32),
-        "rate_chi2_reduced": reduced.astype(np.float32),
-        "rate_points": line.points.astype(np.uint16),
-        "rate_status": status.astype(np.uint8),
-    }
-
-
-def _thicknesses(dataset: Any) -> list[str]:
-    names = (str(name).removesuffix("_stderr_noise") for name in dataset.data_vars)
-    return [n for n in names if n.split("_")[-1] == "thickness" and f"{n}_stderr_noise" in dataset]
+    constant, not_constant = RATES.index("constant"), RATES.index("not-constant")
+    status = np.where(np.isfinite(line.rate), np.where(bent, not_constant, constant), 0)
+    enlarged = np.hypot(line.noise * np.sqrt(np.maximum(reduced, 1.0)), line.systematic)
+    return line.rate, enlarged, line.noise, reduced, line.points, status
 
 
 def _times(array: Any, unit: str | None) -> tuple[np.ndarray, str]:
@@ -211,31 +184,23 @@ def _times(array: Any, unit: str | None) -> tuple[np.ndarray, str]:
     if unit is not None and unit not in _SECONDS:
         raise UsageError(f"`unit` must be one of {', '.join(_SECONDS)}, got {unit!r}")
     stamps = np.asarray(array.values)
+    since = stamps - stamps[0]
+    given = "s"
     if stamps.dtype.kind in "mM":
-        seconds = (stamps - stamps[0]) / np.timedelta64(1, "s")
+        since = since / np.timedelta64(1, "s")
     else:
         given = str(array.attrs.get("units", "")).split(" since ")[0].strip()
-        spelled = {"seconds": "s", "second": "s", "sec": "s", "minutes": "min", "minute": "min", "hours": "h"}
-        spelled |= {"hour": "h", "days": "d", "day": "d"}
-        given = spelled.get(given, given)
-        if not given:
-            raise UsageError(
-                "times are numbers without a unit: give the coordinate `time` `units`, such as s"
-            )
-        if given not in _SECONDS:
-            if unit is not None:
-                raise UsageError(f"`unit` is {unit!r}, but the times are in {given!r}: leave it out")
-            return _checked(stamps - stamps[0]), given
-        seconds = (stamps - stamps[0]) * _SECONDS[given]
-    seconds = _checked(seconds)
-    chosen = unit or max(
-        (u for u in _SECONDS if np.ptp(seconds) >= _SECONDS[u]), key=_SECONDS.__getitem__, default="s"
-    )
-    return seconds / _SECONDS[chosen], chosen
-
-
-def _checked(time: np.ndarray) -> np.ndarray:
-    time = np.asarray(time, float)
-    if not np.isfinite(time).all() or len(np.unique(time)) < 3:
+        given = _SPELLED.get(given, given)
+    since = np.asarray(since, float)
+    if not given:
+        raise UsageError("times are numbers without a unit: give the coordinate `time` `units`, such as s")
+    if given not in _SECONDS and unit is not None:
+        raise UsageError(f"`unit` is {unit!r}, but the times are in {given!r}: leave it out")
+    if not np.isfinite(since).all() or len(np.unique(since)) < 3:
         raise UsageError("a rate needs at least three different times, each of them known")
-    return time
+    if given not in _SECONDS:
+        return since, given
+    seconds = since * _SECONDS[given]
+    spanned = [u for u in _SECONDS if np.ptp(seconds) >= _SECONDS[u]]
+    chosen = unit or max(spanned, key=_SECONDS.__getitem__, default="s")
+    return seconds / _SECONDS[chosen], chosen

@@ -9,13 +9,18 @@ front after the other, where the prediction is best first.
 Two-dimensional phase unwrapping, ch. 4 (growth by quality).
 """
 
+import itertools
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.neighbours import Neighbourhood
 
+_REACH, _STEPS = 2, 3
+"""Largest distance of a neighbour along one axis, and along all axes together, in pixels."""
+_SITES, _FAR = 12, 3.0
+"""Number of neighbours of a site, and their largest distance in units of the usual one."""
 _OUTLIER, _OUTLIERS = 5.0, 0.25
 """Distance from the plane, in standard deviations, of a thickness that does not lie on it, and the share of
 such neighbours that marks an edge. At a straight edge 40 % of the window lie beyond it."""
@@ -23,6 +28,122 @@ _BATCH = 20_000
 """Pixels that are predicted at a time: 30 MB for a window on a plane."""
 _SAMPLE = 20_000
 """Decided pixels from which the usual slope and roughness are computed."""
+
+
+class Near(NamedTuple):
+    """Neighbours of some pixels, arrays (pixels, neighbours, ...).
+
+    `pixel` are flat positions in the map, `offset` (..., axes) the way to the neighbour in units of the usual
+    step along each axis, and `linked` is False where there is no neighbour, or only across a gap.
+    """
+
+    pixel: np.ndarray
+    offset: np.ndarray
+    linked: np.ndarray
+
+
+@dataclass(frozen=True)
+class Neighbourhood:
+    """The neighbours of the pixels of a map of this `shape`.
+
+    `positions` are the coordinates along each axis of a grid. One axis, `site_axis`, may be of sites, whose
+    neighbours are `site_index` (sites, neighbours), −1 where there are fewer, at `site_offset` (sites,
+    neighbours, coordinates), at the same place along the other axes and one step away. Offsets along those
+    axes come first.
+    """
+
+    shape: tuple[int, ...]
+    positions: tuple[np.ndarray, ...]
+    steps: np.ndarray  # (neighbours, axes of the map), the nearest first, along the grid only
+    site_axis: int | None
+    site_index: np.ndarray
+    site_offset: np.ndarray
+
+    @property
+    def fewest(self) -> int:
+        """Fewest neighbours that make a plane: one for each of its coefficients on a grid, else two."""
+        return max(len(self.positions) + 1, 2)
+
+    @property
+    def axes(self) -> int:
+        """Number of coordinates of an offset."""
+        return len(self.positions) + self.site_offset.shape[-1]
+
+    def __call__(self, pixels: np.ndarray, present: np.ndarray) -> Near:
+        """The neighbours of `pixels` (flat positions) through pixels that are `present` (flat map)."""
+        where = np.stack(np.unravel_index(pixels, self.shape), axis=-1)[:, None, :]
+        on_grid = self._at(where, where + self.steps, present)
+        column = {tuple(step): i for i, step in enumerate(self.steps.tolist())}
+        for i, step in enumerate(self.steps):
+            if np.abs(step).sum() > 1:
+                # a gap is not jumped: one of the pixels one step nearer must be linked, too
+                axes = np.flatnonzero(step)
+                nearer = [step - np.sign(step) * (np.arange(len(step)) == axis) for axis in axes]
+                linked = [on_grid.linked[:, column[tuple(one.tolist())]] for one in nearer]
+                on_grid.linked[:, i] &= np.any(linked, axis=0)
+        parts = [on_grid]
+        if self.site_axis is not None:
+            site = where[:, 0, self.site_axis]
+            for step in (0, *self.steps[np.abs(self.steps).sum(axis=1) == 1]):
+                place = np.repeat(where + step, self.site_index.shape[1], axis=1)
+                place[..., self.site_axis] = self.site_index[site]
+                parts.append(self._at(where, place, present))
+                parts[-1].offset[..., len(self.positions) :] = self.site_offset[site]
+        return Near(*(np.concatenate(columns, axis=1) for columns in zip(*parts, strict=True)))
+
+    def _at(self, where: np.ndarray, place: np.ndarray, present: np.ndarray) -> Near:
+        """The pixels at places (pixels, neighbours, axes), with their offsets along the grid."""
+        inside = np.all((place >= 0) & (place < self.shape), axis=-1)
+        place = np.clip(place, 0, np.array(self.shape) - 1)
+        index = np.asarray(np.ravel_multi_index(tuple(np.moveaxis(place, -1, 0)), self.shape))
+        offset = np.zeros((*index.shape, self.axes))
+        grid = [axis for axis in range(len(self.shape)) if axis != self.site_axis]
+        for i, (axis, position) in enumerate(zip(grid, self.positions, strict=True)):
+            offset[..., i] = position[place[..., axis]] - position[where[..., axis]]
+        return Near(index, offset, inside & present[index])
+
+
+def neighbourhood(
+    shape: tuple[int, ...],
+    positions: tuple[np.ndarray | None, ...],
+    site_axis: int | None = None,
+    coordinates: np.ndarray | None = None,
+) -> Neighbourhood:
+    """Return the neighbours on a grid: those at most two pixels away along each axis, corners left out.
+
+    `positions` are coordinates along each axis of the grid, evenly spaced where None. Along `site_axis` there
+    are sites at `coordinates` (sites, 1 or 2 or 3): a site has up to twelve neighbours, none farther than
+    three times the usual distance of the nearest.
+    """
+    reach = [(0,) if axis == site_axis else range(-_REACH, _REACH + 1) for axis in range(len(shape))]
+    every = np.array(list(itertools.product(*reach)), int)
+    distance = np.abs(every).sum(axis=1)
+    near = (distance > 0) & (distance <= _STEPS)
+    steps = every[near][np.argsort(distance[near], kind="stable")]
+    rest = [n for axis, n in enumerate(shape) if axis != site_axis]
+    in_steps = tuple(map(_in_steps, positions, rest))
+    if coordinates is None:
+        return Neighbourhood(shape, in_steps, steps, None, np.empty((0, 0), int), np.empty((0, 0, 0)))
+    from scipy.spatial import KDTree  # slow to import
+
+    count = min(_SITES + 1, len(coordinates))
+    distance, index = KDTree(coordinates).query(coordinates, k=count)
+    distance, index = np.reshape(distance, (-1, count)), np.reshape(index, (-1, count))
+    itself = index == np.arange(len(index))[:, None]
+    apart = np.where(itself | (distance == 0), np.inf, distance).min(axis=1, initial=np.inf)
+    usual = np.median(apart[np.isfinite(apart)]) if np.isfinite(apart).any() else 1.0
+    site_index = np.where(~itself & (distance <= _FAR * usual), index, -1)
+    offset = (coordinates[index] - coordinates[:, None]) / usual
+    return Neighbourhood(shape, in_steps, steps, site_axis, site_index, offset)
+
+
+def _in_steps(position: np.ndarray | None, size: int) -> np.ndarray:
+    """Coordinates in units of their usual step; numbers of pixels where they do not rise or fall."""
+    if position is not None and size > 1:
+        step = np.diff(np.asarray(position, float))
+        if np.all(step > 0) or np.all(step < 0):
+            return np.asarray(position, float) / np.median(np.abs(step))
+    return np.arange(size, dtype=float)
 
 
 class Field(NamedTuple):
