@@ -45,7 +45,7 @@ def fits(monkeypatch):
 @pytest.fixture
 def words(tmp_path, monkeypatch):
     """The arguments that map a cube of 24 x 20 pixels in 9 blocks into the folder `out`."""
-    monkeypatch.setattr("pellicle.mapping.blocks.PIXELS", 100)
+    monkeypatch.setattr("pellicle.mapping.store.PIXELS", 100)
     nm = np.linspace(400.0, 700.0, 30)
     values = np.random.default_rng(0).uniform(0.2, 0.8, (24, 20, 30))
     values[0, 0] = np.nan

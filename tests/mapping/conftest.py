@@ -49,7 +49,7 @@ def scene():
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Blocks of 8 x 8 pixels, of which the cube has 6 x 4."""
-    monkeypatch.setattr("pellicle.mapping.blocks.PIXELS", 64)
+    monkeypatch.setattr("pellicle.mapping.store.PIXELS", 64)
 
 
 @pytest.fixture

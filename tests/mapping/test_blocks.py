@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.cube import Cube
-from pellicle.mapping.blocks import BYTES, PIXELS, Blocks, blocks_of
+from pellicle.mapping.store import BYTES, PIXELS, Blocks, blocks_of
 
 
 def lazy(*shape, chunks=None):

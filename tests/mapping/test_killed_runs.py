@@ -17,11 +17,11 @@ TIME_OUT = 120.0
 PROGRAM = """
 import sys
 import fake_fits
-from pellicle.mapping import blocks
+from pellicle.mapping import store as stores
 from pellicle.mapping.run import run_map
 
 if __name__ == "__main__":
-    blocks.PIXELS = 64
+    stores.PIXELS = 64
     cube, scene, store, workers = fake_fits.load(sys.argv[1])
     run_map(cube, scene, store, workers=workers, fit=fake_fits.slow)
 """

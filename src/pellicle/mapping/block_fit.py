@@ -6,10 +6,9 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from pellicle.data.cube import Cube
-from pellicle.mapping.blocks import Where
 from pellicle.mapping.pixels.fit import PixelModel
 from pellicle.mapping.pixels.results import PixelFits
-from pellicle.mapping.store import MapStore
+from pellicle.mapping.store import MapStore, Where
 
 Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
 

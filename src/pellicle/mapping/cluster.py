@@ -29,7 +29,6 @@ from distributed.scheduler import KilledWorker
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.block_fit import Fitted, Job, fit_block
-from pellicle.mapping.blocks import Where
 from pellicle.programs.threads import single_threaded
 
 log = logging.getLogger(__name__)
@@ -116,7 +115,12 @@ def on_cluster(client: Client, job: Job, todo: Sequence[tuple[int, ...]], *, loc
 
     def submit() -> None:
         for place in waiting:
-            block = part(job.cube, job.store.blocks.where(place)) if shipped else None
+            block = None
+            if shipped:
+                where = job.store.blocks.where(place)
+                read = {k: np.asarray(a if np.ndim(a) == 1 else a[where]) for k, a in job.cube.arrays.items()}
+                mask = None if job.cube.mask is None else job.cube.mask[where]
+                block = replace(sent, arrays=read, mask=mask, units={}, notes=())
             queue.add(client.submit(_task, name, place, block, key=f"{name}-{place}", pure=False))
             if queue.count() >= most:
                 return
@@ -165,16 +169,6 @@ def _completed(queue: Any, client: Client) -> Iterator[Any]:
                 f"all worker processes have ended, and none has come for {WAIT:.0f} s; what is finished is"
                 " kept: repeat with fewer `workers`, or with one"
             )
-
-
-def part(cube: Cube, where: Where) -> Cube:
-    """Read a block of a cube: a small cube in memory."""
-    arrays = {
-        name: np.asarray(array if np.ndim(array) == 1 else array[where])
-        for name, array in cube.arrays.items()
-    }
-    mask = None if cube.mask is None else cube.mask[where]
-    return replace(cube, arrays=arrays, mask=mask, coords={}, units={}, notes=())
 
 
 def _can_be_read_there(cube: Cube) -> bool:

@@ -117,16 +117,14 @@ class Map(PlotMixin):
     @property
     def converged(self) -> float:
         """Share of the pixels with data whose fit has converged, without help of neighbours."""
-        return self._share(CONVERGED)
+        known = sum(self.status.values()) - self.status.get(NO_DATA, 0)
+        return self.status.get(CONVERGED, 0) / known if known else 0.0
 
     @property
     def decided(self) -> float:
         """Share of the pixels with data that have one answer, by themselves or by their neighbours."""
-        return self._share(CONVERGED, BY_NEIGHBOURS)
-
-    def _share(self, *words: str) -> float:
         known = sum(self.status.values()) - self.status.get(NO_DATA, 0)
-        return sum(self.status.get(word, 0) for word in words) / known if known else 0.0
+        return (self.status.get(CONVERGED, 0) + self.status.get(BY_NEIGHBOURS, 0)) / known if known else 0.0
 
     @property
     def thickness(self) -> xarray.DataArray:

@@ -7,7 +7,7 @@ import math
 import os
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,14 +20,13 @@ from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
-from pellicle.mapping.blocks import BYTES
 from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import fit as pixel_fit
 from pellicle.mapping.pixels.data import ORDERS
 from pellicle.mapping.pixels.fit import PixelModel
-from pellicle.mapping.store import FORMAT, begin, held
+from pellicle.mapping.store import BYTES, FORMAT, begin, held
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
@@ -58,39 +57,30 @@ def map_cube(
     **reading: Any,
 ) -> Map:
     """Fit every pixel of a cube; arguments as of `pellicle.map`."""
-    cube = cube_of(data, scene, **reading)
+    if isinstance(scene.instrument.scale, Drift):  # values may have any level
+        reading = {"calibrated": False} | reading
+    cube = read_cube(data, **reading)
     if lamp_curve is not None:
         cube = lamp_curve_of(lamp_curve, cube, scene, lamp_reference).correct(cube)
     elif lamp_reference is not None:
         raise UsageError("`lamp_reference` is of a region: give it as `lamp_curve`, x,y,width,height")
-    factor = preview_factor(cube) if preview else 1
-    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "recipe": recipe}
-    options |= {"resume": resume, "overwrite": overwrite, "preview": factor, "progress": progress}
-    if factor > 1:
-        cube = cube.coarse(factor)
+    factor = 1
+    if preview:
+        sizes = [n for dim, n in zip(cube.dims, cube.shape, strict=True) if dim != "time"]
+        factor = max(1, math.ceil((math.prod(sizes) / PREVIEW) ** (1 / max(1, len(sizes)))))
+        cube = cube.coarse(factor) if factor > 1 else cube
     folder = None
     if out is None:
         if scheduler is not None:
             raise UsageError("a map by `scheduler` needs `out`, a folder that its workers reach")
         folder = tempfile.mkdtemp(prefix="pellicle-map-")
         out = Path(folder) / "map.zarr"
+    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "recipe": recipe}
+    options |= {"resume": resume, "overwrite": overwrite, "preview": factor, "progress": progress}
     made = run_map(cube, scene, out, **options)
     if neighbours:
         made = made.by_neighbours()
     return made if folder is None else made.remove_at_exit(folder)
-
-
-def cube_of(data: Any, scene: Scene, **reading: Any) -> Cube:
-    """Read a cube; where the scale of the scene is free, its values may have any level."""
-    if isinstance(scene.instrument.scale, Drift):
-        reading = {"calibrated": False} | reading
-    return read_cube(data, **reading)
-
-
-def preview_factor(cube: Cube) -> int:
-    """The distance of the pixels of a preview, at which each image has at most `PREVIEW`."""
-    sizes = [n for dim, n in zip(cube.dims, cube.shape, strict=True) if dim != "time"]
-    return max(1, math.ceil((math.prod(sizes) / PREVIEW) ** (1 / max(1, len(sizes)))))
 
 
 def run_map(
@@ -103,7 +93,6 @@ def run_map(
     resume: bool = True,
     overwrite: bool = False,
     preview: int = 1,
-    options: Mapping[str, Any] | None = None,
     recipe: str = "",
     progress: Progress = quiet,
     fit: Fitter | None = None,
@@ -118,7 +107,7 @@ def run_map(
       and with None as soon as one block has shown that the others take longer than processes to start.
     - `scheduler`: address of a running dask scheduler, "tcp://host:8786", whose workers share the files.
     - `preview`: the cube has every so many of the pixels in each direction.
-    - `options` that change the result, `recipe`: the text of it; both are kept in the store.
+    - `recipe`: the text of it, which is kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
     - `fit`: the function that fits a block, `pixels.fit.fit_pixels` by default.
 
@@ -129,7 +118,7 @@ def run_map(
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
     model = pixel_fit.prepare(cube, scene)
-    about, who = attributes(cube, model, recipe, preview), identity(cube, scene, options or {})
+    about, who = attributes(cube, model, recipe, preview), identity(cube, scene)
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
     with held(store.path):
         run = _fit_blocks(Job(model, cube, store, fit or pixel_fit.fit_pixels), workers, scheduler, progress)
@@ -141,30 +130,22 @@ def _fit_blocks(job: Job, workers: int | None, scheduler: str | None, progress: 
     blocks, todo = job.store.blocks, job.store.unfinished()
     total = math.prod(blocks.shape)
     earlier = done = total - sum(map(blocks.count, todo))
-    size = " x ".join(map(str, blocks.size))
-    log.info(
-        "%s: %d of %d blocks of %s pixels are left", job.store.path, len(todo), math.prod(blocks.grid), size
-    )
+    size, grid = " x ".join(map(str, blocks.size)), math.prod(blocks.grid)
+    log.info("%s: %d of %d blocks of %s pixels are left", job.store.path, len(todo), grid, size)
     progress("pixels", done, total)
-    compiling, used = 0.0, 1
+    compiling = 0.0
     if scheduler is None and workers is None and todo:
         first = fit_block(job, todo.pop(0))
         done, compiling = done + first.pixels, first.compiling
         progress("pixels", done, total)
-        workers = _worthwhile(len(todo), first.seconds)
-    if scheduler is not None or (workers or 1) > 1:
-        used = min(workers or len(todo), len(todo))
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        workers = cores if len(todo) * first.seconds > START else 1
+    used = 1 if scheduler is None and (workers or 1) == 1 else min(workers or len(todo), len(todo))
     for fitted in _fitted(job, todo, used, scheduler, progress):
         done += fitted.pixels
         compiling = max(compiling, fitted.compiling)
         progress("pixels", done, total)
     return Run(done - earlier, earlier, used, 0.0, compiling)
-
-
-def _worthwhile(blocks: int, seconds: float) -> int:
-    """Number of processes for blocks that take so many seconds each: 1, or as many as there are cores."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cores if blocks * seconds > START else 1
 
 
 def _fitted(
@@ -202,28 +183,22 @@ def attributes(cube: Cube, model: PixelModel, recipe: str, preview: int) -> dict
     }
 
 
-def identity(cube: Cube, scene: Scene, options: Mapping[str, Any]) -> dict[str, str]:
-    """Hash the input, the scene and the options of a map.
+def identity(cube: Cube, scene: Scene) -> dict[str, str]:
+    """Hash the input and the scene of a map.
 
-    The content of a cube without a `fingerprint` is read once, slab by slab.
+    The content of a cube without a `fingerprint` is read once, in slabs along the first axis of pixels.
     """
     read = cube.signal, cube.polarisation, cube.calibrated, cube.dims, cube.wavelength, cube.angle, cube.mask
-    return {
-        "format": FORMAT,
-        "version": version("pellicle"),
-        "input": fingerprint(cube.fingerprint or _content(cube), cube.shape, *read),
-        "scene": fingerprint(scene),
-        "options": fingerprint(dict(options)),
-    }
-
-
-def _content(cube: Cube) -> list[str]:
-    """Hashes of all arrays, read in slabs along the first axis of pixels."""
-    digests = []
-    for name, array in sorted(cube.arrays.items()):
+    content: Any = cube.fingerprint or []
+    for name, array in [] if cube.fingerprint else sorted(cube.arrays.items()):
         digest = hashlib.sha256(f"{name} {array.dtype} {array.shape}".encode())
         rows = max(1, int(BYTES * array.shape[0] / (np.dtype(array.dtype).itemsize * math.prod(array.shape))))
         for start in range(0, array.shape[0], rows):
             digest.update(np.ascontiguousarray(array[start : start + rows]).tobytes())
-        digests.append(digest.hexdigest())
-    return digests
+        content.append(digest.hexdigest())
+    return {
+        "format": FORMAT,
+        "version": version("pellicle"),
+        "input": fingerprint(content, cube.shape, *read),
+        "scene": fingerprint(scene),
+    }

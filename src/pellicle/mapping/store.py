@@ -8,6 +8,7 @@ that was not marked is computed and written again.
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import warnings
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +26,6 @@ from pellicle.data.cube import Cube
 from pellicle.errors import UsageError, install_command
 from pellicle.files import not_written
 from pellicle.fitting.parameter import Parameter
-from pellicle.mapping.blocks import Blocks, blocks_of
 from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES, PixelFits
 
 if TYPE_CHECKING:
@@ -38,12 +39,20 @@ _OTHERWISE = {
     "version": "was made by another version of pellicle",
     "input": "is of another input, or of one that was read otherwise",
     "scene": "is of another scene",
-    "options": "was made with other options",
 }
 """Messages on a store whose identity differs in one of its parts."""
 STATUS = "status"
 ORDER = "order"
 """Name of the axis of the minima of a pixel, best first."""
+
+BYTES = 64e6
+"""Size of the measured values of a block in float64, at most: with the arrays of a fit a process then takes
+less than 1 GB."""
+PIXELS = 2**14
+"""Pixels of a block, at most: a second of fits, which is what a killed process loses."""
+
+Where = tuple[slice, ...]
+"""A block of pixels: one slice for each axis of pixels."""
 
 
 def zarr_package() -> Any:
@@ -81,44 +90,90 @@ def variable_name(parameter: str) -> str:
 def variables(parameters: Sequence[Parameter]) -> list[Variable]:
     """List the variables of a map of these free parameters, in the order of the fits' arrays."""
 
-    def about(words: str) -> dict[str, Any]:
-        return {"long_name": words, "units": "1"}
+    def about(words: str, unit: str = "1") -> dict[str, Any]:
+        return {"long_name": words, "units": unit}
+
+    def finite(values: np.ndarray) -> np.ndarray:
+        return np.where(np.isfinite(values), values, np.nan)
 
     flags = {"flag_values": list(range(len(STATUSES))), "flag_meanings": " ".join(STATUSES)}
     status = {"long_name": "status of the fit", **flags}
-    rival = about("delta chi2 of the best other minimum")
-    orders = about("delta chi2 of each minimum")
+    listed = [Variable(STATUS, lambda fits: fits.status, status, "uint8", fill=CODES[NO_DATA])]
+    for i, parameter in enumerate(parameters):
+        name, text = variable_name(parameter.name), parameter.name
+        unit = {"degrees": "degree"}.get(parameter.unit, parameter.unit) or "1"
+        noise = about(f"standard error of {text}, of the noise alone", unit)
+        whole = about(f"standard error of {text}, of noise and model", unit)
+        rival = about(f"{text} of the best other minimum", unit)
+        orders = about(f"{text} of each minimum, best first", unit)
+        value = {**about(text, unit), "parameter": text}
+        listed += [
+            Variable(name, lambda fits, i=i: fits.values[:, i], value, "float64"),
+            Variable(f"{name}_stderr", lambda fits, i=i: fits.stderr[:, i], whole),
+            Variable(f"{name}_stderr_noise", lambda fits, i=i: fits.stderr_noise[:, i], noise),
+            Variable(f"rival_{name}", lambda fits, i=i: fits.minima[:, 1, i], rival),
+            Variable(f"order_{name}", lambda fits, i=i: fits.minima[:, :, i], orders, orders=True),
+        ]
+    rival, orders = about("delta chi2 of the best other minimum"), about("delta chi2 of each minimum")
     return [
-        Variable(STATUS, lambda fits: fits.status, status, "uint8", fill=CODES[NO_DATA]),
-        *(variable for i, parameter in enumerate(parameters) for variable in _of_parameter(i, parameter)),
-        Variable("rival_delta_chi2", lambda fits: _finite(fits.delta_chi2[:, 1]), rival),
-        Variable("order_delta_chi2", lambda fits: _finite(fits.delta_chi2), orders, orders=True),
+        *listed,
+        Variable("rival_delta_chi2", lambda fits: finite(fits.delta_chi2[:, 1]), rival),
+        Variable("order_delta_chi2", lambda fits: finite(fits.delta_chi2), orders, orders=True),
         Variable("chi2_reduced", lambda fits: fits.chi2_reduced, about("reduced chi2")),
         Variable("rms", lambda fits: fits.rms, {"long_name": "root mean square of the residuals"}),
     ]
 
 
-def _of_parameter(i: int, parameter: Parameter) -> list[Variable]:
-    name, text = variable_name(parameter.name), parameter.name
-    unit = {"degrees": "degree"}.get(parameter.unit, parameter.unit) or "1"
+@dataclass(frozen=True)
+class Blocks:
+    """A grid of blocks over the pixels of a cube: `shape` of the pixels and `size` of a block, per axis."""
 
-    def about(words: str) -> dict[str, Any]:
-        return {"long_name": words, "units": unit}
+    shape: tuple[int, ...]
+    size: tuple[int, ...]
 
-    noise, whole = (f"standard error of {text}, of {part}" for part in ("the noise alone", "noise and model"))
-    rival, orders = about(f"{text} of the best other minimum"), about(f"{text} of each minimum, best first")
-    value = {**about(text), "parameter": text}
-    return [
-        Variable(name, lambda fits: fits.values[:, i], value, "float64"),
-        Variable(f"{name}_stderr", lambda fits: fits.stderr[:, i], about(whole)),
-        Variable(f"{name}_stderr_noise", lambda fits: fits.stderr_noise[:, i], about(noise)),
-        Variable(f"rival_{name}", lambda fits: fits.minima[:, 1, i], rival),
-        Variable(f"order_{name}", lambda fits: fits.minima[:, :, i], orders, orders=True),
-    ]
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Number of blocks along each axis."""
+        return tuple(math.ceil(n / size) for n, size in zip(self.shape, self.size, strict=True))
+
+    def __iter__(self) -> Iterator[tuple[int, ...]]:
+        """Places of all blocks in the grid, row by row."""
+        return product(*map(range, self.grid))
+
+    def where(self, place: tuple[int, ...]) -> Where:
+        """The pixels of the block at a place in the grid."""
+        parts = zip(place, self.size, self.shape, strict=True)
+        return tuple(slice(i * size, min((i + 1) * size, n)) for i, size, n in parts)
+
+    def count(self, place: tuple[int, ...]) -> int:
+        """Number of pixels of a block."""
+        return math.prod(part.stop - part.start for part in self.where(place))
 
 
-def _finite(values: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(values), values, np.nan)
+def blocks_of(cube: Cube) -> Blocks:
+    """Choose blocks of at most `BYTES` and `PIXELS`, whole chunks of the input where it has chunks.
+
+    A block grows by doubling along the shorter of the last two axes (y and x), and along earlier ones (time)
+    when these are covered. A chunk of the input that is larger than a block is divided.
+    """
+    arrays = sum(len(array.shape) > 1 for array in cube.arrays.values())
+    most = max(1, min(PIXELS, int(BYTES / (8 * cube.points * arrays))))
+    chunks = tuple(getattr(cube.arrays["values"], "chunks", None) or ())[: len(cube.dims)]
+    # of a dask array, the sizes of all chunks along an axis
+    chunks = [max(chunk) if isinstance(chunk, tuple) else int(chunk) for chunk in chunks]
+    size = [min(chunk, n) for chunk, n in zip(chunks or [1] * len(cube.dims), cube.shape, strict=True)]
+    while math.prod(size) > most:
+        longest = size.index(max(size))
+        size[longest] = math.ceil(size[longest] / 2)
+    while short := [axis for axis, n in enumerate(cube.shape) if size[axis] < n]:
+        image = [axis for axis in short if axis >= len(size) - 2]
+        axis = min(image, key=size.__getitem__) if image else short[-1]
+        longer = [*size]
+        longer[axis] = min(2 * size[axis], cube.shape[axis])
+        if math.prod(longer) > most:
+            break
+        size = longer
+    return Blocks(cube.shape, tuple(size))
 
 
 @dataclass(frozen=True)
@@ -189,7 +244,9 @@ def begin(
             if not overwrite:
                 return _continued(target, cube, parameters, identity, resume=resume)
             _check_map(target)
-            _remove(target)
+            old = _draft(target)
+            target.rename(old)  # at once: a half-removed store is never taken for a map
+            shutil.rmtree(old)
     store = MapStore(target, blocks_of(cube), tuple(parameters))
     draft = _draft(target)
     try:
@@ -205,8 +262,7 @@ def _continued(
 ) -> MapStore:
     """Open the store of the same map. Raises UsageError for another one, and without `resume`."""
     stored = _check_map(target)
-    differs = next((words for key, words in _OTHERWISE.items() if stored.get(key) != identity[key]), "")
-    if differs:
+    if differs := next((words for key, words in _OTHERWISE.items() if stored.get(key) != identity[key]), ""):
         raise UsageError(
             f"{target}: {differs}, and cannot be continued; replace it with `overwrite=True`, or choose"
             " another `out`"
@@ -272,12 +328,6 @@ def _draft(target: Path) -> Path:
     return draft
 
 
-def _remove(target: Path) -> None:
-    draft = _draft(target)
-    target.rename(draft)  # at once: a half-removed store is never taken for a map
-    shutil.rmtree(draft)
-
-
 def _check_map(path: Path) -> dict[str, str]:
     """Return the identity of the map stored at `path`. Raises UsageError where there is none."""
     zarr = zarr_package()
@@ -308,25 +358,19 @@ def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any]
         )
     for name, given in cube.coords.items():
         units, values = cube.units.get(name), np.asarray(given)
+        axes = cube.dims[: values.ndim]
+        if values.ndim == 1:  # along the axis of its name, else the first of its length
+            axes = (name if name in cube.dims else cube.dims[cube.shape.index(len(values))],)
         group.create_array(
             name,
             # zarr 3 specifies texts of any length, and none of a fixed one
             data=values.astype(np.dtypes.StringDType()) if values.dtype.kind == "U" else values,
-            dimension_names=_coordinate_dims(cube, name, values),
+            dimension_names=axes,
             attributes={"units": units} if units else {},
         )
     group.create_array(DONE, shape=blocks.grid, chunks=(1,) * len(blocks.grid), dtype="uint8", fill_value=0)
     with _quietly():
         zarr_package().consolidate_metadata(path)
-
-
-def _coordinate_dims(cube: Cube, name: str, values: np.ndarray) -> tuple[str, ...]:
-    """The axes of a coordinate: the one of its name, else the first of its length."""
-    if values.ndim != 1:
-        return cube.dims[: values.ndim]
-    if name in cube.dims:
-        return (name,)
-    return (cube.dims[cube.shape.index(len(values))],)
 
 
 @contextmanager
