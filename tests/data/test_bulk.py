@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.tabular import table as bulk
+from pellicle.data.tabular import layout as bulk
 from pellicle.errors import DataError
 from tests.data.tables import assert_read
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pellicle.data.formats.detect import read_tables
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.tabular.table import read_table
+from pellicle.data.tabular.layout import read_table
 from pellicle.errors import DataError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -20,7 +20,7 @@ FILES = [*(ROOT / "measurements").rglob("*nm*.csv"), *(ROOT / "measurements").rg
 
 def by_pandas(table):
     """Every column."""
-    cells = table.layout.cells
+    cells = table.cells
     frame = pd.read_csv(
         StringIO("\n".join(line.bare for line in cells.rows)),
         sep=r"\s+" if cells.delimiter == " " else cells.delimiter,
@@ -30,7 +30,7 @@ def by_pandas(table):
         decimal=cells.decimal,
         skipinitialspace=True,
     )
-    return [frame[i].to_numpy() for i in range(table.layout.width)]
+    return [frame[i].to_numpy() for i in range(table.width)]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)

@@ -256,7 +256,7 @@ def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
 def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool = False) -> list[Input]:
     """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
     each of several spectra."""
-    from pellicle.data.file_spectra import ALL
+    from pellicle.data.read_spectrum import ALL
 
     if is_of_colours(path, reading):
         try:

@@ -191,8 +191,8 @@ def read_films(path: str, reading: FileOptions, angle: float | list[float] | Non
 
     **Raises:** DataError or UsageError.
     """
-    from pellicle.data.file_spectra import ALL
     from pellicle.data.read_colours import read_colours_by_film
+    from pellicle.data.read_spectrum import ALL
 
     if wrong := [name for name in reading.given() if name not in of_kind(COLOURS)]:
         raise UsageError(

@@ -3,13 +3,13 @@
 import os
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.data.colours import SPACES
-from pellicle.data.tabular.layout import plain_columns
-from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number, open_binary, read_bytes, split, text_file
 from pellicle.data.tabular.units import colour_unit
 from pellicle.errors import DataError, UsageError
@@ -263,8 +263,8 @@ def colour_table(
     """Return the table of cells that `named_cells` has found, whose numbers are at these positions."""
     comma = delimiter != "," and any("," in row[i] for row in cells for i in positions)
     decimal = "," if comma else "."
-    layout = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
-    return Table(file.path, file.sha256, layout)
+    table = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
+    return replace(table, path=file.path, sha256=file.sha256)
 
 
 def bare_name(name: str) -> tuple[str, str | None]:

@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from pellicle.data.formats.detect import read_tables
+from pellicle.data.read_power import beside_wavelength, by_position, read_signal
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import read_signal
-from pellicle.data.tabular.column_selection import (
-    COUNTS,
-    SpectrumColumns,
-    counts_columns,
-    counts_columns_beside,
-    named_columns,
-)
+from pellicle.data.tabular.column_selection import Selection, named_columns, only
+from pellicle.data.tabular.columns import COUNTS, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import check_noise, check_power
@@ -37,7 +32,7 @@ def read_counts(
     **Raises:** DataError or UsageError as `read_spectrum` does; any finite count is accepted.
     """
     table = _only_table(path)
-    counts = _read(table, counts_columns(table, columns), wavelength_unit)
+    counts = _read(table, _counts_columns(table, columns), wavelength_unit)
     return counts if range is None else counts.cut(*range)
 
 
@@ -55,8 +50,9 @@ def read_counts_beside(
     **Returns:** a `Spectrum` as `read_counts` does; None where the file has none.
     """
     table = _only_table(path)
-    chosen = counts_columns_beside(table, columns, part)
-    return None if chosen is None else _read(table, chosen, wavelength_unit)
+    named = named_columns(table, columns) or ()
+    counts = only(table, named, part)
+    return _read(table, beside_wavelength(table, named, counts), wavelength_unit) if counts else None
 
 
 def has_counts(path: str | os.PathLike[str], columns: str | Sequence[str] | None = None) -> bool:
@@ -72,10 +68,30 @@ def _only_table(path: str | os.PathLike[str]) -> Table:
     return table
 
 
-def _read(table: Table, chosen: SpectrumColumns, wavelength_unit: str | None) -> Spectrum:
+def _counts_columns(table: Table, columns: str | Sequence[str] | None) -> Selection:
+    """Choose the columns of raw counts: those of the sample, or the one column beside the wavelength."""
+    named = named_columns(table, columns)
+    if named is None:
+        return by_position(table, "counts")
+    sample = [c for c in named if c.role == "sample counts"]
+    free = [
+        c
+        for c in named
+        if c.role not in ("wavelength", "sigma", "angle", "azimuth") and c.name not in ("_", "")
+    ]
+    counts = sample or free
+    if len(counts) != 1:
+        raise UsageError(
+            f"{table.path}: expected one column of counts beside the wavelength, found "
+            f'{listed(counts) or "none"}; choose one, as in `columns=["wavelength", "counts"]`'
+        )
+    return beside_wavelength(table, named, counts[0])
+
+
+def _read(table: Table, chosen: Selection, wavelength_unit: str | None) -> Spectrum:
     rows = read_signal(table, chosen, wavelength_unit)
-    counts = rows.spectrum((), {"values": rows.columns[0]}, signal="counts", calibrated=False)
-    return replace(counts, declared=table.layout.declared.facts)
+    counts = rows.spectrum((), {"values": rows.columns["values"]}, signal="counts", calibrated=False)
+    return replace(counts, declared=table.declared.facts)
 
 
 def reflectance_from_counts(

@@ -7,101 +7,141 @@ A column of depolarisation, 1 − N² − C² − S², is read with them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
-from pellicle.data.ellipsometry_angles import (
-    ALPHA_BETA,
-    FOLDED_FORMS,
-    FORMS,
-    NCS,
-    PSI_DELTA,
-    TAN_COS,
-    PsiDelta,
-    from_alpha_beta,
-    from_ncs,
-    from_tan_cos,
-)
 from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import REMEDY, Reading, Rows, SeveralColumns, error_columns, without_header
-from pellicle.data.tabular.axis_and_signal import Axis
+from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Reading, Rows
+from pellicle.data.tabular.axis import Axis
 from pellicle.data.tabular.column_selection import (
     AxisColumns,
-    axis_columns,
-    choice_notes,
+    Selection,
+    error_columns,
     first_column,
     only,
+    select,
+    without_header,
 )
 from pellicle.data.tabular.columns import Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
-from pellicle.signals.limits import FOLDED_DELTA, check_depolarisation, check_psi_delta, refuse_first
+from pellicle.signals.limits import FOLDED_DELTA, Where, check_depolarisation, check_psi_delta, refuse_first
 
 SIGNAL = "psi-delta"
+PSI_DELTA, NCS = ("psi", "delta"), ("N", "C", "S")
+ALPHA_BETA, TAN_COS = ("alpha", "beta"), ("tan_psi", "cos_delta")
+FORMS = (PSI_DELTA, NCS, ALPHA_BETA, TAN_COS)
+"""The columns of each form; where a file has several, the first is read."""
+FOLDED_FORMS = (ALPHA_BETA, TAN_COS)
+"""Forms that contain cos Δ only."""
+POLARISED = (0.5, 1.05)
+"""Accepted degrees of polarisation of N, C, S: below, noise dominates; above, the columns are not N, C, S."""
+HIGHEST_COSINE = 1.05
+"""Noise takes cos Δ this far beyond 1; further, the column is not cos Δ."""
+_ROUNDED = 3e-3
+"""1 − N² − C² − S² below this is rounding: of three decimals in each it reaches 0.0017."""
 _METAL_N, _METAL_K = 13, 80
 """Largest n and k of common metals up to 12 µm (gold), in tables that look like psi and delta."""
 _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
 _SOME = "the standard deviation of only one of psi and delta; add the other, or skip it"
+_SHARES = ("depolarisation", "sigma_depolarisation")
 
 
-@dataclass(frozen=True)
-class EllipsometryColumns(SeveralColumns):
-    """Columns of one form, with the errors of Ψ and Δ or none, and the depolarisation (and its error) or
-    none."""
+class Angles(NamedTuple):
+    """Ψ and Δ in degrees, a sentence on the conversion, and the depolarisation, where it is known."""
 
-    form: tuple[str, ...] = PSI_DELTA
-    analyser: Column | None = None
-    depolarisation: tuple[Column, ...] = ()
+    psi: Float[np.ndarray, " points"]
+    delta: Float[np.ndarray, " points"]
+    note: str | None = None
+    depolarisation: Float[np.ndarray, " points"] | None = None
 
 
-def read_ellipsometry(table: Table, chosen: EllipsometryColumns, asked: Reading) -> Spectrum:
+def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Selection:
+    """Choose the columns of Ψ and Δ, in any form. Raises DataError or UsageError."""
+    if columns is None and table.width == 3:
+        named = (Column(1, "", "psi"), Column(2, "", "delta"))
+        note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
+        return Selection(SIGNAL, AxisColumns(first_column(table)), named, notes=(note,))
+    if columns is None:
+        raise without_header(table, _EXAMPLE)
+    roles = {column.role for column in columns}
+    form = next((form for form in FORMS if roles & set(form)), PSI_DELTA)
+    values = [column for role in form if (column := only(table, columns, role)) is not None]
+    if len(values) != len(form):
+        raise DataError(
+            f"{table.path}: psi and delta, N, C and S, alpha and beta, or tan_psi and cos_delta are not all "
+            f"among {listed(columns)}; name the columns in order, as in {_EXAMPLE}"
+        )
+    for column in values:
+        if column.unknown_unit or column.unit == "percent":
+            known = "convert both to degrees" if form == PSI_DELTA else "write plain numbers, as 0.5"
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
+            )
+    errors = error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
+    analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
+    share, error = (only(table, columns, role) for role in _SHARES)
+    shares = [column for column in (share, error) if column] if share else []
+    notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
+    for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False):
+        if column.unknown_unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write a "
+                "depolarisation as a fraction, or in percent with % in the column's name"
+            )
+        unit = "in percent" if column.unit == "percent" else "a fraction"
+        notes.append(f"{column.name!r} read as {meaning}, {unit}")
+    others, meaning = [*shares, analyser], ", ".join(form)
+    return select(
+        table, columns, SIGNAL, values, meaning, _EXAMPLE, errors=errors, others=others, notes=notes
+    )
+
+
+def read_ellipsometry(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
     """Read Ψ and Δ of the chosen columns, Δ in 0 to 360. Raises DataError or UsageError."""
-    facts, folded = dict(table.layout.declared.facts), asked.folded
+    facts, folded = dict(table.declared.facts), asked.folded
+    form = tuple(column.role for column in chosen.values)
     if folded is None and facts.get("delta", "").startswith("folded"):
         folded = True
-    _check_form(table, chosen, folded, asked.analyser)
-    cells = (*chosen.values, *([chosen.analyser] if chosen.analyser else []))
-    every = (*cells, *chosen.errors, *chosen.depolarisation)
-    rows = Rows.read(table, chosen, every, asked.wavelength_unit)
-    psi, delta, note, share = _psi_delta(table, chosen, rows.columns, asked.analyser)
-    errors = rows.columns[len(cells) : len(cells) + len(chosen.errors)]
-    pairs = zip(chosen.depolarisation, rows.columns[len(cells) + len(errors) :], strict=True)
-    shares = [x / 100.0 if column.unit == "percent" else x for column, x in pairs]
-    if not shares and share is not None:
-        shares = [share]
+    _check_arguments(table, chosen, form, folded, asked.analyser)
+    rows = Rows.read(table, chosen, asked.wavelength_unit)
+    psi, delta, note, share = _converted(rows, chosen, form, asked.analyser)
     notes = [note] if note else []
+    arrays = {"values": psi, "delta": delta} | ({} if share is None else {"depolarisation": share})
+    for column in chosen.others:
+        if column.role in _SHARES:
+            name = "depolarisation" if column.role == _SHARES[0] else "depolarisation_sigma"
+            arrays[name] = rows.columns[column.role] / (100.0 if column.unit == "percent" else 1.0)
+    errors = [rows.columns[column.role] for column in chosen.errors]
     if asked.noise is not None:
-        errors = (np.full(psi.size, float(asked.noise)),) * 2
-        notes += ["the given noise replaces the columns of errors"] if chosen.errors else []
-    if chosen.form in (*FOLDED_FORMS, NCS):
-        folded = chosen.form != NCS
+        notes += [NOISE_REPLACES] if errors else []
+        errors = [np.full(psi.size, float(asked.noise))]
+    arrays |= dict(zip(("sigma", "delta_sigma"), errors * 2, strict=False))
+    if form in (*FOLDED_FORMS, NCS):
+        folded = form != NCS
     notes.append("psi and delta in degrees")
     folding = _folding(rows.axis, psi, delta) if folded is None else None
-    rows = replace(rows, columns=(psi, delta, *errors, *shares)).cut(asked.range)
-    psi, delta, *rest = rows.columns
-    sigma, shares = rest[: len(errors)], rest[len(errors) :]
-    _check(rows, chosen, psi, delta, sigma, bool(folded))
-    _check_depolarisation(rows, chosen.depolarisation, shares)
+    rows = replace(rows, columns=arrays).cut(asked.range)
+    arrays = rows.columns
+    _check(rows, chosen, form, bool(folded))
     if folded is None:
         # outside of the range nothing is checked
-        folding = folding or _folding(rows.axis, psi, delta)
-        folded = folding is not None and can_be_folded(delta)
+        folding = folding or _folding(rows.axis, arrays["values"], arrays["delta"])
+        folded = folding is not None and can_be_folded(arrays["delta"])
         notes += [folding_note(folding)] if folded and folding else []
     elif folded:
         notes.append("delta is known in 0 to 180 only: cos(delta) is fitted")
-    arrays = {"values": psi, "delta": np.clip(delta, *FOLDED_DELTA) if folded else delta % 360.0}
-    arrays |= {"sigma": sigma[0] if sigma else None, "delta_sigma": sigma[-1] if sigma else None}
-    arrays |= dict(zip(("depolarisation", "depolarisation_sigma"), shares, strict=False))
-    spectrum = rows.spectrum(notes, arrays, signal=SIGNAL, folded=folded)
-    transmitted = facts.get("light", "").startswith("transmitted")
-    if transmitted if asked.transmission is None else asked.transmission:
-        sweeps = tuple(replace(sweep, transmission=True) for sweep in spectrum.sweeps)
-        notes = (*spectrum.notes, "of transmitted light: conj(t_p/t_s)")
-        spectrum = replace(spectrum, transmission=True, notes=notes, sweeps=sweeps)
-    return spectrum
+    arrays["delta"] = np.clip(arrays["delta"], *FOLDED_DELTA) if folded else arrays["delta"] % 360.0
+    transmitted = asked.transmission
+    if transmitted is None:
+        transmitted = facts.get("light", "").startswith("transmitted")
+    notes += ["of transmitted light: conj(t_p/t_s)"] if transmitted else []
+    return rows.spectrum(notes, arrays, signal=SIGNAL, folded=folded, transmission=transmitted)
 
 
 def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
@@ -114,21 +154,22 @@ def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
     return folding_at(axis.wavelength, psi, delta, curve.ravel().astype(float))
 
 
-def _check_form(
-    table: Table, columns: EllipsometryColumns, folded: bool | None, analyser: float | None
+def _check_arguments(
+    table: Table, chosen: Selection, form: tuple[str, ...], folded: bool | None, analyser: float | None
 ) -> None:
     """Refuse arguments that do not go with the columns. Raises UsageError."""
-    if folded and columns.form == NCS:
+    in_file = any(column.role == "analyser" for column in chosen.others)
+    if folded and form == NCS:
         raise UsageError(f"{table.path}: N, C and S contain the sign of delta; leave `folded` out")
-    if columns.form != ALPHA_BETA:
+    if form != ALPHA_BETA:
         if analyser is not None:
             raise UsageError(f"{table.path}: `analyser` goes with columns alpha and beta; leave it out")
-    elif analyser is None and columns.analyser is None:
+    elif analyser is None and not in_file:
         raise UsageError(
             f"{table.path}: alpha and beta need the analyser's angle: give it as in `analyser=45`, or add a "
             "column analyser_deg"
         )
-    elif analyser is not None and columns.analyser is not None:
+    elif analyser is not None and in_file:
         raise UsageError(
             f"{table.path}: alpha and beta come with a column of analyser angles; leave `analyser` out, or "
             "skip the column analyser_deg"
@@ -137,114 +178,110 @@ def _check_form(
         raise UsageError(f"`analyser` must lie between 0 and 90 degrees, got {analyser:g}")
 
 
-def _psi_delta(
-    table: Table, columns: EllipsometryColumns, read: Sequence[np.ndarray], analyser: float | None
-) -> PsiDelta:
-    """Ψ and Δ in degrees from the columns that were read."""
-    position = columns.values[0].position
-    if columns.form == NCS:
-        return from_ncs(table, position, np.array(read[:3]))
-    if columns.form == PSI_DELTA:
-        return PsiDelta(read[0], read[1])
-    if columns.form == TAN_COS:
-        return from_tan_cos(table, [column.position for column in columns.values], np.array(read[:2]))
-    if columns.analyser is None:
-        angles = np.full(read[0].size, analyser, dtype=float)
-        return from_alpha_beta(table, position, np.array(read[:2]), angles)
-    angles, reason = read[2], f"is not between 0 and 90 degrees; {REMEDY}"
-    refuse_first(angles, (angles <= 0) | (angles >= 90), table.places(columns.analyser.position), reason)
-    return from_alpha_beta(table, position, np.array(read[:2]), angles)
+def _converted(rows: Rows, chosen: Selection, form: tuple[str, ...], analyser: float | None) -> Angles:
+    """Ψ and Δ in degrees from the columns that were read. Raises DataError."""
+    read, places = rows.stacked(form).T, [rows.places(column) for column in chosen.values]
+    if form == PSI_DELTA:
+        return Angles(*read)
+    if form == NCS:
+        return _from_ncs(read, places[0])
+    if form == TAN_COS:
+        return _from_tan_cos(read, places)
+    angles = np.full(read[0].size, analyser, dtype=float)
+    for column in chosen.others:
+        if column.role == "analyser":
+            angles, reason = rows.columns["analyser"], f"is not between 0 and 90 degrees; {REMEDY}"
+            refuse_first(angles, (angles <= 0) | (angles >= 90), rows.places(column), reason)
+    return _from_alpha_beta(read, angles, places[0])
 
 
-def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> EllipsometryColumns:
-    """Choose the columns of Ψ and Δ, in any form. Raises DataError or UsageError."""
-    if columns is None:
-        return _by_position(table)
-    roles = {column.role for column in columns}
-    form = next((form for form in FORMS if roles & set(form)), PSI_DELTA)
-    values = tuple(column for role in form if (column := only(table, columns, role)) is not None)
-    if len(values) != len(form):
+def _from_ncs(columns: Float[np.ndarray, "3 points"], place: Where) -> Angles:
+    """Convert N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ, each times the degree of polarisation.
+
+    Raises DataError for an impossible degree of polarisation.
+    """
+    polarised = np.sqrt(np.sum(columns**2, axis=0))
+    wrong = (polarised < POLARISED[0]) | (polarised > POLARISED[1])
+    if wrong.any():
+        row = int(np.argmax(wrong))
         raise DataError(
-            f"{table.path}: psi and delta, N, C and S, alpha and beta, or tan_psi and cos_delta are not all "
-            f"among {listed(columns)}; name the columns in order, as in {_EXAMPLE}"
+            f"{place(row)}: N, C and S make a degree of polarisation of "
+            f"{polarised[row]:.3g}, where about 1 is possible; {REMEDY}"
         )
-    for column in values:
-        if column.unknown_unit or column.unit == "percent":
-            known = "convert both to degrees" if form == PSI_DELTA else "write plain numbers, as 0.5"
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
-            )
-    axis = axis_columns(table, columns, _EXAMPLE)
-    errors = error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
-    analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
-    shares = _depolarisation_columns(table, columns)
-    notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
-    notes += [
-        f"{column.name!r} read as {meaning}, {'in percent' if column.unit == 'percent' else 'a fraction'}"
-        for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False)
-    ]
-    notes = choice_notes(columns, axis, values, ", ".join(form), [*errors, *shares, analyser], notes)
-    return EllipsometryColumns(axis, values, errors, notes, form, analyser, shares)
+    psi = np.rad2deg(0.5 * np.arctan2(np.hypot(columns[1], columns[2]), columns[0]))
+    delta, share = np.rad2deg(np.arctan2(columns[2], columns[1])), 1 - polarised**2
+    note = "N, C, S converted to psi and delta"
+    if np.max(np.abs(share)) < _ROUNDED:
+        return Angles(psi, delta, note)
+    return Angles(psi, delta, f"{note}, and 1 - N² - C² - S² read as the depolarisation", share)
 
 
-def _by_position(table: Table) -> EllipsometryColumns:
-    if table.layout.width != 3:
-        raise without_header(table, _EXAMPLE)
-    axis = AxisColumns(first_column(table))
-    psi, delta = (Column(i, "", role) for i, role in ((1, "psi"), (2, "delta")))
-    note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
-    return EllipsometryColumns(axis, (psi, delta), (), (note,))
+def _from_alpha_beta(
+    alpha_beta: Float[np.ndarray, "2 points"], analyser: Float[np.ndarray, " points"], place: Where
+) -> Angles:
+    """Convert α, β of a rotating analyser; Δ is in 0 to 180, since only cos Δ is measured.
+
+    `analyser` is the angle of the fixed polariser from the plane of incidence. tan Ψ = tan A
+    √((1 + α)/(1 − α)) and cos Δ = β/√(1 − α²), the inverse of `optics.ellipsometry.alpha_beta`. Where
+    noise takes β beyond √(1 − α²), Δ is 0 or 180. Raises DataError for a contrast above 1.
+    """
+    alpha, beta = alpha_beta
+    contrast = np.hypot(alpha, beta)
+    wrong = (contrast > POLARISED[1]) | (np.abs(alpha) > 1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{place(row)}: alpha {alpha[row]:g} and beta {beta[row]:g} make a contrast of "
+            f"{contrast[row]:.3g}, where at most 1 is possible; {REMEDY}"
+        )
+    psi = np.rad2deg(np.arctan2(np.tan(np.deg2rad(analyser)) * np.sqrt(1 + alpha), np.sqrt(1 - alpha)))
+    delta = np.rad2deg(np.arctan2(np.sqrt(np.maximum(1 - contrast**2, 0.0)), beta))
+    over = int(np.sum(contrast > 1))
+    limited = f"; delta is 0 or 180 at {over} points whose contrast is above 1" if over else ""
+    return Angles(psi, delta, f"alpha and beta converted to psi and delta{limited}")
 
 
-def _depolarisation_columns(table: Table, columns: Sequence[Column]) -> tuple[Column, ...]:
-    """The depolarisation and, if there is one, its standard deviation. Raises DataError."""
-    share, error = only(table, columns, "depolarisation"), only(table, columns, "sigma_depolarisation")
-    if share is None:
-        return ()
-    chosen = (share, error) if error else (share,)
-    for column in chosen:
-        if column.unknown_unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write a "
-                "depolarisation as a fraction, or in percent with % in the column's name"
-            )
-    return chosen
+def _from_tan_cos(tan_cos: Float[np.ndarray, "2 points"], places: Sequence[Where]) -> Angles:
+    """Convert tan Ψ and cos Δ; Δ is in 0 to 180. Where noise takes cos Δ beyond 1, Δ is 0 or 180.
+
+    Raises DataError for a tangent below 0, or a cosine beyond ±1.05.
+    """
+    tangent, cosine = tan_cos
+    refuse_first(tangent, tangent < 0, places[0], f"is no tan(psi), below zero; {REMEDY}")
+    reason = f"is no cos(delta), beyond 1; {REMEDY}, or name the columns psi_deg and delta_deg"
+    refuse_first(cosine, np.abs(cosine) > HIGHEST_COSINE, places[1], reason)
+    over = int(np.sum(np.abs(cosine) > 1))
+    limited = f"; delta is 0 or 180 at {over} points whose cosine is above 1" if over else ""
+    delta = np.rad2deg(np.arccos(np.clip(cosine, -1, 1)))
+    return Angles(np.rad2deg(np.arctan(tangent)), delta, f"tan(psi) and cos(delta) converted{limited}")
 
 
-def _check_depolarisation(rows: Rows, columns: Sequence[Column], values: Sequence[np.ndarray]) -> None:
-    """Refuse a depolarisation that is no fraction, or errors of it not above zero. Raises DataError."""
-    if columns:
-        percent = "if it is in percent, name the column `depolarisation (%)`"
-        remedy = REMEDY if columns[0].unit == "percent" else percent
-        check_depolarisation(values[0], rows.places(columns[0]), remedy)
-        rows.check_errors(columns[1:], values[1:])
-
-
-def _check(
-    rows: Rows,
-    columns: EllipsometryColumns,
-    psi: np.ndarray,
-    delta: np.ndarray,
-    sigma: Sequence[np.ndarray],
-    folded: bool,
-) -> None:
-    """Refuse Ψ, Δ and errors outside their limits, and values in radians. Raises DataError."""
-    named = columns.values if columns.form == PSI_DELTA else (columns.axis.wavelength,) * 2
+def _check(rows: Rows, chosen: Selection, form: tuple[str, ...], folded: bool) -> None:
+    """Refuse Ψ, Δ, depolarisation and errors outside their limits, and radians. Raises DataError."""
+    psi, delta = rows.columns["values"], rows.columns["delta"]
+    named = chosen.values if form == PSI_DELTA else (chosen.axis.wavelength,) * 2
     at_psi, at_delta = map(rows.places, named)
     check_psi_delta(psi, delta, folded, at_psi, at_delta, REMEDY)
-    rows.check_errors((columns.errors * 2)[:2], sigma)
+    rows.check_errors(dict(zip(("sigma", "delta_sigma"), chosen.errors * 2, strict=False)))
     path = rows.table.path
-    unnamed = not any(column.name for column in columns.values)
+    unnamed = not any(column.name for column in chosen.values)
     if unnamed and psi.max() < _METAL_N and delta.min() >= 0 and delta.max() < _METAL_K:
         raise DataError(
             f"{path}: has no header, and its values up to {psi.max():g} and {delta.max():g} may be n "
             "and k; give optical constants as `layer` or `substrate`, or say that they are angles with "
             '`columns=["wavelength", "psi_deg", "delta_deg"]`'
         )
-    stated = any(column.unit == "deg" for column in columns.values) or columns.form != PSI_DELTA
+    stated = any(column.unit == "deg" for column in chosen.values) or form != PSI_DELTA
     if not stated and psi.max() < np.pi / 2 and np.abs(delta).max() < 2 * np.pi:
         raise DataError(
             f"{path}: psi is at most {psi.max():g} and delta {np.abs(delta).max():g}, "
             "which look like radians, or tan(psi) and cos(delta); write degrees and name the columns psi_deg "
             "and delta_deg, or name them tan_psi and cos_delta"
         )
+    shares = {column.role: column for column in chosen.others if column.role in _SHARES}
+    if shares:
+        share, error = shares[_SHARES[0]], shares.get(_SHARES[1])
+        percent = "if it is in percent, name the column `depolarisation (%)`"
+        remedy = REMEDY if share.unit == "percent" else percent
+        check_depolarisation(rows.columns["depolarisation"], rows.places(share), remedy)
+        rows.check_errors({"depolarisation_sigma": error} if error else {})

@@ -1,86 +1,352 @@
-"""Reading of reflectance and transmittance from a table: their units and checks."""
+"""Reading of reflectance, transmittance and counts from a table: their columns, units and checks."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import Reading, Rows, read_signal
-from pellicle.data.tabular.axis_and_signal import axis_unit, signal_scale
-from pellicle.data.tabular.column_selection import SpectrumColumns
+from pellicle.data.spectrum_rows import Reading, Rows
+from pellicle.data.tabular.axis import axis_unit
+from pellicle.data.tabular.column_names import COUNTERS, MUELLER, RATIO_COLUMNS
+from pellicle.data.tabular.column_selection import (
+    AxisColumns,
+    Selection,
+    first_column,
+    named_columns,
+    only,
+    select,
+)
+from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed, unknown_unit
 from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 from pellicle.signals.one_column import OneColumn
 from pellicle.signals.registry import KINDS
 
+_EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
+_EXAMPLE = '`columns=["wavelength", "R"]`'
+_SEVERAL_COLUMNS = {
+    "psi and delta": ("psi", "delta"),
+    "elements of a Mueller matrix": MUELLER,
+    "generalised psi and delta": RATIO_COLUMNS,
+}
+"""Roles of the signals that have several columns."""
+_LEAST_ABSORBANCE = -300.0
+"""Absorbances below it would overflow; the signal is refused anyhow, as far above 1."""
 
-def read_power(table: Table, columns: SpectrumColumns, asked: Reading) -> Spectrum:
+
+def power_columns(
+    table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
+) -> list[Selection]:
+    """Find the reflectances and transmittances of a table; arguments as in `read_spectra`.
+
+    Several are returned where the arguments do not tell them apart. Raises UsageError or DataError where
+    there is none, with the argument that settles it.
+    """
+    named = named_columns(table, columns)
+    if named is None:
+        if signal is None:
+            raise UsageError(f"{table.path}: {_ask_without_header(table.width)}")
+        return [by_position(table, signal)]
+    chosen = _signals(table, named, signal, polarisation, by_caller=columns is not None)
+    if [column.role for column in chosen] != ["sample counts"]:
+        return [beside_wavelength(table, named, column) for column in chosen]
+    # the transmittance that counts of a sample, a reference and possibly the dark make
+    of_sample = beside_wavelength(table, named, chosen[0])
+    reference, dark = only(table, named, "reference counts"), only(table, named, "dark counts")
+    assert reference is not None
+    formula = "(sample - dark) / (reference - dark)" if dark else "sample / reference"
+    notes = (*of_sample.notes, f"transmittance computed from counts: {formula}")
+    values = (replace(chosen[0], role="T", unit="fraction", unknown_unit=None),)
+    others = (reference, dark) if dark else (reference,)
+    return [replace(of_sample, signal="T", values=values, others=others, notes=notes)]
+
+
+def _ask_without_header(width: int) -> str:
+    """Ask what the columns of a table without a header are."""
+    names = '`columns=["wavelength", "angle", "psi", "delta"]`'
+    if width <= 2:
+        return f"has no header, so say what its second column is with {_EITHER_SIGNAL}"
+    if width == 3:
+        return (
+            f"has 3 columns and no header; say what the second is with {_EITHER_SIGNAL} (the third then is "
+            f'its error), or that they are psi and delta with `signal="psi-delta"`, or name them: {names}'
+        )
+    return (
+        f"has {width} columns and no header; name them in order, _ to skip one, as in "
+        f'`columns=["wavelength", "R_percent", "_"]` or {names}'
+    )
+
+
+def by_position(table: Table, role: str) -> Selection:
+    """Select the columns of a table without a header: wavelength, signal, sigma. Raises UsageError."""
+    width = table.width
+    if width > 4:
+        raise UsageError(
+            f"{table.path}: has {width} columns and no header; name them in order, as in "
+            '`columns=["wavelength", "R", "_", "sigma"]`'
+        )
+    errors = (Column(2, "", "sigma"),) if width > 2 and role != "counts" else ()
+    notes = [f"no header: column 1 read as the wavelength, column 2 as {role}"]
+    if errors:
+        notes.append("column 3 read as sigma, the standard deviation of the signal")
+    if width > 3:
+        notes.append("column 4 (by custom the error of the wavelength) ignored")
+    axis = AxisColumns(first_column(table))
+    return Selection(role, axis, (Column(1, "", role),), errors, notes=tuple(notes))
+
+
+def beside_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> Selection:
+    """Select one signal with its sigma. Raises DataError as `select` does."""
+    if signal.role in COUNTS:  # the others are not ignored
+        columns = [c for c in columns if c.role not in COUNTS or c is signal]
+    sigma = only(table, columns, "sigma")
+    errors = [sigma] if sigma else []
+    notes = [f"{listed(errors)} read as the standard deviation of the signal"] if errors else []
+    return select(table, columns, signal.role, [signal], "the signal", _EXAMPLE, errors=errors, notes=notes)
+
+
+def _signals(
+    table: Table,
+    columns: Sequence[Column],
+    signal: str | None,
+    polarisation: str | None,
+    by_caller: bool,
+) -> list[Column]:
+    """The columns that may be meant. Raises UsageError or DataError where none is."""
+    measured = [c for c in columns if c.role in SIGNALS]
+    absorbed = [c for c in measured if c.role == "T" and c.unit == "absorbance"]
+    if signal == "R" and measured and measured == absorbed and not by_caller:
+        raise UsageError(
+            f"{table.path}: {listed(measured)} is an absorbance, read as T = 10^-A, which contradicts "
+            '`signal="R"`; leave that out, or if it is log(1/R), say so with '
+            f'`columns="{_renamed(columns, absorbed[0])}"`'
+        )
+    measured = [c for c in measured if signal in (None, c.role)]
+    if not measured:
+        return _unnamed_signals(table, columns, signal)
+    wanted = [c for c in measured if polarisation and (c.polarisation or "unpolarised") == polarisation]
+    measured = wanted or measured
+    stated = {c.polarisation for c in measured}
+    if polarisation and None not in stated and len(stated) == 1 and stated != {polarisation}:
+        raise UsageError(
+            f"{table.path}: {listed(measured)} is measured in {measured[0].polarisation} light, which "
+            f'contradicts `polarisation="{polarisation}"`; leave that out'
+        )
+    return measured
+
+
+def _renamed(columns: Sequence[Column], column: Column) -> str:
+    """Names for the argument `columns` with which a column of absorbance is log(1/R)."""
+    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle", "azimuth": "azimuth"}
+    return ",".join("log(1/R)" if c is column else words.get(c.role, "_") for c in columns)
+
+
+def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None) -> list[Column]:
+    """An intensity, or columns whose names state no quantity, where the caller states it."""
+    intensity = only(table, columns, "intensity")
+    if intensity and signal is None:
+        raise UsageError(
+            f"{table.path}: {listed([intensity])} is uncalibrated; state the signal with {_EITHER_SIGNAL}"
+        )
+    if intensity:
+        return [intensity]
+    _check_no_other_signal(table, columns, signal)
+    roles = {c.role for c in columns}
+    named = [c for c in columns if c.name not in ("_", "")]
+    processed = [c for c in named if c.role == "processed"]
+    free = [c for c in named if c.role in ("other", "value")]
+    foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
+    counters = [] if foreign else free
+    unnamed = processed or [c for c in free if c.name.strip().lower() not in COUNTERS] or counters
+    _check_one_angle(table, unnamed)
+    if signal is not None and unnamed and "wavelength" in roles:
+        return [replace(c, role=signal) for c in unnamed]
+    sample = only(table, columns, "sample counts")
+    if sample and "reference counts" in roles and signal == "T":
+        return [sample]
+    if sample and "reference counts" in roles and not processed:
+        raise UsageError(
+            f'{table.path}: has counts of a sample and a reference; `signal="T"` takes their quotient, and a '
+            'reflectance needs the material of the reference as well, as in `reference_material="Si"`'
+        )
+    raise _no_signal(table, columns, unnamed if "wavelength" in roles else [], foreign)
+
+
+def _check_no_other_signal(table: Table, columns: Sequence[Column], signal: str | None) -> None:
+    """Raise UsageError for columns of another signal than the one that the caller states."""
+    roles = {c.role for c in columns}
+    other = next((role for role in SIGNALS if role in roles), None)
+    if other:
+        raise UsageError(f'{table.path}: has {other}, which contradicts `signal="{signal}"`; correct that')
+    for name, known in _SEVERAL_COLUMNS.items():
+        if roles & set(known):
+            raise UsageError(
+                f'{table.path}: has {name}, which contradicts `signal="{signal}"`; leave that out'
+            )
+
+
+def _check_one_angle(table: Table, unnamed: Sequence[Column]) -> None:
+    angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
+    if len(angles) > 1:
+        raise DataError(
+            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose two with "
+            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other '
+            "with a column angle_deg"
+        )
+
+
+def _no_signal(
+    table: Table, columns: Sequence[Column], unnamed: Sequence[Column], foreign: Sequence[Column]
+) -> DataError | UsageError:
+    """The error of a table whose columns name no signal: `unnamed` may be one, `foreign` are none."""
+    if unnamed:
+        percent = any(column.unit == "percent" for column in unnamed)
+        unit = "" if percent else ' (unit: `signal_unit="percent"`, ...)'
+        states = "states" if len(unnamed) == 1 else "state"
+        return UsageError(
+            f"{table.path}: {listed(unnamed)} {states} no quantity; state it with {_EITHER_SIGNAL}{unit}"
+            ', or name the columns, as in `columns=["wavelength", "R"]`'
+        )
+    if foreign:
+        names, verb = listed(foreign).replace("declared ", ""), "is" if len(foreign) == 1 else "are"
+        return DataError(
+            f"{table.path}: {names} {verb} neither a reflectance nor a transmittance; export one of these or "
+            "psi and delta, give raw counts with `reference`, or if it is one, name it: "
+            '`columns=["wavelength", "R"]`'
+        )
+    return DataError(
+        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "
+        f'{listed(columns)}; name the columns in order, as in `columns=["wavelength", "R"]`'
+    )
+
+
+def read_power(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
     """Read a reflectance or transmittance, cut to the range before its values are checked.
 
     Raises DataError or UsageError.
     """
-    kind, calibrated = asked.signal or columns.signal.role, asked.calibrated
+    [column], kind, calibrated = chosen.values, asked.signal or chosen.signal, asked.calibrated
     if calibrated is None:
-        calibrated = columns.signal.role != "intensity"
-    polarisation = _polarisation(table, columns, asked.polarisation)
-    axis_unit(table, columns.axis.wavelength, asked.wavelength_unit)  # asked for before that of the signal
-    scale = signal_scale(table, columns, asked.signal_unit)
-    rows = read_signal(table, columns, asked.wavelength_unit)
-    values, sigma = scale.fractions(rows.columns[0], rows.columns[1] if len(rows.columns) > 1 else None)
-    notes = [scale.note(kind, calibrated)]
-    if asked.noise is not None:
-        notes += [] if sigma is None else ["the given noise replaces the column of standard deviations"]
-        sigma = np.full(values.shape, float(asked.noise))
-    read = (values,) if sigma is None else (values, sigma)
-    rows = replace(rows, columns=read, notes=(*rows.notes, *notes)).cut(asked.range)
-    values, sigma = rows.columns[0], rows.columns[1] if len(rows.columns) > 1 else None
-    _check(rows, columns, kind, values, sigma, calibrated, scale.stated)
-    arrays = {"values": values, "sigma": sigma}
-    return rows.spectrum((), arrays, signal=kind, polarisation=polarisation, calibrated=calibrated)
-
-
-def _polarisation(table: Table, columns: SpectrumColumns, asked: str | None) -> str:
-    """The polarisation that column, file or caller state. Raises UsageError where they differ."""
-    declared, named = table.layout.declared.polarisation, columns.signal.polarisation
-    if declared is not None and not named and asked not in (None, declared):
+        calibrated = column.role != "intensity"
+    declared, named = table.declared.polarisation, column.polarisation
+    if declared is not None and not named and asked.polarisation not in (None, declared):
         raise UsageError(
-            f'{table.path}: declares {declared} light, which contradicts `polarisation="{asked}"`; leave '
-            "that out"
+            f"{table.path}: declares {declared} light, which contradicts "
+            f'`polarisation="{asked.polarisation}"`; leave that out'
         )
-    return named or declared or asked or "unpolarised"
+    axis_unit(table, chosen.axis.wavelength, asked.wavelength_unit)  # asked for before that of the signal
+    scale = signal_scale(table, chosen, asked.signal_unit)
+    rows = read_signal(table, chosen, asked.wavelength_unit)
+    columns, notes = scale.fractions(**rows.columns), [scale.note(kind, calibrated)]
+    if asked.noise is not None:
+        notes += ["the given noise replaces the column of standard deviations"] if chosen.errors else []
+        columns["sigma"] = np.full(len(columns["values"]), float(asked.noise))
+    rows = replace(rows, columns=columns, notes=(*rows.notes, *notes)).cut(asked.range)
+    _check(rows, chosen, kind, calibrated, scale.stated)
+    polarisation = named or declared or asked.polarisation or "unpolarised"
+    return rows.spectrum((), rows.columns, signal=kind, polarisation=polarisation, calibrated=calibrated)
 
 
-def _check(
-    rows: Rows,
-    columns: SpectrumColumns,
-    signal: str,
-    values: np.ndarray,
-    sigma: np.ndarray | None,
-    calibrated: bool,
-    unit_stated: bool,
-) -> None:
+def read_signal(table: Table, chosen: Selection, unit: str | None) -> Rows:
+    """Read `values` and, if there is one, their `sigma`, against an axis in the `unit` that the user gives.
+
+    A quotient of counts is infinite where the reference has none. Raises as `Rows.read` does.
+    """
+    rows = Rows.read(table, chosen, unit)
+    values, *sigma = (rows.columns[column.role] for column in (*chosen.values, *chosen.errors))
+    if chosen.others:
+        reference, background = rows.columns["reference counts"], rows.columns.get("dark counts", 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            quotient = (values - background) / (reference - background)
+        values = np.where(reference > background, quotient, np.inf)
+    return replace(rows, columns={"values": values} | ({"sigma": sigma[0]} if sigma else {}))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Units of a file's signal and σ, members of `SIGNAL_UNITS`, and whether file or caller states it."""
+
+    signal: str
+    sigma: str
+    stated: bool
+
+    def fractions(self, values: np.ndarray, sigma: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Convert the signal (points,) and its σ (points,) to fractions.
+
+        An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
+        """
+        if self.signal == "absorbance":
+            values = 10.0 ** -np.maximum(values, _LEAST_ABSORBANCE)
+        elif self.signal == "percent":
+            values = values / 100
+        fractions = {"values": values}
+        if sigma is not None:
+            factor = np.log(10.0) * values if self.sigma == "absorbance" else 1.0
+            fractions["sigma"] = sigma / 100 if self.sigma == "percent" else factor * sigma
+        return fractions
+
+    def note(self, quantity: str, calibrated: bool) -> str:
+        """Return a sentence on the unit in which the signal was read."""
+        if self.signal == "absorbance":
+            return f"signal unit: absorbance A, converted to {quantity} = 10^-A"
+        if not calibrated:
+            return "signal unit: arbitrary (uncalibrated)"
+        return f"signal unit: {self.signal}" + ("" if self.stated else ", assumed")
+
+
+def signal_scale(table: Table, chosen: Selection, requested: str | None) -> Scale:
+    """Return the scale from the column's name or from `requested`. It is never guessed from values.
+
+    Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
+    unknown and none is requested.
+    """
+    asked = None if requested is None else signal_unit(requested)
+    if requested is not None and asked is None:
+        raise UsageError(f"`signal_unit` must be one of {', '.join(SIGNAL_UNITS)}, not {requested!r}")
+    [column] = chosen.values
+    place = f"{table.path}: {table.label(column.position)}"
+    if column.unknown_unit and asked is None:
+        raise DataError(
+            f"{place} {unknown_unit(column)}; state it with "
+            '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
+        )
+    if asked and column.unit and asked != column.unit:
+        raise UsageError(
+            f'{place} is in {column.unit}, which contradicts `signal_unit="{asked}"`; leave that out, or '
+            "rename the columns with `columns`"
+        )
+    unit = column.unit or asked
+    sigma_unit = chosen.errors[0].unit if chosen.errors else None
+    return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)
+
+
+def _check(rows: Rows, chosen: Selection, signal: str, calibrated: bool, unit_stated: bool) -> None:
     """Check σ and the values of these rows, naming line and column. Raises DataError."""
-    table = rows.table
-    if sigma is not None and columns.sigma is not None:
-        if not columns.sigma.name and np.median(sigma) > np.abs(values).max():
+    table, values, sigma = rows.table, rows.columns["values"], rows.columns.get("sigma")
+    for column in chosen.errors:
+        assert sigma is not None
+        if not column.name and np.median(sigma) > np.abs(values).max():
             raise DataError(
                 f"{table.path}: has no header, and its third column, by custom the standard deviation, is "
                 "larger than the signal; name the columns, or give n and k as `layer` or `substrate`"
             )
-        where = rows.places(columns.sigma)
-        refuse_first(sigma, sigma <= 0, where, "is not above zero; correct or delete that row")
-    position = columns.signal.position
+        reason = "is not above zero; correct or delete that row"
+        refuse_first(sigma, sigma <= 0, rows.places(column), reason)
+    [column] = chosen.values
     if not calibrated:
         if values.max() <= 0:
-            raise DataError(f"{table.path}: {table.label(position)} is nowhere positive; check what it holds")
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is nowhere positive; check what it holds"
+            )
         return
     remedy = "leave it out with `range`, or correct that row"
     too_high = (
         'if the file is in percent or an absorbance, say so with `signal_unit="percent"` or '
         '`signal_unit="absorbance"`, or in its header'
     )
-    where = rows.places(columns.signal)
     kind = KINDS[signal]()
     assert isinstance(kind, OneColumn)
-    kind.check_values(values, sigma, where, remedy if unit_stated else too_high, remedy)
+    kind.check_values(values, sigma, rows.places(column), remedy if unit_stated else too_high, remedy)

@@ -14,10 +14,11 @@ from pellicle.colour.observers import (
     sensor,
     srgb_sensor,
 )
-from pellicle.data.tabular.axis_and_signal import axis_unit, read_axis
+from pellicle.data.tabular.axis import axis_unit, read_axis
 from pellicle.data.tabular.column_selection import AxisColumns, first_column
 from pellicle.data.tabular.columns import Column, listed, recognise_all
-from pellicle.data.tabular.table import Table, read_table
+from pellicle.data.tabular.layout import read_table
+from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 
@@ -140,11 +141,9 @@ def read_lamp(path: str | os.PathLike[str]) -> tuple[np.ndarray, np.ndarray]:
 
 def _columns(table: Table) -> tuple[Column, list[Column]]:
     """The wavelength and the other columns that are not empty, in file order. Raises DataError."""
-    if table.layout.names is None:
-        return first_column(table), [
-            Column(i, f"column {i + 1}", "other") for i in range(1, table.layout.width)
-        ]
-    named = [column for column in recognise_all(table.layout.names) if column.name.strip()]
+    if table.names is None:
+        return first_column(table), [Column(i, f"column {i + 1}", "other") for i in range(1, table.width)]
+    named = [column for column in recognise_all(table.names) if column.name.strip()]
     axes = [column for column in named if column.role == "wavelength"]
     if len(axes) != 1:
         raise DataError(

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from math import dist
 
 from pellicle.data.formats.exports import Rows, measured
-from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import TextFile, is_number
 from pellicle.errors import DataError, UsageError
 
@@ -25,7 +25,7 @@ DRIFT_MM = 1.0
 _MOST_LISTED = 40
 
 
-def layout(file: TextFile, spot: int | None = None) -> Layout | None:
+def layout(file: TextFile, spot: int | None = None) -> Table | None:
     """Return Ψ and Δ of one spot, or None for another format.
 
     Raises UsageError where `spot`, from 1, is missing or wrong, DataError for several zones.

@@ -12,9 +12,7 @@ import numpy as np
 
 from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
 from pellicle.data.half_angles import angles, from_half_difference
-from pellicle.data.tabular.cells import TextCells
-from pellicle.data.tabular.layout import Layout
-from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.table import Table, TextCells
 from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError
 
@@ -140,7 +138,7 @@ def _intervals(entry: tuple[Line, str] | None, count: int, path: str) -> tuple[i
     return tuple(kinds * count if len(kinds) == 1 else kinds)
 
 
-def layout(file: TextFile, header: Header) -> Layout:
+def table_of(file: TextFile, header: Header) -> Table:
     """Return the rows of an ALTA file below its header. Raises DataError where there is none."""
     rows = [line for line in file.lines if line.number > header.line]
     if not rows:
@@ -148,7 +146,8 @@ def layout(file: TextFile, header: Header) -> Layout:
     meaning = header.param_out or f"{', '.join(header.channels)} in 1/sr, since it has no #PARAM_OUT"
     note = f"read as an ALTA text file of {header.param_in} (radians) and {meaning}"
     width = len(header.names)
-    return Layout(header.names, width, TextCells(" ", ".", width, width, rows), (note,))
+    cells = TextCells(" ", ".", width, width, rows)
+    return Table(header.names, width, cells, (note,), path=file.path, sha256=file.sha256)
 
 
 def from_table(table: Table, header: Header) -> BrdfSamples:

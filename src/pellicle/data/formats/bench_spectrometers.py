@@ -6,7 +6,7 @@ from pathlib import PurePath
 
 from pellicle.data.formats.exports import Rows, all_cells, counted, delimiter_of, export
 from pellicle.data.tabular.columns import UNSTATED, recognise
-from pellicle.data.tabular.layout import Layout
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
@@ -26,7 +26,7 @@ _MOST_HEADING = 200
 _SECTION = re.compile(r"\[.*\]|#####.*")
 
 
-def perkin_elmer(file: TextFile) -> list[Layout] | None:
+def perkin_elmer(file: TextFile) -> list[Table] | None:
     """Return the spectrum of UV WinLab, format PEDS (`.asc`), or None for another format.
 
     The first line is `PE UV ... ASCII PEDS 4.00` (`PE IR` for infrared instruments). Below the keyword `#GR`
@@ -67,7 +67,7 @@ def perkin_elmer(file: TextFile) -> list[Layout] | None:
     return [export("PerkinElmer PEDS text", names, rows, facts=facts, notes=notes)]
 
 
-def jasco(file: TextFile) -> list[Layout] | None:
+def jasco(file: TextFile) -> list[Table] | None:
     """Return the spectrum of Spectra Manager, or None for another format.
 
     Lines of a keyword and a value (`TITLE`, `DATA TYPE`, `ORIGIN`, `XUNITS`, `YUNITS`, ..., as in JCAMP-DX
@@ -124,7 +124,7 @@ def _jasco_quantity(text: str) -> str:
     return text if column.role == "foreign" else f"{text or 'ordinate'} ({UNSTATED})"
 
 
-def bruker_dpt(file: TextFile) -> list[Layout] | None:
+def bruker_dpt(file: TextFile) -> list[Table] | None:
     """Return the spectrum of a data point table (`.dpt`) of OPUS, or None for another format.
 
     Its two columns of numbers name neither axis nor quantity, whose units are then asked for.

@@ -7,19 +7,20 @@ then checked as in any other file, and messages name the lines of the user's fil
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from pellicle.data.formats import accurion, jcamp, nexus, procspec, vendor_binary, woollam
 from pellicle.data.formats.bench_spectrometers import bruker_dpt, jasco, perkin_elmer
 from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
 from pellicle.data.formats.fibre_spectrometers import avantes, ocean_optics, stellarnet
 from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
-from pellicle.data.tabular.layout import Layout, find_layout
-from pellicle.data.tabular.table import Table, bulk_layout
+from pellicle.data.tabular.layout import bulk_layout, find_layout
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import TextFile, read_bytes, text_file
 from pellicle.errors import UsageError
 
-TextReader = Callable[[TextFile], Sequence[Layout] | None]
-BinaryReader = Callable[[bytes, str], Sequence[Layout] | None]
+TextReader = Callable[[TextFile], Sequence[Table] | None]
+BinaryReader = Callable[[bytes, str], Sequence[Table] | None]
 
 TEXT_READERS: tuple[TextReader, ...] = (
     jcamp.layouts,
@@ -49,22 +50,22 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     content, digest = read_bytes(path)
     for reader in BINARY_READERS:
         if layouts := reader(content, str(path)):
-            return [Table(str(path), digest, layout) for layout in layouts]
+            return [replace(table, path=str(path), sha256=digest) for table in layouts]
     if spot is None:
         plain = bulk_layout(content, lambda head: text_file(head, digest, path), _plain_layout)
         if plain is not None:
-            return [Table(str(path), digest, plain)]
+            return [replace(plain, path=str(path), sha256=digest)]
     file = text_file(content, digest, path)
     layouts = _export_layouts(file, spot) or [find_layout(file)]
-    return [Table(file.path, digest, layout) for layout in layouts]
+    return [replace(table, path=file.path, sha256=digest) for table in layouts]
 
 
-def _plain_layout(head: TextFile) -> Layout | None:
+def _plain_layout(head: TextFile) -> Table | None:
     """The layout of a file that is no instrument's export, from its first lines; None for an export."""
     return None if _export_layouts(head, None) else find_layout(head)
 
 
-def _export_layouts(file: TextFile, spot: int | None) -> Sequence[Layout] | None:
+def _export_layouts(file: TextFile, spot: int | None) -> Sequence[Table] | None:
     """The layouts of an instrument's export, None for another file."""
     layout = accurion.layout(file, spot)
     if layout is not None:

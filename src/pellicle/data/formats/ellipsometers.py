@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from pellicle.data.formats.exports import Facts, Rows, export
 from pellicle.data.tabular.column_names import MUELLER
-from pellicle.data.tabular.layout import Layout
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
@@ -32,7 +32,7 @@ def _points(line: Line) -> str:
     return line.bare.replace(",", ".")
 
 
-def horiba(file: TextFile) -> list[Layout] | None:
+def horiba(file: TextFile) -> list[Table] | None:
     """Return Ψ and Δ of a `.spe` file of DeltaPsi2, or None for another format.
 
     Blocks of a line `# NAME:` and lines of content; below `# INCIDENCE ANGLE:` the angle in degrees, below
@@ -90,7 +90,7 @@ def _horiba_blocks(file: TextFile) -> dict[str, list[Line]]:
     return blocks
 
 
-def spectraray(file: TextFile) -> list[Layout] | None:
+def spectraray(file: TextFile) -> list[Table] | None:
     """Return one row per wavelength and angle of Sentech's SpectraRay, or None for another format.
 
     The first line is `; WAVELENGTH 50.2 50.2 60.2 60.2`, with or without `;`: each angle in degrees, twice.
@@ -129,7 +129,7 @@ def spectraray(file: TextFile) -> list[Layout] | None:
     return [export("Sentech SpectraRay text", names, rows, notes=notes, decimal=".")]
 
 
-def regress_pro(file: TextFile) -> list[Layout] | None:
+def regress_pro(file: TextFile) -> list[Table] | None:
     """Return the rows `SE wavelength alpha beta` of Regress Pro and ADAP, or None for another format.
 
     The first line is `SE ALPHA BETA` or `SE PSI DELTA`; under the second the columns are tan Ψ and cos Δ.
@@ -179,7 +179,7 @@ def _negated(cell: str) -> str:
     return cell[1:] if cell.startswith("-") else f"-{cell.removeprefix('+')}"
 
 
-def film_sense(file: TextFile) -> list[Layout] | None:
+def film_sense(file: TextFile) -> list[Table] | None:
     """Return the measurement of an FS-1, or one for each time, or None for another format.
 
     `Film_Sense_Data` or `Film_Sense_Dyn_Data`, then the numbers of LEDs and of measurements and the angle of
@@ -229,7 +229,7 @@ def film_sense(file: TextFile) -> list[Layout] | None:
 
 def _film_sense_times(
     lines: Sequence[Line], settings: Sequence[list[str]], facts: Facts, path: str
-) -> list[Layout]:
+) -> list[Table]:
     """The measurement of each time; `settings` has the wavelength and the angle of each LED."""
     names = lines[0].text.split() if lines else []
     ends = [name.rpartition("_")[2] for name in names]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from pellicle.data.tabular.columns import Column, Statement, declarations, recognise
-from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
@@ -39,7 +39,7 @@ def export(
     notes: Sequence[str] = (),
     name: str = "",
     decimal: str | None = None,
-) -> Layout:
+) -> Table:
     """Return the layout of a table of an export of the format `kind`, which its first note and fact name.
 
     `names` state quantity and unit as a header does. The decimal mark is that of the rows by default.
@@ -118,7 +118,7 @@ def told_apart(names: Sequence[str]) -> list[str]:
 class Curve:
     """One curve of a file: its layout, the names that the file gives to axis and quantity, and their line."""
 
-    layout: Layout
+    layout: Table
     axis: str
     quantity: str
     line: int = 0
@@ -165,7 +165,7 @@ def signal_column(text: str) -> str | None:
     return f"{column.role}{column.polarisation or ''}{unit}" if not column.unknown_unit else text
 
 
-def readable(curves: Sequence[Curve], path: str) -> list[Layout]:
+def readable(curves: Sequence[Curve], path: str) -> list[Table]:
     """Return the layouts of the curves that are spectra of R, T or absorbance, under different names.
 
     Where there is none, the quantity of the first is declared, and refused when it is read. Raises DataError
@@ -189,6 +189,6 @@ def readable(curves: Sequence[Curve], path: str) -> list[Layout]:
     notes = (f"left out: {', '.join(map(repr, dict.fromkeys(left_out)))}",) if left_out else ()
     names = told_apart([curve.layout.name or curve.quantity for curve in kept]) if len(kept) > 1 else [""]
     return [
-        dataclasses.replace(curve.layout, name=name, notes=(*curve.layout.notes, *notes))
+        dataclasses.replace(curve.layout, name=name, remarks=(*curve.layout.remarks, *notes))
         for curve, name in zip(kept, names, strict=True)
     ]

@@ -6,7 +6,7 @@ from pathlib import PurePath
 
 from pellicle.data.formats.exports import Rows, all_cells, counted, delimiter_of, export, facts, keyword
 from pellicle.data.tabular.columns import UNSTATED, declarations, recognise
-from pellicle.data.tabular.layout import Layout
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.errors import DataError
 
@@ -34,7 +34,7 @@ _FILE = re.compile(r'"\s*File\s*:\s*(?P<name>.*?)\.(?P<suffix>TRM|ABS|SSM|IRR|EP
 _STELLARNET = {"TRM": "processed (%)", "ABS": "absorbance", "IRR": "irradiance"}
 
 
-def avantes(file: TextFile) -> list[Layout] | None:
+def avantes(file: TextFile) -> list[Table] | None:
     """Return the spectrum of AvaSoft 6 to 8 (`.ttt`, `.trt`, `.txt`), or None for another format.
 
     Lines of settings, a line of names separated by semicolons, a line of their units in brackets, then rows:
@@ -109,7 +109,7 @@ def _avantes_settings(above: Sequence[Line]) -> dict[str, str]:
     return settings
 
 
-def ocean_optics(file: TextFile) -> list[Layout] | None:
+def ocean_optics(file: TextFile) -> list[Table] | None:
     """Return the spectrum of OceanView, SpectraSuite, OOIBase32 or Jaz, or None for another format.
 
     Lines of `keyword: value`, then `>>>>>Begin ... Data<<<<<`, rows of wavelength in nm and value, and
@@ -186,7 +186,7 @@ def _ocean_settings(above: Sequence[Line]) -> dict[str, str]:
     return settings
 
 
-def stellarnet(file: TextFile) -> list[Layout] | None:
+def stellarnet(file: TextFile) -> list[Table] | None:
     """Return the spectrum of SpectraWiz (`.TRM`, `.ABS`, `.SSM`, `.IRR`), or None for another format.
 
     Lines that begin with a quotation mark, the first of which names the file (`"File: ...TRM"`), then rows of

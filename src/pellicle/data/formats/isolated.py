@@ -12,7 +12,7 @@ import sys
 
 import numpy as np
 
-from pellicle.data.tabular.layout import Layout, array_columns
+from pellicle.data.tabular.table import Table, array_columns
 from pellicle.errors import DataError
 
 TIMEOUT = 60.0
@@ -21,7 +21,7 @@ TIMEOUT = 60.0
 _CHILD = "from pellicle.data.formats.isolated import answer; answer()"
 
 
-def call(reader: str, content: bytes, path: str) -> list[Layout]:
+def call(reader: str, content: bytes, path: str) -> list[Table]:
     """Return `function(content, path)` for a reader "module:function" of numbers, called in a child process.
 
     Raises DataError as the reader does, and where it crashes or does not end.
@@ -71,7 +71,7 @@ def answer() -> None:
             {
                 "names": layout.names,
                 "rows": len(layout.cells),
-                "notes": layout.notes,
+                "notes": layout.remarks,
                 "name": layout.name,
                 "facts": layout.declared.facts,
             }

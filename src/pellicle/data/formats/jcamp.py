@@ -13,7 +13,7 @@ import numpy as np
 
 from pellicle.data.formats.exports import Curve, axis_column, export, first_stated, readable, signal_column
 from pellicle.data.formats.jcamp_values import Point, ordinates, plain_numbers
-from pellicle.data.tabular.layout import Layout
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError
 
@@ -33,8 +33,8 @@ MOST_POINTS = 10_000_000
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table: its form, as `(X++(Y..Y))`, the line that declares it, and its rows without comments."""
+class Rows:
+    """Rows of a table without comments, its form, as `(X++(Y..Y))`, and the line that declares it."""
 
     form: str
     line: Line
@@ -59,7 +59,7 @@ class _Block:
     """Records and tables between `##TITLE=` and `##END=`; each record keeps its line."""
 
     records: dict[str, tuple[str, Line]] = field(default_factory=dict)
-    tables: list[Table] = field(default_factory=list)
+    tables: list[Rows] = field(default_factory=list)
 
     def text(self, label: str) -> str:
         """Return the value of a record, empty where the block has none."""
@@ -70,7 +70,7 @@ class _Block:
         return [part.strip() for part in self.text(label).split(",")]
 
 
-def layouts(file: TextFile) -> list[Layout] | None:
+def layouts(file: TextFile) -> list[Table] | None:
     """Return the spectra of a JCAMP-DX file, or None for another format.
 
     Raises DataError for a table that contradicts the records above it, and for one without spectra.
@@ -114,7 +114,7 @@ def _blocks(file: TextFile) -> list[_Block]:
         if label == "TITLE":
             blocks.append(_Block())
         if label in _TABLES:
-            table = Table(value, line)
+            table = Rows(value, line)
             blocks[-1].tables.append(table)
         else:
             blocks[-1].records.setdefault(label, (value, line))
@@ -168,7 +168,7 @@ def _scales(block: _Block, path: str) -> Scales:
     )
 
 
-def _paged(block: _Block, table: Table, path: str) -> tuple[str, str, Scales] | None:
+def _paged(block: _Block, table: Rows, path: str) -> tuple[str, str, Scales] | None:
     """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
     form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
     symbols = [symbol.upper() for symbol in block.parts("SYMBOL")]
@@ -226,7 +226,7 @@ def _count(value: float | None, block: _Block, label: str, path: str) -> int | N
     return int(value)
 
 
-def points_of(table: Table, scales: Scales, path: str) -> tuple[Sequence[float], Sequence[Point]]:
+def points_of(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], Sequence[Point]]:
     """Abscissae and ordinates of a table. Raises DataError where they contradict the records."""
     form = re.sub(r"\s", "", table.form).upper()
     if form.startswith("(XY..XY)"):
@@ -241,7 +241,7 @@ def points_of(table: Table, scales: Scales, path: str) -> tuple[Sequence[float],
     return x, [(value * scales.y_factor, line) for value, line in y]
 
 
-def _pairs(table: Table, scales: Scales, path: str) -> tuple[list[float], list[Point]]:
+def _pairs(table: Rows, scales: Scales, path: str) -> tuple[list[float], list[Point]]:
     x: list[float] = []
     y: list[Point] = []
     for line, text in table.rows:
@@ -265,7 +265,7 @@ def _pairs(table: Table, scales: Scales, path: str) -> tuple[list[float], list[P
     return x, y
 
 
-def _even(table: Table, scales: Scales, path: str) -> tuple[Sequence[float], list[Point]]:
+def _even(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], list[Point]]:
     most = scales.points or MOST_POINTS
     y, starts = ordinates(table.rows, most, scales.decimal, path)
     _check_number(len(y), scales, table, path)
@@ -290,7 +290,7 @@ def _even(table: Table, scales: Scales, path: str) -> tuple[Sequence[float], lis
 
 
 def _check_starts(
-    table: Table, starts: Sequence[tuple[float, int]], axis: tuple[float, float], factor: float, path: str
+    table: Rows, starts: Sequence[tuple[float, int]], axis: tuple[float, float], factor: float, path: str
 ) -> None:
     """Refuse a line whose abscissa is not where FIRSTX, LASTX and NPOINTS put it."""
     first, step = axis
@@ -305,7 +305,7 @@ def _check_starts(
             )
 
 
-def _check_number(count: int, scales: Scales, table: Table, path: str) -> None:
+def _check_number(count: int, scales: Scales, table: Rows, path: str) -> None:
     if scales.points is not None and count != scales.points:
         raise DataError(
             f"{path}: the table from line {table.line.number} has {count} points where NPOINTS states "

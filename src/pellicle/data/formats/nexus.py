@@ -16,7 +16,7 @@ import numpy as np
 from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
 from pellicle.data.tabular.columns import recognise
-from pellicle.data.tabular.layout import Layout, array_columns
+from pellicle.data.tabular.table import Table, array_columns
 from pellicle.errors import DataError, install_command
 from pellicle.signals.registry import KINDS, ONE_COLUMN
 
@@ -30,7 +30,7 @@ _ERRORS |= dict.fromkeys(ONE_COLUMN, "sigma")
 _MOST_MEMBERS = 1000
 
 
-def layouts(content: bytes, path: str) -> list[Layout] | None:
+def layouts(content: bytes, path: str) -> list[Table] | None:
     """Return the spectra of a NeXus or NetCDF file, or None for another format.
 
     Raises DataError where h5py is absent, and for a file without spectra, damaged, or with parts elsewhere.
@@ -45,7 +45,7 @@ def layouts(content: bytes, path: str) -> list[Layout] | None:
     return isolated.call(f"{__name__}:{read_hdf5.__name__}", content, path)
 
 
-def read_hdf5(content: bytes, path: str) -> list[Layout]:
+def read_hdf5(content: bytes, path: str) -> list[Table]:
     """Return the spectra of an HDF5 file, in this process. Raises DataError as `layouts` does."""
     import h5py
 
@@ -67,7 +67,7 @@ def read_hdf5(content: bytes, path: str) -> list[Layout]:
     return layouts if len(layouts) > 1 else [replace(layouts[0], name="")]
 
 
-def _layouts(file: Any, path: str) -> Iterator[Layout]:
+def _layouts(file: Any, path: str) -> Iterator[Table]:
     for name, group in hdf5.groups(file, path):
         if len(group) > _MOST_MEMBERS:
             continue

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from pellicle.data.formats.exports import Curve, readable, signal_column
-from pellicle.data.tabular.layout import Layout, array_columns
+from pellicle.data.tabular.table import Table, array_columns
 from pellicle.errors import DataError, install_command
 
 LARGEST_XML = 16 << 20
@@ -38,7 +38,7 @@ _MODES = {
 _NAME = "Ocean Optics ProcSpec"
 
 
-def layouts(content: bytes, path: str) -> list[Layout] | None:
+def layouts(content: bytes, path: str) -> list[Table] | None:
     """Return the processed spectrum of a ProcSpec file, or None for another format.
 
     Raises DataError where defusedxml is absent, for a damaged file, and for one that is too large to unpack.

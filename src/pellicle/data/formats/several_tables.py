@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
 from pellicle.data.tabular.columns import Column, declarations, is_header, recognise
-from pellicle.data.tabular.layout import Layout, find_layout, plain_columns
+from pellicle.data.tabular.layout import find_layout
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 
 _MOST_HEADING = 40
@@ -33,7 +34,7 @@ class _Scan(NamedTuple):
         return any(column.role not in _IGNORED for column in self.columns[1:])
 
 
-def scans_side_by_side(file: TextFile) -> list[Layout] | None:
+def scans_side_by_side(file: TextFile) -> list[Table] | None:
     """Return one layout for each scan, without baselines, or None for another format."""
     lines = file.lines
     for header in range(min(_MOST_HEADING, len(lines))):
@@ -68,7 +69,7 @@ def _names_scan(names: Sequence[str], text: str) -> bool:
 
 def _scans(
     file: TextFile, header: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
-) -> list[Layout] | None:
+) -> list[Table] | None:
     body = [(line, all_cells(line.bare, delimiter)) for line in file.lines[header + 1 :]]
     end = _rows_end(body, groups)
     if not end:
@@ -134,7 +135,7 @@ def _name(group: Sequence[Column], names: Sequence[str]) -> str:
     return re.sub(r"\s*-\s*RawData$", "", title) or group[1].name
 
 
-def stacked_tables(file: TextFile) -> list[Layout] | None:
+def stacked_tables(file: TextFile) -> list[Table] | None:
     """Return one layout for each table, or None where the names are not repeated."""
     lines = file.lines
     first = next((line for line in lines[:40] if is_header(all_cells(line.text))), None)
@@ -148,7 +149,7 @@ def stacked_tables(file: TextFile) -> list[Layout] | None:
         layout = find_layout(TextFile(file.path, file.sha256, lines[start:stop]))
         title = lines[start].text.strip('"') if start < header else f"table {i + 1}"
         note = f"table {i + 1} of {len(headers)} in the file"
-        layouts.append(dataclasses.replace(layout, name=title, notes=(note, *layout.notes)))
+        layouts.append(dataclasses.replace(layout, name=title, remarks=(note, *layout.remarks)))
     return layouts
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pellicle.data.formats.exports import Curve, axis_column, first_stated, readable, signal_column
 from pellicle.data.tabular.columns import recognise
-from pellicle.data.tabular.layout import Layout, array_columns
+from pellicle.data.tabular.table import Table, array_columns
 from pellicle.errors import DataError, install_command
 
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
@@ -42,7 +42,7 @@ _SPECTRAL = ("wavelength", "wavenumber", "energy")
 _OF_QUANTITY = {"transmittance": "T", "reflectance": "R", "absorbance": "absorbance", "log_1_r": "log(1/R)"}
 
 
-def layouts(content: bytes, path: str) -> list[Layout] | None:
+def layouts(content: bytes, path: str) -> list[Table] | None:
     """Return the spectra of such a file, or None for another format.
 
     Raises DataError where openreadout is absent or cannot read the file, and for other quantities.

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from pellicle.data.formats import woollam_rows
 from pellicle.data.formats.exports import Rows
 from pellicle.data.formats.woollam_rows import Selected
-from pellicle.data.tabular.layout import Layout, plain_columns
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
@@ -46,7 +46,7 @@ _MOST_HEADING = 50  # lines that are searched for the unit
 _MOST_LISTED = 8
 
 
-def layouts(file: TextFile) -> list[Layout] | None:
+def layouts(file: TextFile) -> list[Table] | None:
     """Return a layout for each quantity (and time) that can be fitted, or None for another format.
 
     Raises DataError where the file has none.

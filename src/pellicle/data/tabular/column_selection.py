@@ -5,27 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pellicle.data.tabular.column_names import COUNTERS, MUELLER, RATIO_COLUMNS
-from pellicle.data.tabular.columns import (
-    COUNTS,
-    SIGNALS,
-    Column,
-    Declared,
-    listed,
-    parse_columns,
-    recognise,
-    recognise_all,
-)
+from pellicle.data.tabular.column_names import COUNTERS
+from pellicle.data.tabular.columns import SIGNALS, Column, listed, parse_columns, recognise, recognise_all
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
-
-_EITHER_SIGNAL = '`signal="R"` or `signal="T"`'
-_SEVERAL_COLUMNS = {
-    "psi and delta": ("psi", "delta"),
-    "elements of a Mueller matrix": MUELLER,
-    "generalised psi and delta": RATIO_COLUMNS,
-}
-"""Roles of the signals that have several columns."""
 
 
 class AxisColumns(NamedTuple):
@@ -47,143 +30,54 @@ class AxisColumns(NamedTuple):
         return sentences
 
 
-def choice_notes(
+@dataclass(frozen=True)
+class Selection:
+    """Columns to read for one spectrum, and sentences on the choice.
+
+    `signal` is the word of the signal (of a power the role of its column), `values` are its columns, `errors`
+    their standard deviations or none; `others` are read, too.
+    """
+
+    signal: str
+    axis: AxisColumns
+    values: tuple[Column, ...]
+    errors: tuple[Column, ...] = ()
+    others: tuple[Column, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All columns beside the axis."""
+        return (*self.values, *self.errors, *self.others)
+
+
+def select(
+    table: Table,
     columns: Sequence[Column],
-    axis: AxisColumns,
+    signal: str,
     values: Sequence[Column],
     meaning: str,
+    example: str,
+    *,
+    errors: Sequence[Column] = (),
     others: Sequence[Column | None] = (),
     notes: Sequence[str] = (),
-) -> tuple[str, ...]:
-    """Sentences on the columns of the axis and of the `values`, `notes`, and on columns that are ignored.
+) -> Selection:
+    """Select columns with those of the axis, and describe them and the columns that are ignored.
 
-    `others` are columns that are read, too.
+    `example` names columns in messages. Raises DataError as `axis_columns` does.
     """
-    read = {column.position for column in (*axis, *values, *others) if column}
+    axis = axis_columns(table, columns, example)
+    further = tuple(column for column in others if column)
+    read = {column.position for column in (*axis, *values, *errors, *further) if column}
     ignored = [c for c in columns if c.position not in read and c.name not in ("_", "")]
-    return (
+    described = (
         f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as {meaning}",
         *notes,
         *axis.notes,
         *([f"ignored: {listed(ignored)}"] if ignored else []),
     )
-
-
-@dataclass(frozen=True)
-class SpectrumColumns:
-    """Columns to read, and sentences on the choice.
-
-    With a `reference`, the signal is (sample - dark) / (reference - dark) of three columns of counts.
-    """
-
-    axis: AxisColumns
-    signal: Column
-    sigma: Column | None
-    notes: tuple[str, ...]
-    reference: Column | None = None
-    dark: Column | None = None
-
-
-def signal_columns(
-    table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
-) -> list[SpectrumColumns]:
-    """Find the reflectances and transmittances of a table; arguments as in `read_spectra`.
-
-    Several are returned where the arguments do not tell them apart. Raises UsageError or DataError where
-    there is none, with the argument that settles it.
-    """
-    named = named_columns(table, columns)
-    if named is None:
-        if signal is None:
-            raise UsageError(f"{table.path}: {_ask_without_header(table.layout.width)}")
-        return [_by_position(table, signal)]
-    chosen = _signals(table, named, signal, polarisation, by_caller=columns is not None)
-    if [column.role for column in chosen] == ["sample counts"]:
-        return [_quotient(table, named, chosen[0])]
-    return [_with_wavelength(table, named, column) for column in chosen]
-
-
-def _ask_without_header(width: int) -> str:
-    """Ask what the columns of a table without a header are."""
-    names = '`columns=["wavelength", "angle", "psi", "delta"]`'
-    if width <= 2:
-        return f"has no header, so say what its second column is with {_EITHER_SIGNAL}"
-    if width == 3:
-        return (
-            f"has 3 columns and no header; say what the second is with {_EITHER_SIGNAL} (the third then is "
-            f'its error), or that they are psi and delta with `signal="psi-delta"`, or name them: {names}'
-        )
-    return (
-        f"has {width} columns and no header; name them in order, _ to skip one, as in "
-        f'`columns=["wavelength", "R_percent", "_"]` or {names}'
-    )
-
-
-def counts_columns(table: Table, columns: str | Sequence[str] | None) -> SpectrumColumns:
-    """Choose the columns of raw counts: those of the sample, or the one column beside the wavelength."""
-    named = named_columns(table, columns)
-    if named is None:
-        return _by_position(table, "counts")
-    sample = [c for c in named if c.role == "sample counts"]
-    free = [
-        c
-        for c in named
-        if c.role not in ("wavelength", "sigma", "angle", "azimuth") and c.name not in ("_", "")
-    ]
-    counts = sample or free
-    if len(counts) != 1:
-        raise UsageError(
-            f"{table.path}: expected one column of counts beside the wavelength, found "
-            f'{listed(counts) or "none"}; choose one, as in `columns=["wavelength", "counts"]`'
-        )
-    return _with_wavelength(table, _without_other_counts(named, counts[0]), counts[0])
-
-
-def counts_columns_beside(
-    table: Table, columns: str | Sequence[str] | None, part: str
-) -> SpectrumColumns | None:
-    """Return the columns of one of `COUNTS`, None where the table has none."""
-    named = named_columns(table, columns) or ()
-    counts = only(table, named, part)
-    return _with_wavelength(table, _without_other_counts(named, counts), counts) if counts else None
-
-
-def _without_other_counts(columns: Sequence[Column], counts: Column) -> list[Column]:
-    return [c for c in columns if c.role not in COUNTS or c is counts]
-
-
-def _by_position(table: Table, role: str) -> SpectrumColumns:
-    width = table.layout.width
-    if width > 4:
-        raise UsageError(
-            f"{table.path}: has {width} columns and no header; name them in order, as in "
-            '`columns=["wavelength", "R", "_", "sigma"]`'
-        )
-    sigma = Column(2, "", "sigma") if width > 2 and role != "counts" else None
-    notes = [f"no header: column 1 read as the wavelength, column 2 as {role}"]
-    if sigma:
-        notes.append("column 3 read as sigma, the standard deviation of the signal")
-    if width > 3:
-        notes.append("column 4 (by custom the error of the wavelength) ignored")
-    return SpectrumColumns(AxisColumns(first_column(table)), Column(1, "", role), sigma, tuple(notes))
-
-
-def _with_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> SpectrumColumns:
-    axis = axis_columns(table, columns, '`columns=["wavelength", "R"]`')
-    sigma = only(table, columns, "sigma")
-    notes = [f"{listed([sigma])} read as the standard deviation of the signal"] if sigma else []
-    notes = choice_notes(columns, axis, [signal], "the signal", [sigma], notes)
-    return SpectrumColumns(axis, signal, sigma, notes)
-
-
-def _quotient(table: Table, columns: Sequence[Column], sample: Column) -> SpectrumColumns:
-    """The transmittance that counts of a sample, a reference and possibly the dark make."""
-    chosen = _with_wavelength(table, _without_other_counts(columns, sample), sample)
-    reference, dark = only(table, columns, "reference counts"), only(table, columns, "dark counts")
-    formula = "(sample - dark) / (reference - dark)" if dark else "sample / reference"
-    notes = (*chosen.notes, f"transmittance computed from counts: {formula}")
-    signal = dataclasses.replace(sample, role="T", unit="fraction", unknown_unit=None)
-    return dataclasses.replace(chosen, signal=signal, reference=reference, dark=dark, notes=notes)
+    return Selection(signal, axis, tuple(values), tuple(errors), further, described)
 
 
 def axis_columns(table: Table, columns: Sequence[Column], example: str) -> AxisColumns:
@@ -223,118 +117,24 @@ def only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
     return matching[0] if matching else None
 
 
-def _signals(
-    table: Table,
-    columns: Sequence[Column],
-    signal: str | None,
-    polarisation: str | None,
-    by_caller: bool,
-) -> list[Column]:
-    """The columns that may be meant. Raises UsageError or DataError where none is."""
-    measured = [c for c in columns if c.role in SIGNALS]
-    absorbed = [c for c in measured if c.role == "T" and c.unit == "absorbance"]
-    if signal == "R" and measured and measured == absorbed and not by_caller:
-        raise UsageError(
-            f"{table.path}: {listed(measured)} is an absorbance, read as T = 10^-A, which contradicts "
-            '`signal="R"`; leave that out, or if it is log(1/R), say so with '
-            f'`columns="{_renamed(columns, absorbed[0])}"`'
-        )
-    measured = [c for c in measured if signal in (None, c.role)]
-    if not measured:
-        return _unnamed_signals(table, columns, signal)
-    wanted = [c for c in measured if polarisation and (c.polarisation or "unpolarised") == polarisation]
-    measured = wanted or measured
-    stated = {c.polarisation for c in measured}
-    if polarisation and None not in stated and len(stated) == 1 and stated != {polarisation}:
-        raise UsageError(
-            f"{table.path}: {listed(measured)} is measured in {measured[0].polarisation} light, which "
-            f'contradicts `polarisation="{polarisation}"`; leave that out'
-        )
-    return measured
+def error_columns(
+    table: Table, columns: Sequence[Column], values: Sequence[Column], partly: str
+) -> tuple[Column, ...]:
+    """Return a standard deviation of each of `values`, one `sigma` for all, or none.
+
+    Raises DataError where only some have one, which `partly` describes.
+    """
+    stated = [column for one in values if (column := only(table, columns, f"sigma_{one.role}")) is not None]
+    if stated and len(stated) < len(values):
+        raise DataError(f"{table.path}: gives {partly.format(listed(stated))} with _ in `columns`")
+    one = only(table, columns, "sigma")
+    return tuple(stated) or ((one,) if one else ())
 
 
-def _renamed(columns: Sequence[Column], column: Column) -> str:
-    """Names for the argument `columns` with which a column of absorbance is log(1/R)."""
-    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle", "azimuth": "azimuth"}
-    return ",".join("log(1/R)" if c is column else words.get(c.role, "_") for c in columns)
-
-
-def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None) -> list[Column]:
-    """An intensity, or columns whose names state no quantity, where the caller states it."""
-    intensity = only(table, columns, "intensity")
-    if intensity and signal is None:
-        raise UsageError(
-            f"{table.path}: {listed([intensity])} is uncalibrated; state the signal with {_EITHER_SIGNAL}"
-        )
-    if intensity:
-        return [intensity]
-    _check_no_other_signal(table, columns, signal)
-    roles = {c.role for c in columns}
-    named = [c for c in columns if c.name not in ("_", "")]
-    processed = [c for c in named if c.role == "processed"]
-    free = [c for c in named if c.role in ("other", "value")]
-    foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
-    counters = [] if foreign else free
-    unnamed = processed or [c for c in free if c.name.strip().lower() not in COUNTERS] or counters
-    _check_one_angle(table, unnamed)
-    if signal is not None and unnamed and "wavelength" in roles:
-        return [dataclasses.replace(c, role=signal) for c in unnamed]
-    sample = only(table, columns, "sample counts")
-    if sample and "reference counts" in roles and signal == "T":
-        return [sample]
-    if sample and "reference counts" in roles and not processed:
-        raise UsageError(
-            f'{table.path}: has counts of a sample and a reference; `signal="T"` takes their quotient, and a '
-            'reflectance needs the material of the reference as well, as in `reference_material="Si"`'
-        )
-    raise _no_signal(table, columns, unnamed if "wavelength" in roles else [], foreign)
-
-
-def _check_no_other_signal(table: Table, columns: Sequence[Column], signal: str | None) -> None:
-    """Raise UsageError for columns of another signal than the one that the caller states."""
-    roles = {c.role for c in columns}
-    other = next((role for role in SIGNALS if role in roles), None)
-    if other:
-        raise UsageError(f'{table.path}: has {other}, which contradicts `signal="{signal}"`; correct that')
-    for name, known in _SEVERAL_COLUMNS.items():
-        if roles & set(known):
-            raise UsageError(
-                f'{table.path}: has {name}, which contradicts `signal="{signal}"`; leave that out'
-            )
-
-
-def _check_one_angle(table: Table, unnamed: Sequence[Column]) -> None:
-    angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
-    if len(angles) > 1:
-        raise DataError(
-            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose two with "
-            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other '
-            "with a column angle_deg"
-        )
-
-
-def _no_signal(
-    table: Table, columns: Sequence[Column], unnamed: Sequence[Column], foreign: Sequence[Column]
-) -> DataError | UsageError:
-    """The error of a table whose columns name no signal: `unnamed` may be one, `foreign` are none."""
-    if unnamed:
-        percent = any(column.unit == "percent" for column in unnamed)
-        unit = "" if percent else ' (unit: `signal_unit="percent"`, ...)'
-        states = "states" if len(unnamed) == 1 else "state"
-        return UsageError(
-            f"{table.path}: {listed(unnamed)} {states} no quantity; state it with {_EITHER_SIGNAL}{unit}"
-            ', or name the columns, as in `columns=["wavelength", "R"]`'
-        )
-    if foreign:
-        names, verb = listed(foreign).replace("declared ", ""), "is" if len(foreign) == 1 else "are"
-        return DataError(
-            f"{table.path}: {names} {verb} neither a reflectance nor a transmittance; export one of these or "
-            "psi and delta, give raw counts with `reference`, or if it is one, name it: "
-            '`columns=["wavelength", "R"]`'
-        )
-    return DataError(
-        f"{table.path}: no column is a signal (R, T, Rs, Rp, Ts, Tp, absorbance or intensity) among "
-        f'{listed(columns)}; name the columns in order, as in `columns=["wavelength", "R"]`'
+def without_header(table: Table, example: str) -> UsageError:
+    """Return the error of a table without a header, whose columns are named as in the `example`."""
+    return UsageError(
+        f"{table.path}: has {table.width} columns and no header; name them in order, as in {example}"
     )
 
 
@@ -343,9 +143,9 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
 
     Raises DataError where the file contradicts itself.
     """
-    names, declared = table.layout.names, table.layout.declared
+    names, declared = table.names, table.declared
     if columns is not None:
-        parsed = parse_columns(columns, table.path, table.layout.width)
+        parsed = parse_columns(columns, table.path, table.width)
         return tuple(_with_unit_of_file(table, column) for column in parsed)
     if names is None:
         return _declared_columns(table)
@@ -367,12 +167,12 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
     foreign = declared.signal is not None and declared.signal.column.role == "foreign"
     processed = [] if foreign else [c for c in free if c.role == "processed"]
     unnamed = () if signals else processed or free
-    return tuple(_with_declared(table, column, declared, column in unnamed) for column in recognised)
+    return tuple(_with_declared(table, column, column in unnamed) for column in recognised)
 
 
 def first_column(table: Table) -> Column:
     """Return the wavelength of a table without a header, with the unit that the file declares."""
-    declared = table.layout.declared.axis
+    declared = table.declared.axis
     if declared is None:
         return Column(0, "", "wavelength")
     return dataclasses.replace(declared.column, position=0, name="")
@@ -402,7 +202,7 @@ def _with_unit_of_file(table: Table, column: Column) -> Column:
     """
     if column.role not in ("wavelength", *SIGNALS) or column.unit or column.unknown_unit:
         return column
-    names, declared = table.layout.names or (), table.layout.declared
+    names, declared = table.names or (), table.declared
     named = recognise(names[column.position]) if column.position < len(names) else None
     power = column.role in SIGNALS
     statement = declared.signal if power else declared.axis
@@ -422,8 +222,8 @@ def _with_unit_of_file(table: Table, column: Column) -> Column:
 
 def _declared_columns(table: Table) -> tuple[Column, ...] | None:
     """The columns of a table without a header, whose quantity the file declares above it; None otherwise."""
-    declared = table.layout.declared
-    if declared.signal is None or table.layout.width not in (2, 3):
+    declared = table.declared
+    if declared.signal is None or table.width not in (2, 3):
         return None
     signal = declared.signal.column
     label = f"declared {signal.name}"
@@ -431,12 +231,12 @@ def _declared_columns(table: Table) -> tuple[Column, ...] | None:
         dataclasses.replace(first_column(table), name="column 1"),
         dataclasses.replace(signal, position=1, name=label),
     ]
-    return (*columns, *([Column(2, "column 3", "sigma")] if table.layout.width == 3 else []))
+    return (*columns, *([Column(2, "column 3", "sigma")] if table.width == 3 else []))
 
 
-def _with_declared(table: Table, column: Column, declared: Declared, unnamed: bool) -> Column:
+def _with_declared(table: Table, column: Column, unnamed: bool) -> Column:
     """A column of the header with the role and the unit that the file declares. Raises DataError."""
-    statement = declared.axis if column.role == "wavelength" else declared.signal
+    statement = table.declared.axis if column.role == "wavelength" else table.declared.signal
     if statement is None or not (unnamed or column.role in ("wavelength", *SIGNALS)):
         return column
     stated = statement.column

@@ -2,14 +2,13 @@
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.data.tabular.layout import plain_columns
-from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, content_lines, is_number, open_binary, text_of
 from pellicle.data.tabular.units import to_nm
 from pellicle.dispersion.base import AbstractDispersion
@@ -91,7 +90,7 @@ def read_rows(path: str, lines: Sequence[Line], names: Sequence[str], optional: 
                 f"{path}: line {line.number} has {len(row)} value{'s' * (len(row) != 1)} where {width} are "
                 "expected; correct or delete that line"
             )
-    return Table(path, "", plain_columns(names[:width], rows, []))
+    return replace(plain_columns(names[:width], rows, []), path=path)
 
 
 class MaterialFile(NamedTuple):
@@ -136,9 +135,9 @@ def constants_of(
 
     Raises DataError for a cell that is no finite number.
     """
-    values = rows.numbers(range(rows.layout.width))
+    values = rows.numbers(range(rows.width))
     first, second = ("eps1", "eps2") if dielectric else ("n", "k")
-    named = "axis" if axis is not None else rows.layout.names[0] if rows.layout.names else "wavelength"
+    named = "axis" if axis is not None else rows.names[0] if rows.names else "wavelength"
     values = values if axis is None else [axis, *values]
     return OpticalConstants(
         rows.path,

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pellicle.data.tabular.columns import Column, is_unit_row, recognise_all
-from pellicle.data.tabular.layout import header_cells
-from pellicle.data.tabular.table import Table, read_table
+from pellicle.data.tabular.layout import header_cells, read_table
+from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import split
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
@@ -108,8 +108,8 @@ def _header(text: MaterialText, table: Table) -> Sequence[str] | None:
 
     Separated by commas, a header may name more columns than the rows have.
     """
-    if table.layout.names and _is_header(table.layout.names):
-        return table.layout.names
+    if table.names and _is_header(table.names):
+        return table.names
     delimiter = table.text.delimiter
     above = [line.text for line in text.lines if line.number < table.text.lines[0]]
     names = split(above[-1], delimiter) if above else []
@@ -121,8 +121,8 @@ def _header(text: MaterialText, table: Table) -> Sequence[str] | None:
     width = _cells_per_row(text, table)
     if (len(names) == width or delimiter != " ") and _is_header(names):
         return names
-    if table.layout.names:
-        return table.layout.names
+    if table.names:
+        return table.names
     above = text.text.splitlines()[: int(table.text.lines[0]) - 1]
     comments = [line.strip().lstrip("#% ") for line in above if line.strip()[:1] in ("#", "%")]
     commented = [header_cells(comment, delimiter, width) for comment in comments]

@@ -1,19 +1,18 @@
-"""Wavelength axis and signal of a table: their units, conversion to nm and fractions, and checks."""
+"""Wavelength axis of a table: its unit, conversion to nm, and checks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.data.repeated_sweeps import are_sweeps, one_way, sweep_numbers
 from pellicle.data.settings import setting_numbers
-from pellicle.data.tabular.column_selection import AxisColumns, SpectrumColumns
+from pellicle.data.tabular.column_selection import AxisColumns
 from pellicle.data.tabular.columns import Column, unknown_unit
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.units import SIGNAL_UNITS, WAVELENGTH_UNITS, signal_unit, to_nm, wavelength_unit
+from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 
@@ -28,8 +27,6 @@ _FEW = 3
 """Rows out of order that are corrected one by one; more are a matter of the whole file."""
 _REMEDY = "correct or delete that row"
 _LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
-_LEAST_ABSORBANCE = -300.0
-"""Absorbances below it would overflow; the signal is refused anyhow, as far above 1."""
 
 
 class Axis(NamedTuple):
@@ -140,61 +137,3 @@ def _check_monotone(table: Table, axis: AxisColumns, values: np.ndarray, rows: n
             f"{table.place(before)}; within one {one} wavelengths must rise or fall strictly, or come "
             f"in several complete sweeps, so {remedy}"
         )
-
-
-@dataclass(frozen=True)
-class Scale:
-    """Units of a file's signal and σ, members of `SIGNAL_UNITS`, and whether file or caller states it."""
-
-    signal: str
-    sigma: str
-    stated: bool
-
-    def fractions(self, values: np.ndarray, sigma: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Convert the signal (points,) and its σ (points,) to fractions.
-
-        An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
-        """
-        if self.signal == "absorbance":
-            values = 10.0 ** -np.maximum(values, _LEAST_ABSORBANCE)
-        elif self.signal == "percent":
-            values = values / 100
-        if sigma is not None and self.sigma == "absorbance":
-            sigma = np.log(10.0) * values * sigma
-        elif sigma is not None and self.sigma == "percent":
-            sigma = sigma / 100
-        return values, sigma
-
-    def note(self, quantity: str, calibrated: bool) -> str:
-        """Return a sentence on the unit in which the signal was read."""
-        if self.signal == "absorbance":
-            return f"signal unit: absorbance A, converted to {quantity} = 10^-A"
-        if not calibrated:
-            return "signal unit: arbitrary (uncalibrated)"
-        return f"signal unit: {self.signal}" + ("" if self.stated else ", assumed")
-
-
-def signal_scale(table: Table, columns: SpectrumColumns, requested: str | None) -> Scale:
-    """Return the scale from the column's name or from `requested`. It is never guessed from values.
-
-    Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
-    unknown and none is requested.
-    """
-    asked = None if requested is None else signal_unit(requested)
-    if requested is not None and asked is None:
-        raise UsageError(f"`signal_unit` must be one of {', '.join(SIGNAL_UNITS)}, not {requested!r}")
-    column = columns.signal
-    place = f"{table.path}: {table.label(column.position)}"
-    if column.unknown_unit and asked is None:
-        raise DataError(
-            f"{place} {unknown_unit(column)}; state it with "
-            '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
-        )
-    if asked and column.unit and asked != column.unit:
-        raise UsageError(
-            f'{place} is in {column.unit}, which contradicts `signal_unit="{asked}"`; leave that out, or '
-            "rename the columns with `columns`"
-        )
-    unit = column.unit or asked
-    sigma_unit = columns.sigma.unit if columns.sigma else None
-    return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)
