@@ -1,12 +1,12 @@
 """A signal of one column that a class alone defines: nothing else knows its word."""
 
-from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.accuracy.registry import Comparison
 from pellicle.reporting.cost import error_label
 from pellicle.reporting.data_panels import measured
 from pellicle.reporting.measured_text import describe
@@ -53,8 +53,7 @@ def test_values_text_and_figure():
     [("R", "R"), ("mueller", "Mueller elements"), ("contrast", "contrast"), ("loss", "loss")],
 )
 def test_unit_of_errors(word, label):
-    methods: Any = SimpleNamespace(unit=word)
-    assert error_label(methods) == f"error in {label}"
+    assert error_label(Comparison("forward", unit=word)) == f"error in {label}"
 
 
 @pytest.mark.parametrize("depolarisation", [False, True])

@@ -13,8 +13,8 @@ from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import SIGMA, ColourThickness
 from pellicle.colour.spaces import outside
 from pellicle.files import write_text
-from pellicle.reporting.csv_text import csv_rows
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
+from pellicle.reporting.plain_text import csv_rows
 from pellicle.scene.film import Scene
 from pellicle.simulation.colours import colour_table, interference_colours
 

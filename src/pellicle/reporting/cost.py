@@ -4,26 +4,23 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.files import MARKER, new_folder, write_text
+from pellicle.accuracy.cost import Cost
+from pellicle.accuracy.registry import Comparison
+from pellicle.accuracy.surface import SurfaceCost
 from pellicle.reporting import matplotlib_figure
-from pellicle.reporting.csv_text import csv_rows
 from pellicle.reporting.drawable import Line, Panel, Section, Style
-from pellicle.reporting.json_record import indented, versions
-from pellicle.reporting.plain_text import COLUMNS
+from pellicle.reporting.json_record import taken, versions, write_result
+from pellicle.reporting.plain_text import COLUMNS, aligned, csv_rows
 from pellicle.signals.registry import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.registry import Comparison
-    from pellicle.accuracy.surface import SurfaceCost
 
 _Columns = Mapping[str, Callable[[Any], str]]
 """The cell of each column, by its head."""
@@ -31,21 +28,25 @@ _Columns = Mapping[str, Callable[[Any], str]]
 
 def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
     """Format each table with the recommended row, and the reason for what was left out."""
-    from pellicle.accuracy.surface import SurfaceCost
-
+    parts = _parts(cost)
+    blocks = [_table(part, name) for part in parts]
     if isinstance(cost, SurfaceCost):
-        blocks = [] if cost.colours is None else [_methods(cost.colours, name)]
-        blocks.append(_methods(cost.values, name))
         blocks += [f"No colours: {cost.no_colours}.\n"] if cost.no_colours else []
-    else:
-        blocks = [_methods(cost.methods, name)]
-        blocks.append(f"No fits: {cost.no_solvers}.\n" if cost.solvers is None else _solvers(cost.solvers))
-        blocks += [] if cost.intervals is None else [_intervals(cost.intervals)]
-        parts = [part for part in (cost.solvers, cost.intervals) if part is not None]
-        if not cost.interrupted and any(_done(part) < part.requested for part in parts):
-            blocks.append("The time limit ended the data sets early: --time-limit 600 allows ten minutes.\n")
+    elif cost.solvers is None:
+        blocks.append(f"No fits: {cost.no_solvers}.\n")
+    if not cost.interrupted and any(_done(part) < part.requested for part in parts):
+        blocks.append("The time limit ended the data sets early: --time-limit 600 allows ten minutes.\n")
     blocks += ["Interrupted: these are the measurements until then.\n"] if cost.interrupted else []
     return "\n".join(blocks)
+
+
+def _parts(cost: Cost | SurfaceCost) -> list[Comparison]:
+    """What was compared: methods, solvers and intervals of a film, colours and values of a surface."""
+    if isinstance(cost, Cost):
+        parts = (cost.methods, cost.solvers, cost.intervals)
+    else:
+        parts = (cost.colours, cost.values)
+    return [part for part in parts if part is not None]
 
 
 def error_label(methods: Comparison, size: str = "") -> str:
@@ -64,7 +65,23 @@ def time_unit(methods: Comparison) -> tuple[str, float]:
     return ("µs", 1e6) if methods.sample == "spectrum" else ("ns", 1e9)
 
 
-def _methods(methods: Comparison, name: str) -> str:
+def _table(part: Comparison, name: str) -> str:
+    """A title, aligned columns (a mark and two names flush left), and notes."""
+    if part.kind == "inverse":
+        title, columns, notes = _solvers(part)
+    elif part.kind == "interval":
+        title, columns, notes = _intervals(part)
+    else:
+        title, columns, notes = _methods(part, name)
+    rows = [("", *columns)]
+    for result in part.results:
+        mark = ("→" if result.name == part.recommended else " ") + ("*" if result.pareto else " ")
+        rows.append((mark, *(cell(result) for cell in columns.values())))
+    lines = [*textwrap.wrap(title, COLUMNS), "", *aligned(rows, left=3), "", *notes]
+    return "\n".join([*lines, *_omitted(part.left_out)]) + "\n"
+
+
+def _methods(methods: Comparison, name: str) -> tuple[str, _Columns, list[str]]:
     unit, scale = time_unit(methods)
     few, more = (2, 1) if scale < 1e9 else (0, 2)
     columns: _Columns = {
@@ -83,12 +100,7 @@ def _methods(methods: Comparison, name: str) -> str:
     if not methods.within:
         advice = f"no method is within {within}; {methods.recommended} comes nearest"
     title = f"{name}: {_compared(methods)} against {methods.reference}"
-    notes = [
-        "* no other method is both faster and as accurate",
-        f"→ {advice}",
-        *_omitted(methods.left_out),
-    ]
-    return _table(title, methods.results, methods.recommended, columns, notes)
+    return title, columns, ["* no other method is both faster and as accurate", f"→ {advice}"]
 
 
 def _compared(methods: Comparison) -> str:
@@ -102,7 +114,8 @@ def _compared(methods: Comparison) -> str:
 
 
 def _done(comparison: Comparison) -> int:
-    return max((result.details["datasets"] for result in comparison.results), default=0)
+    """Number of data sets that were fitted; 0 of methods of simulation, which have none."""
+    return max((result.details.get("datasets", 0) for result in comparison.results), default=0)
 
 
 def _counted(comparison: Comparison) -> str:
@@ -111,7 +124,7 @@ def _counted(comparison: Comparison) -> str:
     return f"{done}" if done == requested else f"{done} (of {requested})"
 
 
-def _solvers(solvers: Comparison) -> str:
+def _solvers(solvers: Comparison) -> tuple[str, _Columns, list[str]]:
     title = (
         f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values"
         " anywhere between the bounds; errors as a share of the bounds"
@@ -125,13 +138,11 @@ def _solvers(solvers: Comparison) -> str:
         "ms/fit": lambda solver: f"{solver.seconds * 1e3:.1f}",
         "compile s": lambda solver: f"{solver.compile_seconds:.1f}",
     }
-    advice = [f"→ {solvers.recommended} is the fastest of those that failed least"] if solvers.results else []
-    return _table(
-        title, solvers.results, solvers.recommended, columns, [*advice, *_omitted(solvers.left_out)]
-    )
+    advice = f"→ {solvers.recommended} is the fastest of those that failed least"
+    return title, columns, [advice] if solvers.results else []
 
 
-def _intervals(intervals: Comparison) -> str:
+def _intervals(intervals: Comparison) -> tuple[str, _Columns, list[str]]:
     title = (
         f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value,"
         " width as a share of the bounds, and time after the fit"
@@ -145,25 +156,7 @@ def _intervals(intervals: Comparison) -> str:
         "compile s": lambda way: f"{way.compile_seconds:.1f}",
     }
     best = f"→ {intervals.recommended} is the fastest whose coverage is 95 % within two standard deviations"
-    notes = [*([best] if intervals.results else []), *_omitted(intervals.left_out)]
-    return _table(title, intervals.results, intervals.recommended, columns, notes)
-
-
-def _table(
-    title: str, items: Sequence[Any], recommended: str | None, columns: _Columns, notes: Sequence[str]
-) -> str:
-    """A title, aligned columns (a mark and two names flush left), and notes."""
-    rows = [("", *columns)]
-    for item in items:
-        mark = ("→" if item.name == recommended else " ") + ("*" if item.pareto else " ")
-        rows.append((mark, *(cell(item) for cell in columns.values())))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = []
-    for row in rows:
-        padded = zip(row, widths, strict=True)
-        cells = (cell.ljust(w) if i < 3 else cell.rjust(w) for i, (cell, w) in enumerate(padded))
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join([*textwrap.wrap(title, COLUMNS), "", *lines, "", *notes]) + "\n"
+    return title, columns, [best] if intervals.results else []
 
 
 def _omitted(left_out: Mapping[str, str]) -> list[str]:
@@ -175,7 +168,7 @@ def _omitted(left_out: Mapping[str, str]) -> list[str]:
     return [line for item in texts for line in textwrap.wrap(item, COLUMNS, subsequent_indent="    ")]
 
 
-SCHEMA = "pellicle.cost/1"
+_SUMMARY = ("reference", "tolerance", "unit", "recommended", "within")
 _CSV_COLUMNS = (
     *("kind", "name", "leaves_out", "error", "seconds", "compile_seconds", "flops", "pareto"),
     *("median_error", "failures", "datasets", "coverage", "doubt", "width"),
@@ -190,77 +183,44 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
     error). `recommended` names a forward method, or one for colours; `within` says whether it meets the
     tolerance. `brdf` has the same keys for a surface's values. Infinite errors are None.
     """
-    from pellicle.accuracy.surface import SurfaceCost
-
-    details = _surface(cost) if isinstance(cost, SurfaceCost) else _film(cost)
-    end = {"interrupted": cost.interrupted, "versions": versions()}
-    return {"schema": SCHEMA, "recipe": recipe} | details | end
-
-
-def _film(cost: Cost) -> dict[str, Any]:
-    methods, solvers, intervals = cost.methods, cost.solvers, cost.intervals
-    omitted = [part.left_out for part in (methods, solvers, intervals) if part is not None]
-    return {
-        **_summary(methods),
-        "wavelengths": methods.wavelengths,
-        "draws": methods.draws,
-        "rungs": _rungs(methods, solvers, intervals),
-        "recommended_solver": None if solvers is None else solvers.recommended,
-        "recommended_interval": None if intervals is None else intervals.recommended,
-        "noise": None if solvers is None else solvers.noise,
-        "left_out": {name: why for left_out in omitted for name, why in left_out.items()},
-        "no_fits": cost.no_solvers or None,
+    parts = _parts(cost)
+    record = {
+        "schema": "pellicle.cost/1",
+        "recipe": recipe,
+        **taken(parts[0], *_SUMMARY, *(["wavelengths"] if isinstance(cost, Cost) else ()), "draws"),
+        "rungs": [{"kind": part.kind, **result.record()} for part in parts for result in part.results],
     }
-
-
-def _surface(cost: SurfaceCost) -> dict[str, Any]:
-    parts = [part for part in (cost.colours, cost.values) if part is not None]
-    first = parts[0]
-    return {
-        **_summary(first),
-        "draws": first.draws,
-        "rungs": _rungs(*parts),
-        "brdf": _summary(cost.values),
-        "left_out": {name: why for methods in parts for name, why in methods.left_out.items()},
-        "no_colours": cost.no_colours or None,
-    }
-
-
-def _rungs(*comparisons: Comparison | None) -> list[dict[str, Any]]:
-    return [
-        {"kind": part.kind, **result.record()}
-        for part in comparisons
-        if part is not None
-        for result in part.results
-    ]
-
-
-def _summary(methods: Comparison) -> dict[str, Any]:
-    names = ("reference", "tolerance", "unit", "recommended", "within")
-    return {name: getattr(methods, name) for name in names}
-
-
-def to_csv(rungs: list[dict[str, Any]]) -> str:
-    """Format the methods of a record as rows; columns that a kind of method lacks are empty."""
-    cells = [[rung.get(name) for name in _CSV_COLUMNS] for rung in rungs]
-    return csv_rows(_CSV_COLUMNS, [["" if cell is None else str(cell) for cell in row] for row in cells])
+    left_out = {name: why for part in parts for name, why in part.left_out.items()}
+    if isinstance(cost, Cost):
+        solvers, intervals = cost.solvers, cost.intervals
+        record |= {
+            "recommended_solver": None if solvers is None else solvers.recommended,
+            "recommended_interval": None if intervals is None else intervals.recommended,
+            "noise": None if solvers is None else solvers.noise,
+            "left_out": left_out,
+            "no_fits": cost.no_solvers or None,
+        }
+    else:
+        record["brdf"] = taken(cost.values, *_SUMMARY)
+        record |= {"left_out": left_out, "no_colours": cost.no_colours or None}
+    return record | {"interrupted": cost.interrupted, "versions": versions()}
 
 
 def write_cost(folder: str | os.PathLike[str], cost: Cost | SurfaceCost, recipe: str = "scene") -> Path:
     """Write result.json, report.txt, cost.csv and cost.png into a folder, each complete or not at all.
 
-    Returns the folder. Raises UsageError where it holds files that pellicle did not write, or cannot be
-    written.
+    Columns of the table that a kind of method lacks are empty. Returns the folder. Raises UsageError where it
+    holds files that pellicle did not write, or cannot be written.
     """
-    from pellicle.reporting.matplotlib_figure import save_figure
-
     name, record = Path(recipe).name, to_json(cost, recipe)
-    target = new_folder(folder)
-    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder
-    write_text(target / "report.txt", text(cost, name), overwrite=True)
-    write_text(target / "cost.csv", to_csv(record["rungs"]), overwrite=True)
-    save_figure(draw(cost, name), target / "cost.png", overwrite=True)
-    return target
+    cells = [[rung.get(column) for column in _CSV_COLUMNS] for rung in record["rungs"]]
+    rows = [["" if cell is None else str(cell) for cell in row] for row in cells]
+    contents = {
+        "report.txt": text(cost, name),
+        "cost.csv": csv_rows(_CSV_COLUMNS, rows),
+        "cost.png": draw(cost, name),
+    }
+    return write_result(folder, record, contents)
 
 
 FLOOR = 1e-17
@@ -269,47 +229,28 @@ FLOOR = 1e-17
 
 def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
     """Draw error against time: of a film's methods and solvers, or of a surface's colours and values."""
-    from pellicle.accuracy.surface import SurfaceCost
+    parts = [part for part in _parts(cost) if part.kind != "interval" and part.results]
+    return matplotlib_figure.draw([_section(part) for part in parts], name)
 
-    if isinstance(cost, SurfaceCost):
-        kinds = [methods for methods in (cost.colours, cost.values) if methods is not None]
-        solvers = None
+
+def _section(part: Comparison) -> Section:
+    """Numbered points and the tolerance, the Pareto front joined; an error of zero is drawn at the bottom."""
+    shown = sorted((item for item in part.results if np.isfinite(item.error)), key=lambda item: item.seconds)
+    if part.kind == "inverse":
+        unit, scale, sample = "ms", 1e3, "fit"
+        label, tolerance = "mean error of the parameters,\nshare of the bounds", ""
     else:
-        kinds, solvers = [cost.methods], cost.solvers if cost.solvers and cost.solvers.results else None
-    sections = [_methods_section(methods) for methods in kinds]
-    if solvers is not None:
-        label = "mean error of the parameters,\nshare of the bounds"
-        panel = _panel(solvers.results, solvers.recommended, 1e3, label)
-        sections.append(Section("time of one fit (ms)", [[panel]]))
-    return matplotlib_figure.draw(sections, name)
-
-
-def _methods_section(methods: Comparison) -> Section:
-    """Error against time of methods of simulation, and the tolerance."""
-    unit, scale = time_unit(methods)
-    which = "mean" if methods.sample == "colour" else "largest"
-    label = f"{which} {error_label(methods)},\nagainst {methods.reference}"
-    tolerance = f"{error_label(methods, f'{methods.tolerance:g}')} (tolerance)", methods.tolerance
-    panel = _panel(methods.results, methods.recommended, scale, label, tolerance)
-    return Section(f"time of one {methods.sample} ({unit})", [[panel]])
-
-
-def _panel(
-    items: Sequence[Any],
-    recommended: str | None,
-    scale: float,
-    label: str,
-    tolerance: tuple[str, float] | None = None,
-) -> Panel:
-    """Numbered points, the Pareto front joined; an error of zero is drawn at the bottom."""
-    shown = sorted((item for item in items if np.isfinite(item.error)), key=lambda item: item.seconds)
+        (unit, scale), sample = time_unit(part), part.sample
+        which = "mean" if sample == "colour" else "largest"
+        label = f"{which} {error_label(part)},\nagainst {part.reference}"
+        tolerance = f"{error_label(part, f'{part.tolerance:g}')} (tolerance)"
     x = np.array([item.seconds * scale for item in shown])
     y = np.array([max(item.error, FLOOR) for item in shown])
     front = np.array([item.pareto for item in shown], dtype=bool)
-    best = np.array([item.name == recommended for item in shown], dtype=bool)
+    best = np.array([item.name == part.recommended for item in shown], dtype=bool)
     lines = [Line(x[front], y[front], "", "fit", width=1.0)]
-    if tolerance is not None:
-        lines.append(Line(x[[0, -1]], np.full(2, tolerance[1]), tolerance[0], "blue", "dotted", 0.8))
+    if tolerance:
+        lines.append(Line(x[[0, -1]], np.full(2, part.tolerance), tolerance, "blue", "dotted", 0.8))
     groups: tuple[tuple[np.ndarray, str, str, Style], ...] = (
         (front & ~best, "fastest at its accuracy", "fit", "circle"),
         (~front & ~best, "", "data", "circle"),
@@ -319,4 +260,5 @@ def _panel(
     notes = [(*place, str(i)) for i, place in enumerate(zip(x, y, strict=True), start=1)]
     key = [f"{i}  {item.name}" for i, item in enumerate(shown, start=1)]
     axes: Any = {"scale": "log", "abscissa": "log", "legend": "above"}
-    return Panel(label, lines, height=4.0, notes=notes, key=key, **axes)
+    panel = Panel(label, lines, height=4.0, notes=notes, key=key, **axes)
+    return Section(f"time of one {sample} ({unit})", [[panel]])

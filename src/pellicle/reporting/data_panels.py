@@ -10,9 +10,8 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.reporting import fitted_colours
 from pellicle.reporting.drawable import SERIES, Band, Line, Panel, Place, Section, Table, stroke
-from pellicle.reporting.quantities import Quantity, abscissa, lines_of, quantities
+from pellicle.reporting.quantities import Quantity, abscissa, colours_of, display, lines_of, quantities
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Part
@@ -143,7 +142,7 @@ def _residuals(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) -
 
 def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
     """Patches of data above those of the fit, the values of each channel, and residuals in σ."""
-    colours, curve = fitted_colours.colours_of(part)
+    colours, curve = colours_of(part)
     angle = colours.angle
     values, residuals = [], []
     for c, q in enumerate(columns):
@@ -156,7 +155,7 @@ def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[lis
     differences = () if curve.difference is None else curve.difference
     ticks = [f"{i:g}" for i in x] if angle is None else [f"{degrees:g}°" for degrees in angle]
     axis = {"span": (0.5, len(x) + 0.5), "ticks": ticks}
-    image = np.stack([fitted_colours.display(colours, own) for own in (curve.data, curve.model)])
+    image = np.stack([display(colours, own) for own in (curve.data, curve.model)])
     sigma = [Band(np.array(axis["span"]), np.full(2, -1.0), np.ones(2), "±σ")]
     return [
         [Panel("", height=1.6, image=image, captions=[f"ΔE {own:.2g}" for own in differences], **axis)],

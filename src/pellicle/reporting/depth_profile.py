@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting import matplotlib_figure
-from pellicle.reporting.csv_text import csv_rows, csv_text
 from pellicle.reporting.drawable import Band, Line, Panel, Place, Section, Table
-from pellicle.reporting.json_record import indented, number, versions
+from pellicle.reporting.json_record import strict, taken, versions, write_result
+from pellicle.reporting.plain_text import csv_rows, csv_text
 from pellicle.simulation.depth_profile import DepthProfile
 from pellicle.simulation.depth_profile import Section as Group
 
@@ -36,33 +35,30 @@ def report(profile: DepthProfile, title: str) -> str:
 
 def to_json(profile: DepthProfile, path: str) -> dict[str, Any]:
     """Convert to a dictionary: spectra of R, T and absorptances, and the field of each section."""
-    return {
+    record = {
         "schema": SCHEMA,
         "data": {"path": path},
-        "wavelength_nm": _numbers(profile.wavelength),
-        "R": _numbers(profile.R),
-        "T": _numbers(profile.T),
-        "absorptance": {
-            name: _numbers(row) for name, row in zip(profile.media, profile.absorptance, strict=True)
-        },
-        "at_nm": _numbers(profile.at),
-        "shares": {name: _numbers(row) for name, row in profile.shares.items()},
+        "wavelength_nm": profile.wavelength,
+        **taken(profile, "R", "T"),
+        "absorptance": dict(zip(profile.media, profile.absorptance, strict=True)),
+        "at_nm": profile.at,
+        "shares": profile.shares,
         "sections": [
             {
-                "above": section.above,
-                "below": section.below,
+                **taken(section, "above", "below"),
                 "layers": [
-                    {"name": name, "upper_nm": number(upper), "lower_nm": number(lower)}
+                    {"name": name, "upper_nm": upper, "lower_nm": lower}
                     for name, upper, lower in section.layers
                 ],
-                "depth_nm": _numbers(section.depth),
-                "intensity": [_numbers(row) for row in section.intensity],
-                "absorbed_per_nm": [_numbers(row) for row in section.absorbed],
+                "depth_nm": section.depth,
+                "intensity": section.intensity,
+                "absorbed_per_nm": section.absorbed,
             }
             for section in profile.sections
         ],
         "versions": versions(),
     }
+    return strict(record)
 
 
 def write_depth_profile(
@@ -72,23 +68,15 @@ def write_depth_profile(
 
     **Raises:** UsageError where the folder holds files that pellicle did not write.
     """
-    target = new_folder(folder)
-    write_text(target / MARKER, indented(to_json(profile, path)), overwrite=True)
-    write_text(target / "absorptance.csv", _absorptance_csv(profile, comments), overwrite=True)
-    write_text(target / "depth.csv", _depth_csv(profile, comments), overwrite=True)
-    matplotlib_figure.save_figure(draw(profile), target / "depth.png", overwrite=True)
-    return target
-
-
-def _numbers(row: np.ndarray) -> list[float | None]:
-    return [number(float(x)) for x in row]
-
-
-def _absorptance_csv(profile: DepthProfile, comments: list[str]) -> str:
     columns = {"wavelength_nm": profile.wavelength, "R": profile.R, "T": profile.T}
     for name, row in zip(profile.media, profile.absorptance, strict=True):
         columns[f"A of {name.replace(',', ';')}"] = row
-    return csv_text(Table(columns, comments))
+    contents = {
+        "absorptance.csv": csv_text(Table(columns, comments)),
+        "depth.csv": _depth_csv(profile, comments),
+        "depth.png": draw(profile),
+    }
+    return write_result(folder, to_json(profile, path), contents)
 
 
 def _depth_csv(profile: DepthProfile, comments: list[str]) -> str:

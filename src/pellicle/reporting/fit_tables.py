@@ -13,8 +13,9 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.fitting.curves import BIREFRINGENCE
-from pellicle.reporting.csv_text import csv_text, written_by
 from pellicle.reporting.drawable import Table
+from pellicle.reporting.plain_text import csv_text, written_by
+from pellicle.reporting.quantities import colours_in_words, colours_of, quantities
 from pellicle.signals.one_column import OneColumn
 
 if TYPE_CHECKING:
@@ -92,8 +93,6 @@ def _settings(data: Spectrum) -> dict[str, np.ndarray]:
 
 def _columns(fit: Fit, part: Part) -> str:
     """Data, model, residual and known σ of each quantity; those of Ψ and Δ follow both."""
-    from pellicle.reporting.quantities import quantities
-
     data, kind = part.spectrum, part.spectrum.kind
     known = quantities(data, part.curve)
     groups = [[q] for q in known] if kind.parts else [known[:2], known[2:]]
@@ -117,13 +116,12 @@ def _columns(fit: Fit, part: Part) -> str:
 
 
 def _colours(fit: Fit, part: Part) -> str:
-    from pellicle.reporting import fitted_colours  # imports JAX
 
-    data, curve = fitted_colours.colours_of(part)
+    data, curve = colours_of(part)
     light = "transmitted" if data.signal == "T" else "reflected"
     about = [f"signal {data.space}, {light}, {data.polarisation}"]
     about += [note for note in data.notes if note.startswith("observer ")]
-    about += [f"fit of {fitted_colours.summary(part)}: data, model_, sigma_ = standard deviation assumed"]
+    about += [f"fit of {colours_in_words(part)}: data, model_, sigma_ = standard deviation assumed"]
     columns = {} if data.angle is None else {"angle_deg": data.angle}
     for kind, values in (("", curve.data), ("model_", curve.model), ("sigma_", curve.sigma)):
         columns |= {f"{kind}{name}": column for name, column in zip(data.channels, values.T, strict=True)}
@@ -159,8 +157,6 @@ def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
 
     The angle of a BRDF sample is that of the light.
     """
-    from pellicle.reporting.quantities import quantities
-
     data = part.data
     unknown = np.full(len(part.curve.model), math.nan)
     nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown

@@ -10,10 +10,10 @@ from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import fitted_colours, parameter_text
+from pellicle.reporting import parameter_text
 from pellicle.reporting.parameter_text import LEAST_CORRELATION
 from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
-from pellicle.reporting.quantities import weighted_delta
+from pellicle.reporting.quantities import colours_in_words, differences, weighted_delta
 
 if TYPE_CHECKING:
     from pellicle.fitting.result import Fit, Part
@@ -120,7 +120,7 @@ def data_in_words(part: Part) -> str:
         case Curve():
             return _spectrum(part)
         case ColourCurve():
-            return fitted_colours.summary(part)
+            return colours_in_words(part)
         case _:
             return _samples(part)
 
@@ -180,7 +180,7 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     if part.name:
         rms += f", reduced chi-square {part.chi2_reduced:.4g}"
     rows = [(f"rms residual{of}", rms), (f"noise{of}", noise)]
-    if isinstance(curve, ColourCurve) and (apart := fitted_colours.differences(part)):
+    if isinstance(curve, ColourCurve) and (apart := differences(part)):
         rows.append((f"colour difference{of}", apart))
     if isinstance(curve, Curve) and part.spectrum.kind.degrees and (ratios := part.spectrum.kind.parts):
         square = curve.residual**2 + weighted_delta(curve) ** 2

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.csv_text import csv_rows, written_by
 from pellicle.reporting.json_record import indented, to_json, versions
+from pellicle.reporting.plain_text import csv_rows, written_by
 from pellicle.reporting.repeats import FILES as REPEATS
 
 if TYPE_CHECKING:

@@ -9,14 +9,18 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pellicle.files import MARKER, new_folder, write_text
+
 if TYPE_CHECKING:
-    from pellicle.fitting.result import Estimate, Fit, Part, SystematicEffect
-    from pellicle.forward_model.plan import Row
-    from pellicle.sampling.result import Marginal, Posterior
+    from matplotlib.figure import Figure
+
+    from pellicle.fitting.result import Estimate, Fit, Part
+    from pellicle.sampling.result import Posterior
 
 SCHEMA = "pellicle.fit/1"
 ERROR_SCHEMA = "pellicle.error/1"
@@ -30,179 +34,119 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
     Infinite and undefined numbers are None. A joint fit has a list as `data` and `noise`; a fit of BRDF
     samples has the layer test.
     """
-    matrix = np.asarray(fit.correlation, dtype=float)
-    noise = [{"sigma": number(part.sigma), "source": part.sigma_from} for part in fit.parts]
+    data = [_part(part, fit) for part in fit.parts]
+    noise = [{"sigma": part.sigma, "source": part.sigma_from} for part in fit.parts]
+    test = fit.layer_test
     record = {
         "schema": SCHEMA,
-        "data": [_joint_part(part, fit) for part in fit.parts] if fit.joint else _data(fit.parts[0], fit),
-        "status": str(fit.status),
-        "verdict": fit.verdict,
+        "data": data if fit.joint else data[0],
+        **taken(fit, "status", "verdict"),
         "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
         "rivals": [
-            {
-                "parameters": {name: number(value) for name, value in rival.parameters.items()},
-                "delta_chi2": number(rival.delta_chi2),
-                **_probability(rival.probability),
-                **_errors(rival.stderr),
-            }
+            taken(rival, "parameters", "delta_chi2") | _known(rival, "probability", "stderr")
             for rival in fit.rivals
         ],
-        "chi2_reduced": number(fit.chi2_reduced),
-        "rms": None if fit.rms is None else number(fit.rms),
-        "effective_points": number(fit.effective_points),
-        "correlation": {
-            "names": list(fit.correlation_names),
-            "matrix": [[number(value) for value in row] for row in matrix],
-        },
-        "budget": [_systematic(effect) for effect in fit.budget],
-        "plan": [_effect(row, part.name) for part in fit.parts for row in part.plan.rows],
-        "warnings": list(fit.warnings),
+        **taken(fit, "chi2_reduced", "rms", "effective_points"),
+        "correlation": {"names": fit.correlation_names, "matrix": fit.correlation},
+        "budget": [
+            {"effect": effect.name, **taken(effect, "uncertainty", "unit", "changes", "amount", "explains")}
+            for effect in fit.budget
+        ],
+        "plan": [
+            _named(part.name) | taken(row, "effect", "on", "why", "error_bound")
+            for part in fit.parts
+            for row in part.plan.rows
+        ],
+        "warnings": fit.warnings,
         "versions": versions(),
-        "seconds": number(fit.seconds),
+        "seconds": fit.seconds,
         "noise": noise if fit.joint else noise[0],
-        **_probability(fit.probability),
-        **_layer_test(fit),
+        **_known(fit, "probability"),
     }
-    return record if posterior is None else record | {"posterior": posterior_to_json(posterior)}
+    if test is not None:
+        baselines = [taken(baseline, "name", "held_out") for baseline in test.baselines]
+        record |= {"model": fit.surface.model, **taken(test, "residual", "layered", "held_out")}
+        record["baselines"] = baselines
+    return strict(record) | ({} if posterior is None else {"posterior": posterior_to_json(posterior)})
 
 
-def _probability(share: float | None) -> dict[str, Any]:
-    """Share of the posterior of a minimum, where it was computed."""
-    return {} if share is None else {"probability": number(share)}
+def taken(record: object, *names: str) -> dict[str, Any]:
+    """Attributes of an object by their names."""
+    return {name: getattr(record, name) for name in names}
 
 
-def _errors(stderr: Mapping[str, float] | None) -> dict[str, Any]:
-    """Standard errors of a minimum by name, where they were computed."""
-    return {} if stderr is None else {"stderr": {name: number(value) for name, value in stderr.items()}}
+def _known(record: object, *names: str) -> dict[str, Any]:
+    """Attributes that are not None."""
+    return {name: value for name, value in taken(record, *names).items() if value is not None}
 
 
-def _data(part: Part, fit: Fit) -> dict[str, Any]:
-    data = part.data
-    columns = getattr(data, "elements", ()) or getattr(data, "ratios", ())
-    return {
-        "path": data.path,
-        "sha256": data.sha256,
-        "signal": getattr(data, "space", getattr(data, "signal", "brdf")),
-        "points": len(part.curve.model) if columns else int(part.curve.model.size),
-        **({"ratios": list(columns)} if getattr(data, "ratios", ()) else {}),
-        **_azimuths(data),
-        **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
-        **_depolarisation(part),
-        **_sweeps(part, fit),
-    }
+def _named(name: str) -> dict[str, str]:
+    """The name of a spectrum, which those of a joint fit have."""
+    return {"name": name} if name else {}
 
 
-def _azimuths(data: Any) -> dict[str, Any]:
-    """Azimuths of the sample, where the data have them."""
-    azimuth = getattr(data, "azimuth", None)
-    return {} if azimuth is None else {"azimuths_deg": [float(own) for own in np.unique(azimuth)]}
-
-
-def _depolarisation(part: Part) -> dict[str, Any]:
-    """Mean of a measured depolarisation and of its model, and the rms of the residuals."""
-    data, model = (getattr(part.curve, f"depolarisation_{x}", None) for x in ("data", "model"))
-    if data is None or model is None:
-        return {}
-    numbers = {
-        "mean": number(np.mean(data)),
-        "model": number(np.mean(model)),
-        "rms": number(np.sqrt(np.mean(part.spectral.depolarisation_residual**2))),
-    }
-    return {"depolarisation": numbers}
-
-
-def _sweeps(part: Part, fit: Fit) -> dict[str, Any]:
-    """The scatter of repeated sweeps, and the lack of fit of their mean."""
+def _part(part: Part, fit: Fit) -> dict[str, Any]:
+    """One data set: where it is from, what it is, and in a joint fit its name and its fit quality."""
     from pellicle.fitting.lack_of_fit import lack_of_fit  # imports JAX, which records of failures do not need
 
-    lack = lack_of_fit(part, len(fit.free))
-    if lack is None:
-        return {}
-    numbers = {
-        "number": lack.sweeps,
-        "sd": number(lack.repeatability),
-        "lack_of_fit": number(lack.ratio),
-        "degrees_of_freedom": [int(x) for x in lack.freedom],
-        "probability": number(lack.probability),
+    data, curve = part.data, part.curve
+    ratios, azimuth = getattr(data, "ratios", ()), getattr(data, "azimuth", None)
+    several = bool(getattr(data, "elements", ()) or ratios)
+    record = {
+        **({"name": part.name} if fit.joint else {}),
+        **taken(data, "path", "sha256"),
+        "signal": getattr(data, "space", getattr(data, "signal", "brdf")),
+        "points": len(curve.model) if several else int(curve.model.size),
+        **({"ratios": ratios} if ratios else {}),
+        **({} if azimuth is None else {"azimuths_deg": np.unique(azimuth)}),
+        **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
     }
-    return {"sweeps": numbers}
+    measured, model = (getattr(curve, f"depolarisation_{x}", None) for x in ("data", "model"))
+    if measured is not None and model is not None:
+        rms = np.sqrt(np.mean(part.spectral.depolarisation_residual**2))
+        record["depolarisation"] = {"mean": np.mean(measured), "model": np.mean(model), "rms": rms}
+    if (lack := lack_of_fit(part, len(fit.free))) is not None:
+        record["sweeps"] = {
+            "number": lack.sweeps,
+            "sd": lack.repeatability,
+            "lack_of_fit": lack.ratio,
+            "degrees_of_freedom": [int(x) for x in lack.freedom],
+            "probability": lack.probability,
+        }
+    return record | (taken(part, "rms", "chi2_reduced", "effective_points") if fit.joint else {})
 
 
-def _joint_part(part: Part, fit: Fit) -> dict[str, Any]:
-    """One spectrum of a joint fit: its name, which its own parameters end in, and its fit quality."""
+def _parameter(p: Estimate) -> dict[str, Any]:
     return {
-        "name": part.name,
-        **_data(part, fit),
-        "rms": number(part.rms),
-        "chi2_reduced": number(part.chi2_reduced),
-        "effective_points": number(part.effective_points),
-    }
-
-
-def _systematic(effect: SystematicEffect) -> dict[str, Any]:
-    """A row of the uncertainty budget."""
-    return {
-        "effect": effect.name,
-        "uncertainty": number(effect.uncertainty),
-        "unit": effect.unit,
-        "changes": {name: number(value) for name, value in effect.changes.items()},
-        "amount": number(effect.amount),
-        "explains": number(effect.explains),
-    }
-
-
-def _effect(row: Row, name: str) -> dict[str, Any]:
-    """A row of a plan, with the name of the spectrum in a joint fit."""
-    return {
-        **({"name": name} if name else {}),
-        "effect": row.effect,
-        "on": bool(row.on),
-        "why": row.why,
-        "error_bound": number(row.error_bound),
-    }
-
-
-def _layer_test(fit: Fit) -> dict[str, Any]:
-    """The surface's model and its errors on held-out BRDF samples beside those of the baselines."""
-    test = fit.layer_test
-    if test is None:
-        return {}
-    return {
-        "model": fit.surface.model,
-        "residual": test.residual,
-        "layered": test.layered,
-        "held_out": number(test.held_out),
-        "baselines": [{"name": b.name, "held_out": number(b.held_out)} for b in test.baselines],
+        **taken(p, "value", "stderr", "stderr_noise", "expanded", "coverage_factor"),
+        "degrees_of_freedom": p.effective_degrees_of_freedom,
+        **taken(p, "unit", "lower", "upper", "free"),
+        **_known(p, "lower_limit", "upper_limit"),
     }
 
 
 def posterior_to_json(posterior: Posterior) -> dict[str, Any]:
     """Convert a posterior to dictionaries; the parameters have no numbers where the chain is not trusted."""
     checks, trusted = posterior.checks, posterior.parameters
-    return {
-        "parameters": {name: _marginal(trusted.get(name)) for name in posterior.marginals()},
+    names = "mean", "sd", "q025", "q50", "q975"
+
+    def marginal(name: str) -> dict[str, Any]:
+        known = trusted.get(name)
+        if known is None:
+            return {**dict.fromkeys(names), "modes": []}
+        return taken(known, *names) | {"modes": [taken(mode, "value", "mass") for mode in known.modes]}
+
+    record = {
+        "parameters": {name: marginal(name) for name in posterior.marginals()},
         "checks": {
-            "n_over_tau": number(checks.n_over_tau),
-            "rhat": number(checks.rhat),
-            "acceptance": number(checks.acceptance),
-            "minima_found": checks.minima_found,
-            "minima_visited": checks.minima_visited,
-            "steps": checks.steps,
-            "discard": checks.discard,
+            **taken(checks, "n_over_tau", "rhat", "acceptance", "minima_found", "minima_visited"),
+            **taken(checks, "steps", "discard"),
             "walkers": posterior.draws.shape[1],
-            "autocorrelation_time": number(checks.autocorrelation_time),
-            "independent": checks.independent,
+            **taken(checks, "autocorrelation_time", "independent"),
         },
-        "trusted": checks.trusted,
-        "doubts": list(checks.doubts),
+        **taken(checks, "trusted", "doubts"),
     }
-
-
-def _marginal(marginal: Marginal | None) -> dict[str, Any]:
-    if marginal is None:
-        return {**dict.fromkeys(("mean", "sd", "q025", "q50", "q975")), "modes": []}
-    numbers = {name: getattr(marginal, name) for name in ("mean", "sd", "q025", "q50", "q975")}
-    return numbers | {"modes": [{"value": mode.value, "mass": mode.mass} for mode in marginal.modes]}
+    return strict(record)
 
 
 def failure(
@@ -265,23 +209,35 @@ def versions() -> Mapping[str, str | None]:
     return installed
 
 
-def number(value: Any) -> float | None:
-    """The number as the schema has it: None where it is infinite or undefined."""
-    return float(value) if math.isfinite(value) else None
+def strict(value: Any) -> Any:
+    """Convert to what strict JSON has: lists for arrays, None for infinite and undefined numbers."""
+    if isinstance(value, Mapping):
+        return {str(key): strict(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [strict(each) for each in value]
+    if isinstance(value, str):
+        return str(value)  # also of an enumeration
+    if hasattr(value, "tolist"):
+        return strict(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _parameter(p: Estimate) -> dict[str, Any]:
-    written = {
-        "value": number(p.value),
-        "stderr": number(p.stderr),
-        "stderr_noise": number(p.stderr_noise),
-        "expanded": number(p.expanded),
-        "coverage_factor": number(p.coverage_factor),
-        "degrees_of_freedom": number(p.effective_degrees_of_freedom),
-        "unit": p.unit,
-        "lower": number(p.lower),
-        "upper": number(p.upper),
-        "free": bool(p.free),
-    }
-    limits = {"lower_limit": p.lower_limit, "upper_limit": p.upper_limit}
-    return written | {name: number(value) for name, value in limits.items() if value is not None}
+def write_result(
+    folder: str | os.PathLike[str], record: Mapping[str, Any], contents: Mapping[str, str | Figure]
+) -> Path:
+    """Write result.json, and texts and figures by the names of their files; return the folder.
+
+    Each file appears complete or not at all; those of an earlier result are replaced.
+
+    **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
+    """
+    from pellicle.reporting.matplotlib_figure import save_figure
+
+    target = new_folder(folder)
+    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
+    for name, content in contents.items():
+        if isinstance(content, str):
+            write_text(target / name, content, overwrite=True)
+        else:
+            save_figure(content, target / name, overwrite=True)
+    return target

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ from pellicle.fitting.result import Status
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, NO_DATA
 from pellicle.reporting.fit_text import ADVICE
-from pellicle.reporting.json_record import number, versions
+from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise
 from pellicle.reporting.plain_text import block, facts, wrapped
 
@@ -218,45 +217,33 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
     """Convert a map to the dictionary of its summary; infinite and undefined numbers are None."""
     facts = summarise(made) if summary is None else summary
     about, run = facts.attributes, facts.run
-    return {
+    record = {
         "schema": SCHEMA,
         "data": {
             "path": about.get("path", ""),
             "fingerprint": about.get("fingerprint", ""),
             "signal": about.get("signal", "R"),
-            "shape": dict(zip(map(str, dataset_of(made)["status"].dims), facts.axes.shape, strict=True)),
-            "pixels": facts.pixels,
-            "with_data": facts.with_data,
+            "shape": dict(zip(dataset_of(made)["status"].dims, facts.axes.shape, strict=True)),
+            **taken(facts, "pixels", "with_data"),
         },
         "summary": in_words(facts),
-        "status": dict(facts.counts),
-        "places": dict(facts.places),
+        "status": facts.counts,
+        "places": facts.places,
         "converged": facts.counts.get(str(Status.CONVERGED), 0) / facts.with_data if facts.with_data else 0.0,
         "parameters": {p.name: _parameter_json(p) for p in facts.parameters},
         "rates": {rate.variable: asdict(rate) for rate in facts.rates},
-        "plan": [dict(row) for row in facts.plan],
+        "plan": facts.plan,
         "preview": int(about.get("preview", 1)),
-        "notes": list(facts.notes),
-        "seconds": None if run is None else number(run.seconds),
-        "pixels_per_second": number(_rate(run)) if run is not None and run.pixels else None,
+        "notes": facts.notes,
+        "seconds": None if run is None else run.seconds,
+        "pixels_per_second": _rate(run) if run is not None and run.pixels else None,
         "versions": versions(),
     }
+    return strict(record)
 
 
 def _parameter_json(p: ParameterSummary) -> dict[str, Any]:
-    names: Sequence[str] = ("least", "q05", "median", "q95", "largest")
-    record: dict[str, Any] = {
-        "variable": p.variable,
-        "unit": p.unit,
-        **{name: number(value) for name, value in zip(names, p.percentiles, strict=True)},
-        "stderr": number(p.stderr),
-        "stderr_noise": number(p.stderr_noise),
-    }
-    if p.plane is not None:
-        record["plane"] = {
-            "slopes": dict(p.plane.slopes),
-            "unit": p.plane.unit,
-            "rms": number(p.plane.rms),
-            "explains": number(p.plane.explains),
-        }
-    return record
+    names = ("least", "q05", "median", "q95", "largest")
+    record = taken(p, "variable", "unit") | dict(zip(names, p.percentiles, strict=True))
+    plane = {} if p.plane is None else {"plane": asdict(p.plane)}
+    return record | taken(p, "stderr", "stderr_noise") | plane

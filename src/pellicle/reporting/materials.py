@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pellicle.materials import Material, contents, material
 from pellicle.materials.formats.detect import read_material_file
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from pellicle.reporting.plain_text import aligned
 
 HEADINGS = ("name", "page", "range (nm)", "k data", "source")
 SHOWN_NM = (190.0, 2500.0)
@@ -33,13 +29,6 @@ def _row(name: str, page: contents.Page | None) -> tuple[str, ...]:
     return name, page.path, _range(page.low, page.high), "yes" if page.has_extinction else "no", page.short
 
 
-def _align(rows: Iterable[tuple[str, ...]]) -> str:
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows)
-    return "\n".join(line.rstrip() for line in lines) + "\n"
-
-
 def table(pattern: str | None = None) -> str:
     """List the catalogue as aligned text, one line for each short name and each other page.
 
@@ -54,7 +43,7 @@ def table(pattern: str | None = None) -> str:
         entries = [e for e in entries if any(wanted in text.lower() for text in (*e[0], *e[1]))]
         if not entries:
             return f"nothing in the catalogue matches {pattern!r}\n"
-    return _align([HEADINGS, *(row for row, _ in entries)])
+    return "\n".join([*aligned([HEADINGS, *(row for row, _ in entries)]), ""])
 
 
 def describe(name: str) -> str:
@@ -67,8 +56,11 @@ def describe(name: str) -> str:
         return f"{name}\n"
     low, high = source.wavelength_range
     is_file = entry is None and source.page == name.strip() and Path(source.page).is_file()
+    of_file = read_material_file(source.page) if is_file else None
+    names = ("format", "columns", "title", "comments")
     facts = [
-        *(_facts_of_file(source.page) if is_file else [("page", source.page)]),
+        ("file" if is_file else "page", source.page),
+        *((name, getattr(of_file, name)) for name in (names if is_file else ())),
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
         ("index", _index(source)),
@@ -77,28 +69,26 @@ def describe(name: str) -> str:
         ("reference", source.citation),
         ("aliases", ", ".join(entry.aliases) if entry else ""),
     ]
-    text = [source.name, *(_fact(label, value) for label, value in facts if value)]
+    text = [
+        source.name,
+        *(
+            textwrap.fill(
+                value,
+                100,
+                initial_indent=f"  {label:<11}",
+                subsequent_indent=" " * 13,
+                break_on_hyphens=False,
+            )
+            for label, value in facts
+            if value
+        ),
+    ]
     parts = source.page.split("/")
     others = contents.pages_of_book(parts[1]) if len(parts) == 3 and not is_file else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
-        text += [
-            "",
-            f"pages of {parts[1]} in this installation:",
-            textwrap.indent(_align(rows), "  ").rstrip(),
-        ]
+        text += ["", f"pages of {parts[1]} in this installation:", *(f"  {line}" for line in aligned(rows))]
     return "\n".join(text) + "\n"
-
-
-def _facts_of_file(path: str) -> list[tuple[str, str]]:
-    material = read_material_file(path)
-    return [
-        ("file", path),
-        ("format", material.format),
-        ("columns", material.columns),
-        ("title", material.title),
-        ("comments", material.comments),
-    ]
 
 
 def _index(source: Material) -> str:
@@ -108,13 +98,6 @@ def _index(source: Material) -> str:
     value = complex(source(at))
     k = f", k = {value.imag:.4g}" if source.has_extinction else ""
     return f"n = {value.real:.5g}{k} at {at:g} nm"
-
-
-def _fact(label: str, value: str) -> str:
-    indent = " " * 13
-    return textwrap.fill(
-        value, 100, initial_indent=f"  {label:<11}", subsequent_indent=indent, break_on_hyphens=False
-    )
 
 
 def shown_range(material: Material) -> tuple[float, float]:
@@ -131,12 +114,7 @@ def figure(name: str, path: str | os.PathLike[str]) -> Path:
     The file appears complete or not at all; an existing one is not overwritten. Raises what `material`
     raises, and UsageError for another file type or a path that cannot be written.
     """
-    target = figure_path(path)
-    return save_figure(_draw(name), target)
-
-
-def _draw(name: str) -> Figure:
-    source = material(name)
+    target, source = figure_path(path), material(name)
     low, high = shown_range(source) if isinstance(source, Material) else SHOWN_NM
     nm = np.clip(np.linspace(low, high, POINTS), low, high)
     values = np.asarray(source(nm))
@@ -154,4 +132,4 @@ def _draw(name: str) -> Figure:
         axes.set_title(f"{source.name}   {source.page}", loc="left")
         if source.caution:
             sheet.supxlabel("\n".join(textwrap.wrap(source.caution, 90)), fontsize="small", color="C3")
-    return sheet
+    return save_figure(sheet, target)

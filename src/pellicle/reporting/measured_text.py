@@ -1,19 +1,20 @@
 """Summaries of spectra, colours and cubes: what was read from a file, as text and as JSON."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from pellicle.data.colours import Colours
 from pellicle.data.cube import Cube
 from pellicle.data.cubes.sampled_checks import sample
 from pellicle.data.spectrum import Spectrum
-from pellicle.reporting.fitted_colours import display
-from pellicle.reporting.json_record import number, versions
-from pellicle.reporting.plain_text import facts
+from pellicle.reporting.json_record import strict, taken, versions
+from pellicle.reporting.plain_text import described
+from pellicle.reporting.quantities import display
 from pellicle.signals.registry import KINDS
 
-SPECTRUM_SCHEMA = "pellicle.spectrum/1"
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
 
 
@@ -22,79 +23,73 @@ def describe(measured: Spectrum | Colours | Cube, notes: tuple[str, ...] | None 
 
     `notes` replace those of the data.
     """
-    if isinstance(measured, Spectrum):
-        return describe_spectrum(measured, notes)
-    return (
-        describe_colours(measured, notes) if isinstance(measured, Colours) else describe_cube(measured, notes)
-    )
+    match measured:
+        case Spectrum():
+            noun, rows = "spectrum", _spectrum_rows(measured)
+        case Colours():
+            noun, rows = "colours", _colours_rows(measured)
+        case _:
+            noun, rows = "cube", _cube_rows(measured)
+    return described(measured.path or noun, rows, measured.notes if notes is None else notes)
 
 
 def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
     """Convert the summary to a dictionary; numbers that are unknown are None."""
-    if isinstance(measured, Spectrum):
-        return spectrum_json(measured)
-    return colours_json(measured) if isinstance(measured, Colours) else cube_json(measured)
+    match measured:
+        case Spectrum():
+            record = _spectrum_record(measured)
+        case Colours():
+            record = _colours_record(measured)
+        case _:
+            record = _cube_record(measured)
+    return strict(record | {"notes": measured.notes, "versions": versions()})
 
 
-def describe_spectrum(spectrum: Spectrum, notes: tuple[str, ...] | None = None) -> str:
-    """Describe what was read: quantity, range, points, angles, noise, and how the file was read.
-
-    `notes` replace those of the spectrum.
-    """
-    nm, angles = spectrum.wavelength, _each(spectrum.angle)
-    azimuths = _each(spectrum.azimuth)
+def _spectrum_rows(spectrum: Spectrum) -> list[tuple[str, str]]:
+    """Labels and texts of quantity, range, points, angles and noise."""
+    nm, values = spectrum.wavelength, _values(spectrum)
     steps = np.diff(np.unique(nm))
     reach = f"{nm[0]:g} to {nm[-1]:g} nm, every {np.median(steps):.3g} nm" if steps.size else f"{nm[0]:g} nm"
     quantity = spectrum.kind.title + ("" if spectrum.calibrated else ", scale unknown")
     if not (spectrum.kind.ellipsometric or spectrum.kind.of_counts):
         quantity += f", {spectrum.polarisation} light"
-    rows = [
+    sizes = {name: scatter(x) for name, x in values.items()}
+    seen = ", ".join(f"{size:.2g} ({name})" for name, size in sizes.items() if np.isfinite(size))
+    given = "" if spectrum.sigma is None else f"given, {np.median(spectrum.sigma):.2g} in the median"
+    noise = (given, f"neighbouring points scatter by {seen}" if seen else "")
+    return [
         ("spectrum", spectrum.name),
         ("quantity", quantity),
-        *((label, _span(values)) for label, values in _values(spectrum).items()),
+        *((label, f"{x.min():.4g} to {x.max():.4g}") for label, x in values.items()),
         ("wavelength", f"{reach}, {len(spectrum)} points"),
-        ("angle", ", ".join(f"{angle:g}" for angle in angles) + " degrees" if angles else ""),
-        ("azimuth", ", ".join(f"{azimuth:g}" for azimuth in azimuths) + " degrees" if azimuths else ""),
+        ("angle", _degrees(_each(spectrum.angle))),
+        ("azimuth", _degrees(_each(spectrum.azimuth))),
         ("sweeps", f"{len(spectrum.sweeps)}, averaged" if spectrum.sweeps else ""),
-        ("noise", _noise_text(spectrum)),
+        ("noise", "; ".join(text for text in noise if text)),
         *spectrum.declared,
-        *((" " if i else "read", note) for i, note in enumerate(spectrum.notes if notes is None else notes)),
     ]
-    return "\n".join([spectrum.path or "spectrum", *facts([row for row in rows if row[1]]), ""])
 
 
-def spectrum_json(spectrum: Spectrum) -> dict[str, Any]:
-    """Convert the summary to a dictionary; numbers that are unknown are None."""
-    low, high = (float(x) for x in spectrum.wavelength[[0, -1]])
-    stated = {
-        name: None if errors is None else [number(errors.min()), number(errors.max())]
-        for name, errors in (("sigma", spectrum.sigma), ("delta_sigma", spectrum.delta_sigma))
-    }
+def _spectrum_record(spectrum: Spectrum) -> dict[str, Any]:
+    errors = taken(spectrum, "sigma", "delta_sigma")
     return {
-        "schema": SPECTRUM_SCHEMA,
-        "path": spectrum.path,
-        "sha256": spectrum.sha256,
-        "name": spectrum.name,
-        "signal": spectrum.signal,
-        "polarisation": spectrum.polarisation,
-        "calibrated": spectrum.calibrated,
+        "schema": "pellicle.spectrum/1",
+        **taken(spectrum, "path", "sha256", "name", "signal", "polarisation", "calibrated"),
         "folded": spectrum.kind.folded,
         "transmission": spectrum.transmission,
         "points": len(spectrum),
         "sweeps": len(spectrum.sweeps),
-        "range_nm": [low, high],
+        "range_nm": spectrum.wavelength[[0, -1]],
         "angles_deg": _each(spectrum.angle),
         "azimuths_deg": _each(spectrum.azimuth),
-        "values": {name: [number(x.min()), number(x.max())] for name, x in _values(spectrum).items()},
-        "noise": {name: number(scatter(x)) for name, x in _values(spectrum).items()},
-        **stated,
+        "values": {name: [x.min(), x.max()] for name, x in _values(spectrum).items()},
+        "noise": {name: scatter(x) for name, x in _values(spectrum).items()},
+        **{name: None if x is None else [x.min(), x.max()] for name, x in errors.items()},
         "declared": dict(spectrum.declared),
-        "notes": list(spectrum.notes),
-        "versions": versions(),
     }
 
 
-def scatter(values: np.ndarray) -> float:
+def scatter(values: Float[np.ndarray, " points"]) -> float:
     """Noise of a point, from second differences of neighbours; NaN for fewer than 5 points.
 
     A smooth signal cancels: of independent noise σ, y₋ − 2y + y₊ has the standard deviation √6 σ.
@@ -120,20 +115,11 @@ def _each(values: np.ndarray | None) -> list[float]:
     return [] if values is None else [float(value) for value in np.unique(values)]
 
 
-def _span(values: np.ndarray) -> str:
-    return f"{values.min():.4g} to {values.max():.4g}"
+def _degrees(angles: Iterable[float]) -> str:
+    text = ", ".join(f"{angle:g}" for angle in angles)
+    return f"{text} degrees" if text else ""
 
 
-def _noise_text(spectrum: Spectrum) -> str:
-    sizes = {name: scatter(values) for name, values in _values(spectrum).items()}
-    seen = ", ".join(f"{size:.2g} ({name})" for name, size in sizes.items() if np.isfinite(size))
-    given = "" if spectrum.sigma is None else f"given, {np.median(spectrum.sigma):.2g} in the median"
-    return "; ".join(
-        text for text in (given, f"neighbouring points scatter by {seen}" if seen else "") if text
-    )
-
-
-COLOURS_SCHEMA = "pellicle.colours/1"
 _SPACES = {
     "srgb": "display values of sRGB",
     "rgb": "channels of a camera",
@@ -144,84 +130,60 @@ _COLOURS_SHOWN = 12
 """Colours that are listed."""
 
 
-def describe_colours(colours: Colours, notes: tuple[str, ...] | None = None) -> str:
-    """Describe what was read: the space, each colour with its angle, the noise and how the file was read.
-
-    `notes` replace those of the colours.
-    """
+def _colours_rows(colours: Colours) -> list[tuple[str, str]]:
+    """Labels and texts of the space, of each colour as `0.412 0.355 0.220  #695b38  at 45 degrees`, and of
+    the noise."""
     light = f"{'transmitted' if colours.signal == 'T' else 'reflected'}, {colours.polarisation} light"
-    plural = "s" * (len(colours) > 1)
-    rows = [
+    codes, digits = _codes(colours), 2 if colours.space == "lab" else 4
+    lines = []
+    for i, values in enumerate(colours.values[:_COLOURS_SHOWN]):
+        angle = "" if colours.angle is None else f"  at {colours.angle[i]:g} degrees"
+        lines.append(f"{' '.join(f'{x:.{digits}f}' for x in values)}  {codes[i]}{angle}")
+    left = len(colours) - len(lines)
+    lines += [f"and {left} more"] if left else []
+    noise = f"{np.median(colours.noise):.2g} in the median"
+    return [
         ("film", colours.name),
-        ("quantity", f"{_SPACES[colours.space]}, {len(colours)} colour{plural}, {light}"),
-        *(("" if i else ", ".join(colours.channels), text) for i, text in enumerate(_listed(colours))),
-        ("noise", _colour_noise(colours)),
+        ("quantity", f"{_SPACES[colours.space]}, {len(colours)} colour{'s' * (len(colours) > 1)}, {light}"),
+        *(("" if i else ", ".join(colours.channels), text) for i, text in enumerate(lines)),
+        ("noise", f"usual one, {noise}" if colours.sigma is None else noise),
         ("white balance", "free" if colours.white_balance == "free" else ""),
-        *((" " if i else "read", note) for i, note in enumerate(colours.notes if notes is None else notes)),
     ]
-    return "\n".join([colours.path or "colours", *facts([row for row in rows if row[1]]), ""])
 
 
-def colours_json(colours: Colours) -> dict[str, Any]:
-    """Convert the summary to a dictionary. `display` are sRGB colours as #rrggbb."""
+def _colours_record(colours: Colours) -> dict[str, Any]:
+    """Summary of colours; `display` are sRGB colours as #rrggbb."""
     nm = colours.sensor[0]
+    columns = zip(colours.channels, colours.values.T, strict=True)
     return {
-        "schema": COLOURS_SCHEMA,
-        "path": colours.path,
-        "sha256": colours.sha256,
-        "name": colours.name,
+        "schema": "pellicle.colours/1",
+        **taken(colours, "path", "sha256", "name"),
         "signal": colours.space,
         "transmitted": colours.signal == "T",
         "polarisation": colours.polarisation,
         "points": len(colours),
-        "range_nm": [number(nm.min()), number(nm.max())],
-        "angles_deg": [] if colours.angle is None else [number(x) for x in colours.angle],
-        "values": {
-            channel: [number(x.min()), number(x.max())]
-            for channel, x in zip(colours.channels, colours.values.T, strict=True)
-        },
-        "colours": [[number(x) for x in row] for row in colours.values],
-        "sigma": None if colours.sigma is None else [[number(x) for x in row] for row in colours.sigma],
-        "display": [_code(row) for row in display(colours, colours.values)],
-        "white_balance": colours.white_balance,
-        "gamma": number(colours.gamma),
-        "notes": list(colours.notes),
-        "versions": versions(),
+        "range_nm": [nm.min(), nm.max()],
+        "angles_deg": [] if colours.angle is None else colours.angle,
+        "values": {channel: [x.min(), x.max()] for channel, x in columns},
+        "colours": colours.values,
+        "sigma": colours.sigma,
+        "display": _codes(colours),
+        **taken(colours, "white_balance", "gamma"),
     }
 
 
-def _listed(colours: Colours) -> list[str]:
-    """A line for each colour, `0.412 0.355 0.220  #695b38  at 45 degrees`."""
-    shown = display(colours, colours.values)
-    digits = 2 if colours.space == "lab" else 4
-    lines = []
-    for i, values in enumerate(colours.values[:_COLOURS_SHOWN]):
-        angle = "" if colours.angle is None else f"  at {colours.angle[i]:g} degrees"
-        numbers = " ".join(f"{x:.{digits}f}" for x in values)
-        lines.append(f"{numbers}  {_code(shown[i])}{angle}")
-    left = len(colours) - len(lines)
-    return [*lines, f"and {left} more"] if left else lines
+def _codes(colours: Colours) -> list[str]:
+    """Each colour as a display shows it, #rrggbb."""
+    shown = np.round(255 * np.clip(display(colours, colours.values), 0, 1)).astype(int)
+    return ["#{:02x}{:02x}{:02x}".format(*rgb) for rgb in shown]
 
 
-def _code(shown: np.ndarray) -> str:
-    return "#" + "".join(f"{int(x):02x}" for x in np.round(255 * np.clip(shown, 0, 1)))
-
-
-def _colour_noise(colours: Colours) -> str:
-    size = f"{np.median(colours.noise):.2g} in the median"
-    return f"usual one, {size}" if colours.sigma is None else size
-
-
-CUBE_SCHEMA = "pellicle.cube/1"
 _BANDS_SHOWN = 6
 """Wavelengths at which the text shows the median spectrum."""
 
 
-def describe_cube(cube: Cube, notes: tuple[str, ...] | None = None) -> str:
-    """Describe what was read: quantity, pixels, bands, values, and how the file was read.
-
-    `notes` replace those of the cube. Values are of a sample of the pixels.
-    """
+def _cube_rows(cube: Cube) -> list[tuple[str, str]]:
+    """Labels and texts of quantity, pixels, bands and values, which are of a sample of the pixels."""
     seen, nm = _sample(cube), cube.wavelength
     kind = KINDS[cube.signal]()
     quantity = kind.title + ("" if cube.calibrated else ", scale unknown")
@@ -233,41 +195,34 @@ def describe_cube(cube: Cube, notes: tuple[str, ...] | None = None) -> str:
         ("quantity", quantity),
         ("pixels", pixels + ("" if cube.mask is None else f"; {int(cube.mask.sum())} used")),
         ("wavelength", f"{nm[0]:g} to {nm[-1]:g} nm, {nm.size} bands"),
-        ("angle", "" if cube.angle is None else ", ".join(f"{a:g}" for a in cube.angle) + " degrees"),
-        *(_value_row(name, values) for name, values in seen.items()),
-        *(
-            (f"median {name}", ", ".join(f"{middle[i]:.3g} at {nm[i]:g} nm" for i in some))
-            for name, middle in _medians(cube, seen).items()
-        ),
-        *((" " if i else "read", note) for i, note in enumerate(cube.notes if notes is None else notes)),
+        ("angle", "" if cube.angle is None else _degrees(cube.angle)),
     ]
-    return "\n".join([cube.path or "cube", *facts([row for row in rows if row[1]]), ""])
+    for name, values in seen.items():
+        missing = np.mean(~np.isfinite(values))
+        lacks = f", {100 * missing:.2g} % missing" if missing else ""
+        rows.append((name, f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g}{lacks}"))
+    for name, middle in _medians(cube, seen).items():
+        rows.append((f"median {name}", ", ".join(f"{middle[i]:.3g} at {nm[i]:g} nm" for i in some)))
+    return rows
 
 
-def cube_json(cube: Cube) -> dict[str, Any]:
-    """Convert the summary to a dictionary; values are of a sample of the pixels."""
+def _cube_record(cube: Cube) -> dict[str, Any]:
+    """Summary of a cube; values are of a sample of the pixels."""
     seen = _sample(cube)
-    low, high = (float(x) for x in cube.wavelength[[0, -1]])
     return {
-        "schema": CUBE_SCHEMA,
-        "path": cube.path,
-        "fingerprint": cube.fingerprint,
-        "signal": cube.signal,
-        "polarisation": cube.polarisation,
-        "calibrated": cube.calibrated,
+        "schema": "pellicle.cube/1",
+        **taken(cube, "path", "fingerprint", "signal", "polarisation", "calibrated"),
         "pixels": dict(zip(cube.dims, cube.shape, strict=True)),
         "pixels_used": int(np.prod(cube.shape) if cube.mask is None else cube.mask.sum()),
         "points": cube.points,
-        "bands": int(cube.wavelength.size),
-        "range_nm": [low, high],
-        "angles_deg": [] if cube.angle is None else [float(angle) for angle in cube.angle],
-        "values": {name: [number(np.nanmin(x)), number(np.nanmax(x))] for name, x in seen.items()},
-        "missing": {name: number(np.mean(~np.isfinite(x))) for name, x in seen.items()},
-        "median": {name: [number(x) for x in middle] for name, middle in _medians(cube, seen).items()},
-        "wavelength_nm": [float(x) for x in cube.wavelength],
-        "units": dict(cube.units),
-        "notes": list(cube.notes),
-        "versions": versions(),
+        "bands": cube.wavelength.size,
+        "range_nm": cube.wavelength[[0, -1]],
+        "angles_deg": [] if cube.angle is None else cube.angle,
+        "values": {name: [np.nanmin(x), np.nanmax(x)] for name, x in seen.items()},
+        "missing": {name: np.mean(~np.isfinite(x)) for name, x in seen.items()},
+        "median": _medians(cube, seen),
+        "wavelength_nm": cube.wavelength,
+        "units": cube.units,
     }
 
 
@@ -283,9 +238,3 @@ def _medians(cube: Cube, seen: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     if cube.angle is not None and cube.angle.size > 1:
         return {}
     return {name: np.nanmedian(x.reshape(len(x), -1), axis=0) for name, x in seen.items()}
-
-
-def _value_row(name: str, values: np.ndarray) -> tuple[str, str]:
-    missing = np.mean(~np.isfinite(values))
-    text = f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g}"
-    return name, text + (f", {100 * missing:.2g} % missing" if missing else "")

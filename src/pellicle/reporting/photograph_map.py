@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.files import MARKER, new_folder, replacing, write_text
+from pellicle.files import replacing
 from pellicle.mapping.photograph import ThicknessMap
-from pellicle.reporting.csv_text import csv_rows
-from pellicle.reporting.json_record import indented, number, versions
-from pellicle.reporting.matplotlib_figure import BLUE, GREY, ORANGE, new_figure, save_figure
+from pellicle.reporting.json_record import strict, versions, write_result
+from pellicle.reporting.matplotlib_figure import BLUE, GREY, ORANGE, new_figure, plain
+from pellicle.reporting.plain_text import csv_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,34 +21,27 @@ SCHEMA = "pellicle.map/1"
 LEAST = 1e-3
 """Least probability of a thickness that is listed and drawn."""
 _HEADER = (
-    "position_px",
-    "R",
-    "G",
-    "B",
-    "order",
-    "thickness_nm",
-    "stderr_nm",
-    "probability",
-    "delta_e",
-    "status",
+    *("position_px", "R", "G", "B"),
+    *("order", "thickness_nm", "stderr_nm", "probability", "delta_e", "status"),
 )
 
 
 def report(made: ThicknessMap) -> str:
     """Describe a map: its positions, thicknesses and how many of them are sure."""
-    best, status = made.found.thickness[..., 0], made.found.status
-    names, counts = np.unique(status, return_counts=True)
-    share = ", ".join(f"{100 * n / status.size:.3g} % {name}" for name, n in zip(names, counts, strict=True))
-    low, middle, high = np.percentile(best, [0, 50, 100])
-    lines = [
-        made.path,
-        f"    thickness  {low:.1f} to {high:.1f} nm, {middle:.1f} nm in the median",
-        f"    errors     {np.median(made.found.stderr[..., 0]):.2g} nm in the median (noise alone)",
-        f"    status     {share}",
-        f"    misfit     ΔE*ab {np.median(made.found.delta_e[..., 0]):.2g} in the median (CIE 1976)",
+    films = made.found
+    names, counts = np.unique(films.status, return_counts=True)
+    share = ", ".join(
+        f"{100 * n / films.status.size:.3g} % {name}" for name, n in zip(names, counts, strict=True)
+    )
+    low, middle, high = np.percentile(films.thickness[..., 0], [0, 50, 100])
+    rows = [
+        ("thickness", f"{low:.1f} to {high:.1f} nm, {middle:.1f} nm in the median"),
+        ("errors", f"{np.median(films.stderr[..., 0]):.2g} nm in the median (noise alone)"),
+        ("status", share),
+        ("misfit", f"ΔE*ab {np.median(films.delta_e[..., 0]):.2g} in the median (CIE 1976)"),
+        *(("" if i else "read", note) for i, note in enumerate(made.notes)),
     ]
-    lines += [f"    {'' if i else 'read':<9}  {note}" for i, note in enumerate(made.notes)]
-    return "\n".join([*lines, ""])
+    return "\n".join([made.path, *(f"    {label:<9}  {text}" for label, text in rows), ""])
 
 
 def to_json(made: ThicknessMap) -> dict[str, Any]:
@@ -59,36 +52,33 @@ def to_json(made: ThicknessMap) -> dict[str, Any]:
         "schema": SCHEMA,
         "data": {"path": made.path, "sha256": made.sha256, "signal": made.space, "points": best.size},
         "strip" if made.position is not None else "region": made.where,
-        "status": {str(name): int(n) for name, n in zip(names, counts, strict=True)},
+        "status": dict(zip(names, counts, strict=True)),
         "converged": made.converged,
-        "thickness": {
-            "least": number(best.min()),
-            "median": number(np.median(best)),
-            "largest": number(best.max()),
-        },
+        "thickness": {"least": best.min(), "median": np.median(best), "largest": best.max()},
         "unit": "nm",
-        "notes": list(made.notes),
+        "notes": made.notes,
         "versions": versions(),
     }
     if made.position is not None:
         columns = zip(("thickness", "stderr", "probability", "delta_e"), made.found, strict=False)
         record["positions"] = {
-            "position_px": [number(x) for x in made.position],
-            **{name: [number(x) for x in values[:, 0]] for name, values in columns},
-            "status": made.found.status.tolist(),
+            "position_px": made.position,
+            **{name: values[:, 0] for name, values in columns},
+            "status": made.found.status,
         }
-    return record
+    return strict(record)
 
 
 def to_csv(made: ThicknessMap) -> str:
     """Format a strip as rows, one for each admissible thickness of each position."""
     films, rows = made.found, []
     assert made.position is not None
-    for i, (at, colour) in enumerate(zip(made.position, made.colours, strict=True)):
+    for i, (position, colour) in enumerate(zip(made.position, made.colours, strict=True)):
         for order in np.flatnonzero(np.nan_to_num(films.probability[i]) >= LEAST):
             columns = (films.thickness, films.stderr, films.probability, films.delta_e)
             values = [f"{float(x[i, order]):.6g}" for x in columns]
-            rows.append([f"{at:.6g}", *(f"{x:.5f}" for x in colour), order + 1, *values, films.status[i]])
+            rgb = (f"{x:.5f}" for x in colour)
+            rows.append([f"{position:.6g}", *rgb, order + 1, *values, films.status[i]])
     return csv_rows(_HEADER, rows)
 
 
@@ -102,17 +92,15 @@ def write_map(folder: str | os.PathLike[str], made: ThicknessMap) -> Path:
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
-    target = new_folder(folder)
-    write_text(target / MARKER, indented(to_json(made)), overwrite=True)  # first: it marks the folder
-    write_text(target / "report.txt", report(made), overwrite=True)
-    if made.position is not None:
-        write_text(target / "strip.csv", to_csv(made), overwrite=True)
-    else:
-        arrays = zip(("thickness", "stderr", "probability"), made.found, strict=False)
-        for key, values in arrays:
+    name = Path(made.path).name
+    contents = {"report.txt": report(made), "map.png": draw(made, name)}
+    contents |= {} if made.position is None else {"strip.csv": to_csv(made)}
+    target = write_result(folder, to_json(made), contents)
+    if made.position is None:
+        for key in ("thickness", "stderr", "probability"):
+            values = getattr(made.found, key)[..., 0].astype(np.float32)
             with replacing(target / f"{key}.npy", overwrite=True) as draft, draft.open("wb") as file:
-                np.save(file, values[..., 0].astype(np.float32))
-    save_figure(draw(made, Path(made.path).name), target / "map.png", overwrite=True)
+                np.save(file, values)
     return target
 
 
@@ -130,7 +118,7 @@ def _strip(made: ThicknessMap, name: str) -> Figure:
     )
     shown.set_yticks([0, 1], ["data", "fit"])
     shown.tick_params(length=0)
-    shown.set_title(name.replace("$", r"\$"))
+    shown.set_title(plain(name))
     films = made.found
     for order in range(films.thickness.shape[1] - 1, -1, -1):
         probability = np.nan_to_num(films.probability[:, order])
@@ -166,7 +154,7 @@ def _region(made: ThicknessMap, name: str) -> Figure:
     figure = new_figure(10.0, float(np.clip(0.6 + 3.0 * height / width, 2.4, 8.0)))
     panels = figure.subplots(1, 3)
     panels[0].imshow(np.clip(made.colours, 0, 1), interpolation="nearest")
-    panels[0].set_title(name.replace("$", r"\$"))
+    panels[0].set_title(plain(name))
     parts = (
         ("thickness (nm)", made.found.thickness, "viridis"),
         ("probability", made.found.probability, "cividis"),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from pellicle.forward_model.plan import SURFACE, Plan, Row
+from pellicle.reporting.json_record import taken
+from pellicle.reporting.plain_text import aligned
 
 if TYPE_CHECKING:
     from pellicle.effects.differences import Savings
@@ -17,7 +18,7 @@ def report(plan: Plan) -> str:
     """Format one line for each effect, on or off, with its reason, and the bound on the error of the plan."""
     rows = [("effect", "", "error bound", "why")]
     rows += [(row.effect, "on" if row.on else "off", _bound(row), row.why) for row in plan.rows]
-    return "\n".join([*_aligned(rows), "", *_summary(plan)]) + "\n"
+    return "\n".join([*aligned(rows), "", *_summary(plan)]) + "\n"
 
 
 def report_with_savings(plan: Plan, savings: Savings) -> str:
@@ -30,18 +31,11 @@ def report_with_savings(plan: Plan, savings: Savings) -> str:
     error, *gradients = _summary(plan)
     planned, exact = _time(savings.planned), _time(savings.exact)
     times = f"an evaluation takes {planned}, with every effect that is present {exact}"
-    return "\n".join([*_aligned(rows), "", error, times, *gradients]) + "\n"
+    return "\n".join([*aligned(rows), "", error, times, *gradients]) + "\n"
 
 
 def _bound(row: Row) -> str:
     return f"{row.error_bound:.1e}" if row.error_bound else "0"
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Columns of text; the last one is not padded."""
-    widths = [*(max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]), 0]
-    lines = ("  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) for row in rows)
-    return [line.rstrip() for line in lines]
 
 
 def _summary(plan: Plan) -> list[str]:
@@ -71,18 +65,10 @@ def to_json(plan: Plan, savings: Savings) -> dict[str, Any]:
         saving = savings.effects.get(row.effect)
         effects.append(
             {
-                "effect": row.effect,
-                "on": row.on,
-                "why": row.why,
-                "error_bound": row.error_bound,
+                **taken(row, "effect", "on", "why", "error_bound"),
                 "cost": 0.0 if saving is None else saving.seconds,
                 "error_without": None if saving is None else saving.error,
             }
         )
-    return {
-        "schema": "pellicle.plan/1",
-        "tolerance": plan.tolerance,
-        "error_bound": plan.error_bound,
-        "gradient_error": plan.gradient_error,
-        "effects": effects,
-    }
+    record = taken(plan, "tolerance", "error_bound", "gradient_error")
+    return {"schema": "pellicle.plan/1", **record, "effects": effects}

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.csv_text import csv_rows, written_by
-from pellicle.reporting.json_record import indented, number, versions
-from pellicle.reporting.plain_text import block, facts, table, wrapped
+from pellicle.reporting.json_record import indented, strict, taken, versions
+from pellicle.reporting.plain_text import block, csv_rows, facts, table, wrapped, written_by
 
 if TYPE_CHECKING:
     from pellicle.fitting.repeated_measurements import RepeatedParameter, Repeats
@@ -83,8 +82,7 @@ def to_json(repeats: Repeats) -> dict[str, Any]:
         "data": [{"path": r.path, "status": str(r.status), "used": not r.left_out} for r in repeats.repeats],
         "verdict": repeats.verdict,
         "parameters": {name: _parameter(p) for name, p in repeats.parameters.items()},
-        "uncompared": list(repeats.uncompared),
-        "warnings": list(repeats.warnings),
+        **strict(taken(repeats, "uncompared", "warnings")),
         "versions": versions(),
     }
 
@@ -96,32 +94,18 @@ def failure(paths: Sequence[str], error: str) -> dict[str, Any]:
 
 
 def _parameter(p: RepeatedParameter) -> dict[str, Any]:
-    return {
-        "unit": p.unit,
-        "values": list(map(number, p.values)),
-        "stderr_noise": list(map(number, p.noise)),
-        "mean": number(p.mean),
-        "sd": number(p.sd),
-        "sd_mean": number(p.sd_mean),
+    record = {
+        **taken(p, "unit", "values"),
+        "stderr_noise": p.noise,
+        **taken(p, "mean", "sd", "sd_mean"),
         "degrees_of_freedom": p.freedom,
-        "chi2": number(p.chi2),
-        "probability": number(p.probability),
-        "ratio": number(p.ratio),
-        "agreement": str(p.agreement),
-        "stderr_common": number(p.shared),
-        "stderr": number(p.stderr),
-        "effective_degrees_of_freedom": number(p.effective_freedom),
-        "coverage_factor": number(p.coverage_factor),
-        "expanded": number(p.expanded),
+        **taken(p, "chi2", "probability", "ratio", "agreement"),
+        "stderr_common": p.shared,
+        "stderr": p.stderr,
+        "effective_degrees_of_freedom": p.effective_freedom,
+        **taken(p, "coverage_factor", "expanded"),
     }
-
-
-def repeats_csv(repeats: Repeats) -> str:
-    """Format one row for each parameter as CSV."""
-    rows = [{"parameter": name, **_parameter(p)} for name, p in repeats.parameters.items()]
-    header = [name for name in rows[0] if name not in ("values", "stderr_noise")]
-    cells = [[row[name] for name in header] for row in rows]
-    return csv_rows(header, cells, [f"scatter of repeated measurements; {written_by()}"])
+    return strict(record)
 
 
 def write_repeats(folder: str | os.PathLike[str], repeats: Repeats) -> Path:
@@ -132,6 +116,10 @@ def write_repeats(folder: str | os.PathLike[str], repeats: Repeats) -> Path:
     target, record = new_folder(folder), indented(to_json(repeats))
     if not (target / MARKER).exists():
         write_text(target / MARKER, record)
-    for name, text in zip(FILES, (record, repeats_csv(repeats), report(repeats)), strict=True):
+    rows = [{"parameter": name, **_parameter(p)} for name, p in repeats.parameters.items()]
+    header = [name for name in rows[0] if name not in ("values", "stderr_noise")]
+    cells = [[row[name] for name in header] for row in rows]
+    text_of_table = csv_rows(header, cells, [f"scatter of repeated measurements; {written_by()}"])
+    for name, text in zip(FILES, (record, text_of_table, report(repeats)), strict=True):
         write_text(target / name, text, overwrite=True)
     return target

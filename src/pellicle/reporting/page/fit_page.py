@@ -11,12 +11,13 @@ import numpy as np
 from pellicle.fitting.curves import ColourCurve
 from pellicle.fitting.result import Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import fit_text, fitted_colours, parameter_text
+from pellicle.reporting import fit_text, parameter_text
 from pellicle.reporting.drawable import Line, Panel, Section
 from pellicle.reporting.fit_panels import file_names
 from pellicle.reporting.page import figures, repetition
 from pellicle.reporting.page.document import Table, page, picture
 from pellicle.reporting.plotly_figure import figure
+from pellicle.reporting.quantities import colours_in_words, colours_of, display
 from pellicle.sampling.result import verdict
 
 if TYPE_CHECKING:
@@ -200,10 +201,8 @@ def _statistics(fit: Fit) -> Table:
 
 def _swatches(part: Part) -> dict[str, Any]:
     """Colours of data and fit as a browser shows them, and their differences."""
-    data, curve = fitted_colours.colours_of(part)
-    both = zip(
-        fitted_colours.display(data, curve.data), fitted_colours.display(data, curve.model), strict=True
-    )
+    data, curve = colours_of(part)
+    both = zip(display(data, curve.data), display(data, curve.model), strict=True)
     rows = [
         {
             "name": f"{i + 1}" if data.angle is None else f"{data.angle[i]:g}°",
@@ -213,7 +212,7 @@ def _swatches(part: Part) -> dict[str, Any]:
         }
         for i, (measured, model) in enumerate(both)
     ]
-    return {"caption": fitted_colours.summary(part), "rows": rows}
+    return {"caption": colours_in_words(part), "rows": rows}
 
 
 def _hex(rgb: Any) -> str:
