@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.data.sensors import read_lamp, read_sensitivities
+from pellicle.data.cameras import read_lamp, read_sensitivities
 from pellicle.errors import DataError
 from tests.data.tables import rows
 

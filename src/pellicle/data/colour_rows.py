@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +20,6 @@ _NAMES = ("name", "film", "sample", "patch", "label", "id")
 _HEAD = 65_536
 """Bytes in which the header is looked for."""
 _STATED = re.compile(r"signal (rgb|srgb|xyz|lab)\b")
-
-
 _SIGHT = re.compile(r"observer (1931|1964) under (E|A|D50|D55|D65|D75)")
 """Comment of pellicle's own files on the observer and the illuminant."""
 _MEANING = {
@@ -38,9 +36,8 @@ _SETS = {
 }
 """Names of the channels of each set; case matters where it tells X, Y, Z from x, y, Y."""
 _UNITS = {"%": "percent", "percent": "percent", "8 bit": "8-bit", "8-bit": "8-bit", "8bit": "8-bit"}
-EXAMPLE = '`columns=["angle_deg", "R", "G", "B"]`'
-UNITS = {"fraction": 1.0, "percent": 100.0, "8-bit": 255.0, "16-bit": 65535.0}
-_ASK = '`signal_unit="8-bit"`, `signal_unit="percent"` or `signal_unit="fraction"`'
+_EXAMPLE = '`columns=["angle_deg", "R", "G", "B"]`'
+_FULL = {"fraction": 1.0, "percent": 100.0, "8-bit": 255.0, "16-bit": 65535.0}
 _HIGHEST = 1.5
 """Largest fraction: calibrations are off by half at most."""
 
@@ -60,11 +57,33 @@ class ColourRows(NamedTuple):
     sight: str = ""  # "observer 1964 under D65", where the file states it
 
 
+@dataclass(frozen=True)
+class ColourCells:
+    """Cells of a file of colours, and the names of its columns.
+
+    `sets` are the positions of the channels of every set that the names have: rgb, xyz, xyY and lab.
+    """
+
+    file: TextFile
+    names: list[str]
+    rows: list[Line]
+    cells: list[list[str]]
+    delimiter: str
+    sets: dict[str, list[int]]
+
+    def table(self, positions: Sequence[int]) -> Table:
+        """Return the table of the cells, whose numbers are at these positions."""
+        comma = self.delimiter != "," and any("," in row[i] for row in self.cells for i in positions)
+        rows = list(zip(self.rows, self.cells, strict=True))
+        table = plain_columns(self.names, rows, [], decimal="," if comma else ".")
+        return replace(table, path=self.file.path, sha256=self.file.sha256)
+
+
 class _Columns(NamedTuple):
     kind: str  # a key of _SETS
     channels: list[int]
     sigma: list[int]  # none, one for all, or three
-    angle: int | None
+    angle: list[int]  # one or none
     name: int | None
     unit: str | None
     ignored: list[str]
@@ -91,90 +110,77 @@ def read_colour_rows(
 
     **Raises:** DataError or UsageError: one sentence with file, line and remedy.
     """
-    file = text_file(*read_bytes(path), path)
-    names, rows, cells, delimiter = named_cells(file, columns)
-    chosen = _recognised(names, file.path)
+    cells = colour_cells(path, columns)
+    file, chosen = cells.file, _recognised(cells)
     space = _space(file, chosen.kind, space)
-    table = colour_table(file, names, rows, cells, delimiter, chosen.channels)
-    values, sigma, angle = _numbers(table, chosen)
-    where = [table.places(position) for position in chosen.channels]
-    values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
-    shown = ", ".join(names[i].strip() for i in chosen.channels)
-    notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
-    notes += [f"ignored: {', '.join(chosen.ignored)}"] if chosen.ignored else []
-    films = np.array(["" if chosen.name is None else row[chosen.name] for row in cells])
-    lines = np.array([row.number for row in rows])
-    sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
-    return [
-        ColourRows(
-            space,
-            values[of_film],
-            None if sigma is None else sigma[of_film],
-            None if angle is None else angle[of_film],
-            lines[of_film],
-            tuple(notes),
-            film,
-            file.path,
-            file.sha256,
-            sight,
-        )
-        for film in dict.fromkeys(films.tolist())
-        for of_film in [films == film]
-    ]
-
-
-def _numbers(table: Table, chosen: _Columns) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """Values and their σ (rows, 3), and angles (rows,), as far as the table has them."""
-    numbers = table.numbers(
-        [*chosen.channels, *chosen.sigma, *([] if chosen.angle is None else [chosen.angle])]
-    )
-    values, rest = np.stack(numbers[:3], axis=1), numbers[3:]
+    table = cells.table(chosen.channels)
+    numbers = table.numbers([*chosen.channels, *chosen.sigma, *chosen.angle])
+    values, errors = np.stack(numbers[:3], axis=1), numbers[3 : 3 + len(chosen.sigma)]
     if chosen.kind == "xyY":
         values = _from_chromaticity(table, chosen.channels, values)
-    sigma = np.stack((rest[: len(chosen.sigma)] * 3)[:3], axis=1) if chosen.sigma else None
-    return values, sigma, rest[-1] if chosen.angle is not None else None
+    sigma = np.stack((errors * 3)[:3], axis=1) if errors else None
+    where = [table.places(position) for position in chosen.channels]
+    values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
+    shown = ", ".join(cells.names[i].strip() for i in chosen.channels)
+    notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
+    notes += [f"ignored: {', '.join(chosen.ignored)}"] if chosen.ignored else []
+    films = np.array(["" if chosen.name is None else row[chosen.name] for row in cells.cells])
+    lines = np.array([row.number for row in cells.rows])
+    sight = next((c.text.strip() for c in file.comments if _SIGHT.fullmatch(c.text.strip())), "")
+    made = []
+    for film in dict.fromkeys(films.tolist()):
+        of_film = films == film
+        spread = None if sigma is None else sigma[of_film]
+        angle = numbers[-1][of_film] if chosen.angle else None
+        rows = ColourRows(space, values[of_film], spread, angle, lines[of_film], tuple(notes), film)
+        made.append(rows._replace(path=file.path, sha256=file.sha256, sight=sight))
+    return made
 
 
 def is_colour_table(path: str | os.PathLike[str]) -> bool:
-    """Return True for a text file whose header names a colour. Raises DataError for an unreadable file."""
+    """Return True for a text file whose header names three channels of a colour, and no wavelength or angle.
+
+    Raises DataError for an unreadable file.
+    """
     with open_binary(path) as file:
         head = file.read(_HEAD)
-    return is_colour_header(first_cells(text_file(head, "", path))[0])
+    names, _ = _first_cells(text_file(head, "", path))
+    plain = {name.strip().lower().split("_")[0].split(" ")[0] for name in names}
+    foreign = plain & {"wavelength", "wl", "lambda", "energy", "wavenumber", "frequency", "theta", "phi"}
+    return not foreign and bool(_channel_sets(names))
 
 
-def _recognised(names: Sequence[str], path: str) -> _Columns:
+def _recognised(cells: ColourCells) -> _Columns:
     """The columns by their names. Raises UsageError where they name no colour, or several."""
-    sets = channel_sets(names)
+    names, path = cells.names, cells.file.path
     listed = ", ".join(repr(name) for name in names)
-    if not sets:
+    if not cells.sets:
         raise UsageError(
             f"{path}: no three columns are a colour among {listed}: name them R, G, B or X, Y, Z or x, y, Y"
-            f" or L*, a*, b*, as in {EXAMPLE}"
+            f" or L*, a*, b*, as in {_EXAMPLE}"
         )
-    if len(sets) > 1:
+    if len(cells.sets) > 1:
         raise UsageError(
             f"{path}: has more than one colour ({listed}): choose with `columns`, _ for the others"
         )
-    [(kind, channels)] = sets.items()
-    bare = [bare_name(name)[0] for name in names]
+    [(kind, channels)] = cells.sets.items()
+    bare, units = zip(*map(bare_name, names), strict=True)
     twice = next((x for i, x in enumerate(bare) if x not in ("", "_") and x in bare[:i]), None)
     if twice is not None:
         raise DataError(f"{path}: the header names {twice!r} twice; rename one")
     plain = [re.sub(r"[\s_]+", " ", name).lower() for name in bare]
     one = [plain.index("sigma")] if "sigma" in plain else []
-    each = [f"sigma {bare[i].lower()}" for i in channels]
-    each = [plain.index(name) for name in each if name in plain]
+    each = [plain.index(name) for i in channels if (name := f"sigma {bare[i].lower()}") in plain]
     if each and (len(each) != 3 or one):
         raise DataError(f"{path}: needs sigma, or one of each channel ({listed}); add the missing columns")
     if kind == "xyY" and (one or each):
         raise UsageError(f"{path}: has standard deviations of x, y, Y: convert them to X, Y, Z")
-    angle, name = (next((plain.index(x) for x in known if x in plain), None) for known in (_ANGLES, _NAMES))
-    used = {*channels, *one, *each, angle, name}
+    angle, name = ([plain.index(x) for x in known if x in plain][:1] for known in (_ANGLES, _NAMES))
+    used = {*channels, *one, *each, *angle, *name}
     ignored = [name for i, name in enumerate(names) if i not in used and name.strip() not in ("", "_")]
-    units = {bare_name(names[i])[1] for i in channels}
-    if len(units) > 1:
+    if len({units[i] for i in channels}) > 1:
         raise DataError(f"{path}: the channels are in different units ({listed}); write them in one")
-    return _Columns(kind, channels, each or one, angle, name, units.pop(), ignored)
+    return _Columns(kind, channels, each or one, angle, next(iter(name), None), units[channels[0]], ignored)
 
 
 def _space(file: TextFile, kind: str, requested: str | None) -> str:
@@ -207,64 +213,40 @@ def _from_chromaticity(table: Table, positions: list[int], values: np.ndarray) -
     return np.stack([x / y * luminance, luminance, (1 - x - y) / y * luminance], axis=1)
 
 
-def is_colour_header(names: Sequence[str]) -> bool:
-    """Return True for a header that names three channels of a colour, and no wavelength or direction."""
-    plain = {name.strip().lower().split("_")[0].split(" ")[0] for name in names}
-    foreign = plain & {"wavelength", "wl", "lambda", "energy", "wavenumber", "frequency", "theta", "phi"}
-    return not foreign and bool(channel_sets(names))
-
-
-def first_cells(file: TextFile) -> tuple[list[str], str]:
-    """Return the cells of the first line and its delimiter, with which they name a colour if any does."""
+def _first_cells(file: TextFile) -> tuple[list[str], str]:
+    """Cells of the first line and its delimiter, with which they name a colour if any does."""
     first = file.lines[0].text
-    delimiter = max("\t;, ", key=lambda mark: (bool(channel_sets(split(first, mark))), first.count(mark)))
+    delimiter = max("\t;, ", key=lambda mark: (bool(_channel_sets(split(first, mark))), first.count(mark)))
     return split(first, delimiter), delimiter
 
 
-def named_cells(
-    file: TextFile, columns: str | Sequence[str] | None = None
-) -> tuple[list[str], list[Line], list[list[str]], str]:
-    """Return the column names, the rows with their cells, and the delimiter of a file of colours.
+def colour_cells(path: str | os.PathLike[str], columns: str | Sequence[str] | None = None) -> ColourCells:
+    """Read the cells of a file of colours; rows are filled up with empty ones.
 
-    `columns` names the columns in order, in place of the header. Rows are filled up with empty cells.
+    `columns` names the columns in order, in place of the header.
 
     **Raises:** UsageError without a header, DataError without rows and for a row of too many cells.
     """
-    names, delimiter = first_cells(file)
+    file = text_file(*read_bytes(path), path)
+    names, delimiter = _first_cells(file)
     headed = not any(is_number(cell, ",") for cell in names)
     if columns is not None:
         given = columns.split(",") if isinstance(columns, str) else columns
         names = [name.strip() for name in given]
     elif not headed:
-        raise UsageError(f"{file.path}: has no header, so name its columns, as in {EXAMPLE}")
+        raise UsageError(f"{path}: has no header, so name its columns, as in {_EXAMPLE}")
     rows = list(file.lines[headed:])
     if not rows:
-        raise DataError(
-            f"{file.path}: has no row of colours below its header; expected rows as 0.41,0.35,0.22"
-        )
+        raise DataError(f"{path}: has no row of colours below its header; expected rows as 0.41,0.35,0.22")
     cells = [split(line.bare, delimiter) for line in rows]
     for line, row in zip(rows, cells, strict=True):
         if len(row) > len(names):
             raise DataError(
-                f"{file.path}: line {line.number} has {len(row)} values where {len(names)} columns are named;"
+                f"{path}: line {line.number} has {len(row)} values where {len(names)} columns are named;"
                 " correct that line"
             )
-    return names, rows, [[*row, *[""] * (len(names) - len(row))] for row in cells], delimiter
-
-
-def colour_table(
-    file: TextFile,
-    names: Sequence[str],
-    rows: Sequence[Line],
-    cells: Sequence[Sequence[str]],
-    delimiter: str,
-    positions: Sequence[int],
-) -> Table:
-    """Return the table of cells that `named_cells` has found, whose numbers are at these positions."""
-    comma = delimiter != "," and any("," in row[i] for row in cells for i in positions)
-    decimal = "," if comma else "."
-    table = plain_columns(names, list(zip(rows, cells, strict=True)), [], decimal=decimal)
-    return replace(table, path=file.path, sha256=file.sha256)
+        row += [""] * (len(names) - len(row))
+    return ColourCells(file, names, rows, cells, delimiter, _channel_sets(names))
 
 
 def bare_name(name: str) -> tuple[str, str | None]:
@@ -277,11 +259,11 @@ def bare_name(name: str) -> tuple[str, str | None]:
     return re.sub(r"[\s_]*[(\[]?(deg|degrees|°)[)\]]?$", "", plain), None
 
 
-def channel_sets(names: Sequence[str]) -> dict[str, list[int]]:
-    """Return the positions of the channels of every set that the names have: rgb, xyz, xyY and lab."""
+def _channel_sets(names: Sequence[str]) -> dict[str, list[int]]:
+    """The positions of the channels of every set that the names have: rgb, xyz, xyY and lab."""
     sets = {}
+    bare = [bare_name(name)[0] for name in names]
     for kind, channels in _SETS.items():
-        bare = [bare_name(name)[0] for name in names]
         spelt = [name.lower() for name in bare] if kind == "rgb" else bare
         positions = [next((i for i, name in enumerate(spelt) if name in known), -1) for known in channels]
         if min(positions) >= 0:
@@ -304,21 +286,19 @@ def scaled(
 
     **Raises:** UsageError where the unit is unclear or unknown, DataError for values beyond every unit.
     """
-    if unit is not None and colour_unit(unit) not in UNITS:
-        raise UsageError(f"`signal_unit` of colours must be one of {', '.join(UNITS)}, not {unit!r}")
-    unit = None if unit is None else colour_unit(unit)
+    if unit is not None and colour_unit(unit) not in _FULL:
+        raise UsageError(f"`signal_unit` of colours must be one of {', '.join(_FULL)}, not {unit!r}")
     if space == "lab":
         lightness = values[:, 0]
-        refuse_first(
-            lightness, (lightness < -1) | (lightness > 150), where[0], "is no L*, of 0 to 100; correct it"
-        )
+        wrong = (lightness < -1) | (lightness > 150)
+        refuse_first(lightness, wrong, where[0], "is no L*, of 0 to 100; correct it")
         if lightness.max() <= 1:
             raise DataError(
                 f"{path}: L* is at most {lightness.max():g}, and runs from 0 to 100; multiply it by 100"
             )
         return values, sigma, ""
-    chosen = unit or (_unit_of_xyz(values, path) if space == "xyz" else _unit_of_rgb(values, path))
-    full = UNITS[chosen]
+    chosen = (unit and colour_unit(unit)) or _unit_of(values, space, path)
+    full = _FULL[chosen]
     if np.max(values) > _HIGHEST * full or (unit and chosen.endswith("bit") and np.max(values) > full):
         wrong = np.max(values, axis=1) == np.max(values)
         channel = int(np.argmax(np.max(values, axis=0)))
@@ -329,24 +309,24 @@ def scaled(
     return values / full, None if sigma is None else sigma / full, note
 
 
-def _unit_of_rgb(values: np.ndarray, path: str) -> str:
+def _unit_of(values: np.ndarray, space: str, path: str) -> str:
+    """The unit that the values show. Raises UsageError where they show none, DataError beyond all."""
+    if space == "xyz":
+        highest = np.max(values[:, 1])
+        if highest <= _HIGHEST * _FULL["percent"]:
+            return "fraction" if highest <= _HIGHEST else "percent"
+        raise DataError(
+            f"{path}: Y goes up to {highest:g}, beyond the 100 of a perfect reflector in percent; divide X,"
+            " Y, Z by the Y of that white"
+        )
     highest, whole = np.max(values), bool(np.all(values == np.round(values)))
     if highest <= (1 if whole else _HIGHEST):
         return "fraction"
-    if whole and highest <= UNITS["16-bit"]:
-        return "8-bit" if highest <= UNITS["8-bit"] else "16-bit"
-    if UNITS["percent"] < highest <= UNITS["8-bit"]:
+    if highest <= _FULL["8-bit"] and (whole or highest > _FULL["percent"]):
         return "8-bit"
-    raise UsageError(f"{path}: R, G, B go up to {highest:g}, in an unclear unit: state it, {_ASK}")
-
-
-def _unit_of_xyz(values: np.ndarray, path: str) -> str:
-    highest = np.max(values[:, 1])
-    if highest <= _HIGHEST:
-        return "fraction"
-    if highest <= _HIGHEST * UNITS["percent"]:
-        return "percent"
-    raise DataError(
-        f"{path}: Y goes up to {highest:g}, beyond the 100 of a perfect reflector in percent; divide X, Y, Z"
-        " by the Y of that white"
+    if whole and highest <= _FULL["16-bit"]:
+        return "16-bit"
+    raise UsageError(
+        f'{path}: R, G, B go up to {highest:g}, in an unclear unit: state it, `signal_unit="8-bit"`,'
+        ' `signal_unit="percent"` or `signal_unit="fraction"`'
     )

@@ -13,10 +13,9 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.data.cameras import Camera, Sight, sight
+from pellicle.data.cameras import Camera, Sight, band_sensor, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.data.read_brdf import read_brdf_samples
-from pellicle.data.sensors import band_sensor
 from pellicle.errors import DataError, UsageError, did_you_mean
 from pellicle.recipes import parts
 from pellicle.recipes.media import medium, number

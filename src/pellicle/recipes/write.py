@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour.observers import ILLUMINANTS, OBSERVERS
+from pellicle.data.cameras import SRGB, band_sensor
 from pellicle.data.options import CameraOptions, FileOptions
-from pellicle.data.sensors import SRGB, band_sensor
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.recipes import parts
