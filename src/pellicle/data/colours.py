@@ -16,7 +16,6 @@ from pellicle.signals.limits import Where, refuse_first
 SPACES = ("rgb", "srgb", "xyz", "lab")
 USUAL_NOISE = {"srgb": 1.5 / 255, "rgb": 0.01, "xyz": 0.005, "lab": 0.5}
 """Standard deviation of each channel where none is given: that of a good camera, or of a colorimeter."""
-_ARRAYS = ("angle", "lines")
 _REMEDY = "correct or delete that row"
 
 
@@ -77,24 +76,19 @@ class Colours:
     name: str = ""
 
     def __post_init__(self) -> None:
-        values = np.array(self.values, dtype=np.float64)
+        values = np.asarray(self.values)
         if values.ndim != 2 or values.shape[1] != 3 or not len(values):
             raise ValueError(f"`values`: expected the shape (colours, 3), got {values.shape}")
-        tables: dict[str, np.ndarray] = {"values": values}
-        if self.sigma is not None:
-            tables["sigma"] = np.array(self.sigma, dtype=np.float64)
-            if tables["sigma"].shape != values.shape:
-                raise ValueError(f"`sigma`: expected the shape {values.shape}, got {tables['sigma'].shape}")
-        for name in _ARRAYS:
-            value = getattr(self, name)
-            if value is None:
+        for name in ("values", "sigma", "angle", "lines"):
+            if (given := getattr(self, name)) is None:
                 continue
-            if np.shape(value) != (len(values),):
+            array = np.array(given, dtype=np.int64 if name == "lines" else np.float64)
+            if name == "sigma" and array.shape != values.shape:
+                raise ValueError(f"`sigma`: expected the shape {values.shape}, got {array.shape}")
+            if name in ("angle", "lines") and array.shape != (len(values),):
                 raise ValueError(
-                    f"`{name}`: expected one number per colour ({len(values)}), got {np.shape(value)}"
+                    f"`{name}`: expected one number per colour ({len(values)}), got {array.shape}"
                 )
-            tables[name] = np.array(value, dtype=np.int64 if name == "lines" else np.float64)
-        for name, array in tables.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         nm, weights = (np.array(x, dtype=np.float64) for x in self.sensor)
@@ -123,18 +117,15 @@ class Colours:
         sigma = np.ones((1, 3)) if self.sigma is None else self.sigma
         angle = np.zeros(1) if self.angle is None else self.angle
         for channel, values, errors in zip(self.channels, self.values.T, sigma.T, strict=True):
-            where = self.place(channel)
+            where, spread = self.place(channel), self.place(f"the standard deviation of {channel}")
             refuse_first(values, ~np.isfinite(values), where, f"is not finite; {_REMEDY}")
             if self.space == "srgb":
                 outside = (values < 0) | (values > 1)
                 refuse_first(values, outside, where, "is not from 0 to 1; divide 8-bit values by 255")
-            spread = self.place(f"the standard deviation of {channel}")
-            refuse_first(
-                errors, ~(np.isfinite(errors) & (errors > 0)), spread, f"is not above zero; {_REMEDY}"
-            )
-        refuse_first(
-            angle, ~((angle >= 0) & (angle <= 90)), self.place("angle"), "is not from 0 to 90 degrees"
-        )
+            wrong = ~(np.isfinite(errors) & (errors > 0))
+            refuse_first(errors, wrong, spread, f"is not above zero; {_REMEDY}")
+        beyond = ~((angle >= 0) & (angle <= 90))
+        refuse_first(angle, beyond, self.place("angle"), "is not from 0 to 90 degrees")
 
     @property
     def channels(self) -> tuple[str, str, str]:

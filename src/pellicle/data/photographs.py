@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from logging import CRITICAL, getLogger
@@ -70,6 +69,9 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
     if kind is None:
         raise DataError(f"{path}: is no PNG, TIFF or JPEG photograph; save it as one of these")
     content, sha256 = read_bytes(path)
+    log = getLogger("tifffile")  # without its messages on damaged files, which one error reports
+    level = log.level
+    log.setLevel(CRITICAL + 1)
     try:
         values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
     except ImportError as error:
@@ -79,8 +81,18 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
     except Exception as error:  # decoders raise errors of every kind on damaged files
         reason = re.sub(r" <_io\.BytesIO.*?>", "", str(error).split("\n")[0].rstrip("."))
         raise DataError(f"{path}: the {kind} cannot be decoded ({reason}); save it again") from None
-    coded, notes = _colours(values, full, notes, str(path))
-    name = _profile_name(profile)
+    finally:
+        log.setLevel(level)
+    if values.ndim != 3 or values.shape[2] not in (3, 4):
+        raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
+    if values.shape[2] == 4 and np.any(values[..., 3] < full):
+        clear = max(round(float(100 * np.mean(values[..., 3] < full))), 1)
+        raise DataError(
+            f"{path}: {clear} % of its pixels are transparent, whose colours are unknown; save it without"
+            " alpha"
+        )
+    coded = values[..., :3].astype(np.float32) / np.float32(full)
+    name = _profile_name(profile) if profile else "sRGB"
     foreign = "" if "srgb" in name.lower() or "61966-2" in name else name
     if kind == "JPEG":
         notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
@@ -101,24 +113,16 @@ def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[st
         notes.append("palette converted to R, G, B")
         image = image.convert("RGBA" if "transparency" in image.info else "RGB")
     if image.mode not in _COLOUR_MODES:
-        known = {
-            "L": "grey",
-            "LA": "grey",
-            "1": "black and white",
-            "I;16": "grey",
-            "I": "grey",
-            "CMYK": "in CMYK",
-        }
-        raise DataError(
-            f"is {known.get(image.mode, f'in the mode {image.mode}')}: a photograph in R, G, B is needed"
-        )
+        known = {"1": "black and white", "CMYK": "in CMYK"} | dict.fromkeys(("L", "LA", "I", "I;16"), "grey")
+        shown = known.get(image.mode, f"in the mode {image.mode}")
+        raise DataError(f"is {shown}: a photograph in R, G, B is needed")
     return np.asarray(image), 255.0, profile, notes
 
 
 def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     import tifffile
 
-    with _silent("tifffile"), tifffile.TiffFile(BytesIO(content)) as file:
+    with tifffile.TiffFile(BytesIO(content)) as file:
         page: Any = file.pages[0]
         notes = [f"page 1 of {len(file.pages)}"] if len(file.pages) > 1 else []
         name = page.photometric.name if page.photometric is not None else "unknown"
@@ -129,10 +133,8 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
             raise DataError(f"has {page.size:,} values, more than {LARGEST:,}; cut it to the film")
         values = page.asarray()
         if name == "PALETTE":
-            values, notes = (
-                np.moveaxis(page.colormap[:, values], 0, -1),
-                [*notes, "palette converted to R, G, B"],
-            )
+            values = np.moveaxis(page.colormap[:, values], 0, -1)
+            notes.append("palette converted to R, G, B")
         elif page.planarconfig.name == "SEPARATE":
             values = np.moveaxis(values, 0, -1)
         tag = page.tags.get(34675)  # ICC profile
@@ -146,35 +148,8 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     return values, float(np.iinfo(values.dtype).max), profile, notes
 
 
-@contextmanager
-def _silent(name: str) -> Iterator[None]:
-    """A logger without its messages on damaged files, which one error reports."""
-    log = getLogger(name)
-    level = log.level
-    log.setLevel(CRITICAL + 1)
-    try:
-        yield
-    finally:
-        log.setLevel(level)
-
-
-def _colours(values: np.ndarray, full: float, notes: list[str], path: str) -> tuple[np.ndarray, list[str]]:
-    """Coded R, G, B from 0 to 1 without the opaque alpha channel. Raises DataError."""
-    if values.ndim != 3 or values.shape[2] not in (3, 4):
-        raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
-    if values.shape[2] == 4 and np.any(values[..., 3] < full):
-        clear = max(round(float(100 * np.mean(values[..., 3] < full))), 1)
-        raise DataError(
-            f"{path}: {clear} % of its pixels are transparent, whose colours are unknown; save it without"
-            " alpha"
-        )
-    return values[..., :3].astype(np.float32) / np.float32(full), notes
-
-
-def _profile_name(profile: bytes | None) -> str:
-    """Name of an ICC profile; "sRGB" where there is none."""
-    if not profile:
-        return "sRGB"
+def _profile_name(profile: bytes) -> str:
+    """Name of an ICC profile."""
     from PIL import ImageCms
 
     try:
@@ -239,8 +214,7 @@ def parse_points(
                 f"{photograph.path}: the point {x},{y} is not in the photograph of {width} by {height} pixels"
             )
         left, top = max(x - POINT, 0), max(y - POINT, 0)
-        right, bottom = min(x + POINT + 1, width), min(y + POINT + 1, height)
-        squares.append(Region(left, top, right - left, bottom - top))
+        squares.append(Region(left, top, min(x + POINT + 1, width) - left, min(y + POINT + 1, height) - top))
     return squares
 
 
@@ -272,10 +246,7 @@ def strip(photograph: Photograph, value: str | Sequence[int]) -> Strip:
     across = np.arange(STRIP) - STRIP // 2
     x = x0 + along[:, None] * (x1 - x0) - across * (y1 - y0) / length
     y = y0 + along[:, None] * (y1 - y0) + across * (x1 - x0) / length
-    column, row = (
-        np.clip(np.rint(coordinate), 0, size - 1).astype(int)
-        for coordinate, size in ((x, width), (y, height))
-    )
+    column, row = (np.clip(np.rint(a), 0, size - 1).astype(int) for a, size in ((x, width), (y, height)))
     return Strip(along * length, photograph.pixels[row, column])
 
 

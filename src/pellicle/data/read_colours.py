@@ -1,16 +1,32 @@
-"""Colours of films from files and photographs, with the sensor that saw them."""
+"""Colours of films from CSV files and photographs, with the sensor that saw them.
+
+Regions of a photograph are averaged in linear light and divided by a white.
+"""
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from pellicle.colour.encoding import Encoding
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colour_rows import ColourRows, read_colour_rows
 from pellicle.data.colours import Colours
-from pellicle.data.photograph_colours import Pixels, photograph_colours
-from pellicle.data.photographs import image_format, read_photograph
-from pellicle.errors import UsageError
+from pellicle.data.photographs import (
+    Photograph,
+    Region,
+    image_format,
+    parse_points,
+    parse_regions,
+    read_photograph,
+)
+from pellicle.errors import DataError, UsageError
+
+Pixels = str | Sequence[int] | Sequence[Sequence[int]]
+"""Regions or points of a photograph: "x,y,w,h;x,y,w,h", or numbers."""
+_LIMITED = 0.5
+"""Share of clipped pixels above which a channel is a limit: the median is clipped."""
 
 
 def read_colours(path: str | os.PathLike[str], *, name: str | None = None, **options) -> Colours:
@@ -93,7 +109,7 @@ def read_colours_by_film(
     if image_format(path) is not None:
         if columns is not None or signal_unit is not None:
             raise UsageError(f"{path}: is a photograph: leave `columns` and `signal_unit` out")
-        films, seen = photograph_colours(read_photograph(path), space, camera, region, points, white, angle)
+        films, seen = _photograph_colours(read_photograph(path), space, camera, region, points, white, angle)
         angle = None
     else:
         if not region is points is white is None:
@@ -111,42 +127,161 @@ def _assembled(
     noise: float | Sequence[float] | None,
     polarisation: str,
 ) -> Colours:
-    sigma, stated = film.sigma, film.angle
-    if film.sight and camera.sensitivities is camera.chart is camera.lamp is None:
-        taken = f"observer {camera.observer} under {camera.illuminant}"
-        if taken != film.sight:
-            _, observer, _, illuminant = film.sight.split()
-            raise UsageError(
-                f"{film.path}: states the {film.sight}, and would be read for the {taken}: give"
-                f' `observer="{observer}"` and `illuminant="{illuminant}"`'
-            )
+    """The colours of one film, with the arguments of their reader. Raises UsageError."""
+    read: dict[str, Any] = film._asdict() | {"notes": (*film.notes, *seen.notes)}
+    stated = read.pop("sight")
+    taken = f"observer {camera.observer} under {camera.illuminant}"
+    if stated not in ("", taken) and camera.sensitivities is camera.chart is camera.lamp is None:
+        _, observer, _, illuminant = stated.split()
+        raise UsageError(
+            f"{film.path}: states the {stated}, and would be read for the {taken}: give"
+            f' `observer="{observer}"` and `illuminant="{illuminant}"`'
+        )
     if noise is not None:
         if not (np.all(np.isfinite(noise)) and np.all(np.asarray(noise) > 0) and np.size(noise) in (1, 3)):
             raise UsageError(f"`noise` must be one standard deviation above zero, or three, got {noise}")
         if film.space != "lab" and np.any(np.asarray(noise) > 0.5):
             raise UsageError(f"`noise` {noise} is a fraction of white: divide 8-bit values by 255")
-        sigma = np.broadcast_to(noise, film.values.shape)
+        read["sigma"] = np.broadcast_to(noise, film.values.shape)
     if angle is not None:
         count = len(film.values)
         if np.ndim(angle) and np.shape(angle) != (count,):
             raise UsageError(f"{film.path}: has {count} colours and `angle` {np.size(angle)} numbers")
-        if stated is not None and not np.allclose(stated, angle, atol=1e-3):
+        if film.angle is not None and not np.allclose(film.angle, angle, atol=1e-3):
             raise UsageError(f"{film.path}: states its own angles; leave `angle` out")
-        stated = np.broadcast_to(np.asarray(angle, float), count)
+        read["angle"] = np.broadcast_to(np.asarray(angle, float), count)
     return Colours(
-        film.values,
-        seen.sensor,
-        film.space,
-        "T" if camera.transmitted else "R",
-        sigma=sigma,
-        angle=stated,
+        **read,
+        sensor=seen.sensor,
+        signal="T" if camera.transmitted else "R",
         polarisation=polarisation,
         gamma=camera.gamma,
         white_balance=camera.white_balance,
         camera=seen.matrix,
-        path=film.path,
-        sha256=film.sha256,
-        lines=film.lines,
-        notes=(*film.notes, *seen.notes),
-        name=film.name,
     )
+
+
+def _photograph_colours(
+    photograph: Photograph,
+    space: str | None,
+    camera: Camera,
+    region: Pixels | None,
+    points: Pixels | None,
+    white: Pixels | None,
+    angle: float | Sequence[float] | None,
+) -> tuple[list[ColourRows], Sight]:
+    """Return the colours of the regions of a photograph, of a film each, or of one film at several angles."""
+    assumed = space is None
+    space = check_photograph(photograph, space)
+    seen = sight(camera, space)
+    if region is not None and points is not None:
+        raise UsageError(f"{photograph.path}: `region` and `points` exclude each other: leave one out")
+    if region is points is None:
+        width, height = photograph.size
+        either = '`region="x,y,width,height"` or `points="x,y"`'
+        raise UsageError(f"{photograph.path}: is a photograph of {width} by {height} pixels: give {either}")
+    regions = parse_points(points, photograph) if points is not None else parse_regions(region or "")
+    reference, notes = white_reference(photograph, seen.coding, white)
+    angles = None if angle is None else np.asarray(angle, float)
+    if angles is not None and angles.ndim and len(angles) != len(regions):
+        raise UsageError(
+            f"{len(angles)} angles are given for {len(regions)} regions of the photograph: give one for each"
+        )
+    told = [*photograph.notes, *notes]
+    if assumed and photograph.floats:
+        told.append('floating-point values taken as coded in sRGB: give `space="rgb"` if they are linear')
+    told += [f"colour profile {photograph.profile} ignored"] if photograph.profile else []
+    films = []
+    for number, region in enumerate(regions):
+        value, sigma, sentences = _region_colour(region, photograph, seen.coding, reference)
+        of_region = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
+        rows = ColourRows(space, value, sigma, of_region, None, (*told, *sentences), str(region))
+        films.append(rows._replace(path=photograph.path, sha256=photograph.sha256))
+    if angles is None or not angles.ndim:
+        return films, seen
+    # the regions are colours of one film, without σ where one of them is a single pixel
+    sigma = [film.sigma for film in films if film.sigma is not None]
+    joined = films[0]._replace(
+        values=np.concatenate([film.values for film in films]),
+        sigma=np.concatenate(sigma) if len(sigma) == len(films) else None,
+        angle=angles,
+        notes=tuple(dict.fromkeys(note for film in films for note in film.notes)),
+        name=";".join(film.name for film in films),
+    )
+    return [joined], seen
+
+
+def check_photograph(photograph: Photograph, space: str | None) -> str:
+    """Return the space of a photograph, "srgb" by default. Raises UsageError or DataError for another one."""
+    if space not in (None, "srgb", "rgb"):
+        raise UsageError(
+            f'{photograph.path}: a photograph has `signal="srgb"` or `signal="rgb"`, not {space}'
+        )
+    if photograph.profile and space != "rgb":
+        raise DataError(
+            f"{photograph.path}: has the colour profile {photograph.profile!r}, not sRGB: convert the"
+            " photograph to sRGB"
+        )
+    return space or "srgb"
+
+
+def white_reference(
+    photograph: Photograph, coding: Encoding, white: Pixels | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Linear channels (3,) of the region `white`, 1 without one. Raises UsageError where it is clipped."""
+    if white is None:
+        return np.ones(3), ()
+    one, *others = parse_regions(white, "white")
+    if others:
+        raise UsageError("`white` must be one region")
+    pixels = one.pixels(photograph, "white")
+    for limited, what, remedy in (
+        (pixels <= 0, "black", "choose the region of a white standard"),
+        (pixels >= 1, "clipped", "expose less, or choose another region"),
+    ):
+        share = np.mean(limited, axis=0)
+        if np.any(share > 0.01):
+            raise UsageError(
+                f"{photograph.path}: `white` {one} is {what} in {100 * share.max():.0f} % of its pixels in"
+                f" {'RGB'[int(np.argmax(share))]}: {remedy}"
+            )
+    linear = coding.decoded(pixels).mean(axis=0)
+    shown = ", ".join(f"{x:.3g}" for x in linear)
+    return linear, (f"divided by the white of region {one}, linear {shown}",)
+
+
+def _region_colour(
+    region: Region, photograph: Photograph, coding: Encoding, white: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
+    """Mean colour of a region in linear light, coded again: (1, 3), its σ (1, 3), and sentences on it.
+
+    σ is the scatter of the pixels, not that of their mean, and the rounding: neighbouring pixels of a photo
+    share their errors. A single pixel has no σ.
+    """
+    pixels = region.pixels(photograph)
+    mean = coding.decoded(pixels).mean(axis=0, dtype=float)
+    notes = [f"region {region}: mean of {len(pixels)} pixels in linear light"]
+    exposed = mean / white
+    value = coding.encode(exposed, coding.roots(exposed))
+    sigma = None
+    if len(pixels) > 1:
+        scatter = np.hypot(pixels.std(axis=0, dtype=float, ddof=1), photograph.step / np.sqrt(12))
+        slope = [np.diagonal(coding.rise(at), axis1=-2, axis2=-1) for at in (mean, exposed)]
+        sigma = scatter / slope[0] / white * slope[1]
+    if np.any(exposed > 1 + 1e-6):
+        notes.append(
+            f"region {region}: brighter than white in {_named(exposed > 1 + 1e-6)}, taken as a limit"
+        )
+    for limit, what in ((0.0, "dark"), (1.0, "bright")):
+        share = np.mean(pixels == limit, axis=0)
+        if np.any(share > 0):
+            percent = 100 * share.max()
+            at_limit = share > _LIMITED
+            value = np.where(at_limit, limit, value)
+            told = f", taken as a limit in {_named(at_limit)}" if at_limit.any() else ""
+            notes.append(f"region {region}: up to {percent:.2g} % of the pixels are clipped ({what}){told}")
+    return value[None], None if sigma is None else sigma[None], tuple(notes)
+
+
+def _named(channels: np.ndarray) -> str:
+    return ", ".join("RGB"[i] for i in np.flatnonzero(channels))

@@ -10,9 +10,9 @@ from pellicle.colour.inverse import ColourThickness
 from pellicle.colour.observers import Sensor
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
-from pellicle.data.photograph_colours import check_photograph, white_reference
 from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph
 from pellicle.data.photographs import strip as strip_of
+from pellicle.data.read_colours import check_photograph, white_reference
 from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
