@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.pixel_array import Gain, lazy
+from pellicle.data.cubes.raw_cube import Gain, lazy
 from pellicle.data.fingerprint import fingerprint
 
 

@@ -2,27 +2,37 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from logging import getLogger
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from pellicle.data.cube import Cube
 from pellicle.data.cubes import detect, xarray_cubes
-from pellicle.data.cubes.bands import chosen_bands, in_nm, parse_wavelengths
-from pellicle.data.cubes.camera_frames import CameraFrames, camera_frames
-from pellicle.data.cubes.numpy_files import arrays_to_raw
-from pellicle.data.cubes.pixel_array import PixelArray, Scale, Share, Step, value_scale
-from pellicle.data.cubes.raw_cube import ANGLE, Asked, RawCube, Stored
-from pellicle.data.cubes.sampled_checks import (
+from pellicle.data.cubes.camera_frames import camera_frames
+from pellicle.data.cubes.checks import (
     check_angles,
     check_level,
     check_type,
+    chosen_bands,
+    in_nm,
     live_bands,
+    parse_wavelengths,
     sample,
     sample_blocks,
+)
+from pellicle.data.cubes.numpy_files import arrays_to_raw
+from pellicle.data.cubes.raw_cube import (
+    ANGLE,
+    Asked,
+    PixelArray,
+    RawCube,
+    Scale,
+    Share,
+    Step,
+    value_scale,
 )
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
 from pellicle.data.photographs import image_format
@@ -88,55 +98,56 @@ def read_cube(
     """
     if isinstance(source, Cube):
         return source
-    frames = _Frames(white_frame, dark_frame, white_reflectance, saturation)
-    _check(signal, polarisation, frames)
+    if signal is not None and signal not in SIGNALS:
+        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
+    if polarisation is not None and polarisation not in POLARISATIONS:
+        raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
+    if white_frame is None and any(x is not None for x in (dark_frame, white_reflectance, saturation)):
+        raise UsageError(
+            "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
+        )
     given, unit = (None, "") if wavelengths is None else parse_wavelengths(wavelengths)
     raw = _raw(source, Asked(given, wavelength_unit or unit or None, variable, signal))
     nm, notes = in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
     bands, told = chosen_bands(nm, range, without_bands, raw.good, raw.path)
-    values = _values(raw, nm, signal, signal_unit, frames, calibrated)
+    notes = [*raw.notes, *notes, *told]
+    kind = signal or raw.signal or "R"
+    if signal is raw.signal is None:
+        notes.append('signal: R, assumed; give `signal="T"` for transmittance')
+    if (kind == "psi-delta") != ("delta" in raw.arrays):
+        raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
+    frames = None
+    if white_frame is not None:
+        frames, told = camera_frames(raw, nm, white_frame, dark_frame, white_reflectance, saturation)
+        notes += told
+    calibrated = raw.calibrated if calibrated is None else calibrated
+    scale, told = value_scale(raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None)
+    notes += [told] if told else []
     used = None if mask is None else read_mask(mask, raw)
-    bands, dead = _checked(values, bands, used)
+    steps = (scale,) if frames is None else (scale, frames)
+    measured = _lazy(raw, ("values", "delta"), bands, *steps)
+    live, told = _live(raw, measured, kind, used, calibrated)
+    bands = bands[live]
+    measured = {name: replace(array, bands=bands) for name, array in measured.items()}
     cube = Cube(
-        values.arrays(bands, noise),
+        measured | _errors(raw, measured, noise, bands, scale, framed=frames is not None),
         nm[bands],
-        values.signal,
+        kind,
         raw.dims,
         angle=raw.angle if angle is None else _stated_angle(raw, float(angle)),
         polarisation=polarisation or raw.polarisation or "unpolarised",
         coords=raw.coords,
         units=raw.units,
         mask=used,
-        calibrated=values.calibrated,
+        calibrated=calibrated,
         path=raw.path,
-        notes=_once([*raw.notes, *notes, *told, *values.notes, *dead]),
+        notes=_once([*notes, *told]),
     )
-    calibration = values.frames and (values.frames.reflectance, values.frames.saturation)
-    facts = (noise, variable, polarisation, cube.signal, values.scale, calibration, cube.angle, used)
-    cube = _with_fingerprint(cube, raw, frames, (*facts, nm[bands], bands))
+    calibration = frames and (frames.reflectance, frames.saturation)
+    facts = (noise, variable, polarisation, kind, scale, calibration, cube.angle, used, nm[bands], bands)
+    cube = _with_fingerprint(cube, raw, [x for x in (white_frame, dark_frame) if x is not None], facts)
     log.info("%s", cube)
     return cube
-
-
-class _Frames(NamedTuple):
-    """Frames of a camera as they are given."""
-
-    white: Any
-    dark: Any
-    reflectance: Any
-    saturation: float | None
-
-
-def _check(signal: str | None, polarisation: str | None, frames: _Frames) -> None:
-    """Refuse wrong arguments. Raises UsageError."""
-    if signal is not None and signal not in SIGNALS:
-        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
-    if polarisation is not None and polarisation not in POLARISATIONS:
-        raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
-    if frames.white is None and any(given is not None for given in frames[1:]):
-        raise UsageError(
-            "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
-        )
 
 
 def _raw(source: Any, asked: Asked) -> RawCube:
@@ -158,122 +169,79 @@ def _raw(source: Any, asked: Asked) -> RawCube:
     return raw
 
 
-@dataclass(frozen=True, eq=False)
-class _Values:
-    """Measured values as they are converted when a block is read, and notes on their conversion."""
-
-    raw: RawCube
-    signal: str
-    calibrated: bool
-    scale: Scale
-    frames: CameraFrames | None
-    notes: tuple[str, ...]
-
-    def measured(self, bands: np.ndarray) -> dict[str, PixelArray]:
-        """Measured values by name, at some bands."""
-        steps = (self.scale,) if self.frames is None else (self.scale, self.frames)
-        stored = {name: self.raw.arrays[name] for name in ("values", "delta") if name in self.raw.arrays}
-        return {name: self._lazy(array, bands, *steps) for name, array in stored.items()}
-
-    def arrays(self, bands: np.ndarray, noise: float | str | None) -> dict[str, Any]:
-        """Measured values and standard deviations by name: those given, or those of the file.
-
-        Raises UsageError.
-        """
-        measured, names = self.measured(bands), {"values": "sigma", "delta": "delta_sigma"}
-        stored = {name: self.raw.arrays[name] for name in names.values() if name in self.raw.arrays}
-        if isinstance(noise, str) and noise in self.raw.others:
-            stored = {"sigma": self.raw.others[noise]}
-        elif noise is not None:
-            return measured | _stated_errors(noise, measured, bands.size)
-        elif self.frames is not None or self.scale.absorbance:
-            return dict(measured)  # errors of counts or absorbances are not converted
-        step = replace(self.scale, absorbance=False)
-        return measured | {name: self._lazy(one, bands, step) for name, one in stored.items()}
-
-    def _lazy(self, stored: Stored, bands: np.ndarray, *steps: Step) -> PixelArray:
-        return PixelArray(stored, self.raw.pixels, bands, self.raw.arrays["values"].sizes.get(ANGLE), steps)
+def _lazy(raw: RawCube, names: Sequence[str], bands: np.ndarray, *steps: Step) -> dict[str, PixelArray]:
+    """Arrays of the file by name, as far as it has them, at some bands, with conversions."""
+    angles = raw.arrays["values"].sizes.get(ANGLE)
+    stored = {name: raw.arrays[name] for name in names if name in raw.arrays}
+    return {name: PixelArray(one, raw.pixels, bands, angles, steps) for name, one in stored.items()}
 
 
-def _stated_errors(noise: float | str, measured: Mapping[str, PixelArray], bands: int) -> dict[str, Any]:
-    """Standard deviations by name, as `noise` states them. Raises UsageError."""
+def _live(
+    raw: RawCube, measured: Mapping[str, PixelArray], signal: str, used: np.ndarray | None, calibrated: bool
+) -> tuple[np.ndarray, list[str]]:
+    """Check a sample of the values; returns which bands have some, and a note. Raises DataError."""
+    seen = sample(measured, len(raw.dims), used)
+    live, notes = live_bands(seen["values"], int(np.prod(raw.shape)), raw.path)
+    seen = {name: array[:, live] for name, array in seen.items()}
+    if signal == "psi-delta":
+        check_angles(seen["values"], seen["delta"], raw.path)
+    elif calibrated:
+        check_level(seen["values"], signal, raw.path)
+    return live, notes
+
+
+def _errors(
+    raw: RawCube,
+    measured: Mapping[str, PixelArray],
+    noise: float | str | None,
+    bands: np.ndarray,
+    scale: Scale,
+    *,
+    framed: bool,
+) -> dict[str, Any]:
+    """Standard deviations by name: those that `noise` states or names, or those of the file.
+
+    Raises UsageError.
+    """
+    step, names = replace(scale, absorbance=False), {"values": "sigma", "delta": "delta_sigma"}
+    if isinstance(noise, str) and noise in raw.others:
+        return {"sigma": replace(measured["values"], stored=raw.others[noise], steps=(step,))}
+    if noise is None:
+        # errors of counts or absorbances are not converted
+        return {} if framed or scale.absorbance else _lazy(raw, [*names.values()], bands, step)
     level = noise_level(noise)
     if not level.relative:
-        names = {"values": "sigma", "delta": "delta_sigma"}
-        return {names[name]: np.full(bands, level.value) for name in measured}
+        return {names[name]: np.full(bands.size, level.value) for name in measured}
     if "delta" in measured:
         raise UsageError(f"`noise` {level} is a share of the signal: give that of psi and delta in degrees")
     return {"sigma": measured["values"].then(Share(level.value))}
 
 
-def _values(
-    raw: RawCube,
-    nm: np.ndarray,
-    signal: str | None,
-    unit: str | float | None,
-    frames: _Frames,
-    calibrated: bool | None,
-) -> _Values:
-    """The kind of the values and their conversion to fractions or degrees. Raises DataError or UsageError."""
-    notes = []
-    kind = signal or raw.signal
-    if kind is None:
-        kind = "R"
-        notes.append('signal: R, assumed; give `signal="T"` for transmittance')
-    if (kind == "psi-delta") != ("delta" in raw.arrays):
-        raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
-    calibration = None
-    if frames.white is not None:
-        calibration, told = camera_frames(raw, nm, *frames)
-        notes += told
-    calibrated = raw.calibrated if calibrated is None else calibrated
-    scale, told = value_scale(raw, kind, unit, calibrated=calibrated, framed=calibration is not None)
-    return _Values(raw, kind, calibrated, scale, calibration, (*notes, *([told] if told else [])))
-
-
-def _checked(values: _Values, bands: np.ndarray, used: np.ndarray | None) -> tuple[np.ndarray, list[str]]:
-    """Check a sample of the values; returns the bands that have some, and a note. Raises DataError."""
-    raw = values.raw
-    seen = sample(values.measured(bands), len(raw.dims), used)
-    live, notes = live_bands(seen["values"], int(np.prod(raw.shape)), raw.path)
-    seen = {name: array[:, live] for name, array in seen.items()}
-    if values.signal == "psi-delta":
-        check_angles(seen["values"], seen["delta"], raw.path)
-    elif values.calibrated:
-        check_level(seen["values"], values.signal, raw.path)
-    return bands[live], notes
-
-
-def _with_fingerprint(cube: Cube, raw: RawCube, frames: _Frames, facts: tuple[Any, ...]) -> Cube:
+def _with_fingerprint(cube: Cube, raw: RawCube, frames: Sequence[Any], facts: tuple[Any, ...]) -> Cube:
     """The cube with a digest of its content and of how it was read, and a note where that is of a sample.
 
     Of files, and of arrays in memory, of more than 64 MB some samples are read.
     """
-    given = [frame for frame in (frames.white, frames.dark) if frame is not None]
-    beside = [Path(frame) for frame in given if not isinstance(frame, np.ndarray)]
-    arrays = [frame for frame in given if isinstance(frame, np.ndarray)]
+    beside = [Path(frame) for frame in frames if not isinstance(frame, np.ndarray)]
+    parts: list[Any] = [frame for frame in frames if isinstance(frame, np.ndarray)]
+    arrays = [array for _, array in sorted(raw.arrays.items())]
     form = [(n, s.axes, s.data.shape, str(s.data.dtype)) for n, s in sorted(raw.arrays.items())]
     content, total = file_fingerprint((*raw.files, *beside))
-    how, parts = "size, date and samples of its files", []
+    how = "size, date and samples of its files"
     if not raw.files:
         how = "some blocks of pixels"
-        total = sum(int(np.prod(s.data.shape)) * np.dtype(s.data.dtype).itemsize for s in raw.arrays.values())
-        parts = [_sampled(raw, stored, total > WHOLE) for _, stored in sorted(raw.arrays.items())]
-    digest = fingerprint(facts, arrays, form, content, parts)
+        total = sum(int(np.prod(s.data.shape)) * np.dtype(s.data.dtype).itemsize for s in arrays)
+        for stored in arrays:
+            graph = ""  # the name of a dask array is a digest of its graph
+            if getattr(stored.data, "chunks", None) is not None:
+                graph = str(getattr(getattr(stored.data, "data", stored.data), "name", ""))
+            dims = [axis for axis in stored.axes if axis in raw.dims]
+            blocks = sample_blocks(tuple(stored.sizes[axis] for axis in dims), 10**9)
+            places = [dict(zip(dims, w, strict=True)) for w in blocks] if total > WHOLE or graph else [None]
+            parts += [graph, *(stored.read(place) for place in places)]
+    digest = fingerprint(facts, form, content, parts)
     note = f"{total / 1e9:.2g} GB: a change of the content is recognised by {how}"
     return replace(cube, fingerprint=digest, notes=(*cube.notes, *([note] if total > WHOLE else [])))
-
-
-def _sampled(raw: RawCube, stored: Stored, part: bool) -> list[Any]:
-    """The content of an array, or some blocks of it, and the name of a dask array: a digest of its graph."""
-    graph = ""
-    if getattr(stored.data, "chunks", None) is not None:
-        graph = str(getattr(getattr(stored.data, "data", stored.data), "name", ""))
-    if not (part or graph):
-        return [stored.read()]
-    dims = [axis for axis in stored.axes if axis in raw.dims]
-    blocks = sample_blocks(tuple(stored.sizes[axis] for axis in dims), 10**9)
-    return [graph, *(stored.read(dict(zip(dims, where, strict=True))) for where in blocks)]
 
 
 def _once(notes: Sequence[str]) -> tuple[str, ...]:
@@ -330,20 +298,17 @@ def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
     if kind is None:
         raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
     try:
-        values = _pixels(path, kind)
+        if kind == "TIFF":
+            import tifffile
+
+            values = tifffile.imread(path)
+        else:
+            from PIL import Image
+
+            with Image.open(path) as image:
+                values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
     except ImportError as error:
         raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
     except Exception as error:  # decoders raise errors of every kind on damaged files
         raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
     return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)
-
-
-def _pixels(path: Path, kind: str) -> Any:
-    if kind == "TIFF":
-        import tifffile
-
-        return tifffile.imread(path)
-    from PIL import Image
-
-    with Image.open(path) as image:
-        return np.asarray(image.convert("RGB") if image.mode == "P" else image)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from pellicle.data.colours import Colours
 from pellicle.data.cube import Cube
-from pellicle.data.cubes.sampled_checks import sample
+from pellicle.data.cubes.checks import sample
 from pellicle.data.spectrum import Spectrum
 from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.plain_text import described

@@ -1,8 +1,10 @@
 """Cubes of arrays without names of axes: in memory, `.npy`, and `.npz` with the wavelengths beside them.
 
-Files are read block by block, but for compressed `.npz`, which are unpacked into memory.
+Files are read block by block, but for compressed `.npz`, which are unpacked into memory. The names of several
+arrays state which are the measured values, and which their errors; that holds for variables of xarray too.
 """
 
+import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,15 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, MappedFile, RawCube, Stored
-from pellicle.data.cubes.variable_names import choose_variables
-from pellicle.data.tabular.columns import recognise
+from pellicle.data.cubes.raw_cube import ANGLE, COUNTS, WAVELENGTH, Asked, MappedFile, RawCube, Stored
+from pellicle.data.tabular.columns import Column, recognise
 from pellicle.data.tabular.text import open_binary
-from pellicle.errors import DataError, UsageError
+from pellicle.data.tabular.units import signal_unit
+from pellicle.errors import DataError, UsageError, did_you_mean
 
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
 _PIXELS = {1: ("site",), 2: ("y", "x"), 3: ("time", "y", "x")}
 """Axes of pixels of an array, by their number."""
+_ERROR = r"(?:sigma|std|sd|stdev|stddev|stderr|uncertainty|unc|err|error|errors)"
+_ERRORS = re.compile(rf"(?:{_ERROR}(?:_(?P<of>.+))?|(?P<name>.+)_{_ERROR})", re.IGNORECASE)
+_COUNTS = ("counts", "count", "dn", "adu", "digital number", "raw")
 
 
 def is_numpy(path: Path) -> bool:
@@ -95,17 +100,17 @@ def arrays_to_raw(arrays: Mapping[str, Any], path: str, asked: Asked, files: tup
     if not measured:
         shapes = ", ".join(f"{name or 'one'} ({_text(array.shape)})" for name, array in arrays.items())
         raise DataError(f"{path}: has no array of pixels and bands, only {shapes or 'none'}")
-    chosen = choose_variables(dict.fromkeys(measured), asked.variable, asked.signal, path)
-    shape = tuple(measured[chosen.arrays["values"]].shape)
+    chosen, stated = choose_variables(dict.fromkeys(measured), asked.variable, asked.signal, path)
+    shape = tuple(measured[chosen["values"]].shape)
     if wavelength is None:
         raise need_wavelengths(shape, path)
-    axes, notes = _axes(shape, wavelength.size, angle, path)
+    axes, notes = array_axes(shape, wavelength.size, path, angle)
     dims = tuple(axis for axis in axes if axis not in (WAVELENGTH, ANGLE))
     by_rank = {len(axes): axes, len(dims): dims, 1: (WAVELENGTH,)}
-    others = {name: a for name, a in arrays.items() if name not in chosen.arrays.values()}
+    others = {name: a for name, a in arrays.items() if name not in chosen.values()}
     return RawCube(
         path,
-        {role: Stored(measured[name], axes) for role, name in chosen.arrays.items()},
+        {role: Stored(measured[name], axes) for role, name in chosen.items()},
         dims,
         wavelength,
         unit,
@@ -113,31 +118,26 @@ def arrays_to_raw(arrays: Mapping[str, Any], path: str, asked: Asked, files: tup
         angle=angle,
         others={n: Stored(a, by_rank[len(a.shape)]) for n, a in others.items() if len(a.shape) in by_rank},
         notes=tuple(notes),
-        **chosen.stated,
+        **stated,
     )
 
 
-def _axes(
-    shape: tuple[int, ...], bands: int, angle: np.ndarray | None, path: str
+def array_axes(
+    shape: tuple[int, ...], bands: int, path: str, angle: np.ndarray | None = None
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Axes of an array, of which the last is that of the angles where there are several."""
-    if angle is None or angle.size == 1:
-        return array_axes(shape, bands, path)
-    if shape[-1] != angle.size:
-        raise DataError(
-            f"{path}: has {angle.size} angles, and the last of its axes ({_text(shape)}) another length: "
-            "store it as y, x, wavelength, angle"
-        )
-    axes, notes = array_axes(shape[:-1], bands, path)
-    return (*axes, ANGLE), notes
-
-
-def array_axes(shape: tuple[int, ...], bands: int, path: str) -> tuple[tuple[str, ...], list[str]]:
     """Return the names of the axes of an array of pixels with `bands` bands, and notes.
 
-    The axis of the bands is the last, or else the only one of that length. Raises DataError where no axis has
-    it.
+    The last axis is that of the angles where there are several. The axis of the bands is the last before it,
+    or else the only one of that length. Raises DataError where no axis has it.
     """
+    if angle is not None and angle.size > 1:
+        if shape[-1] != angle.size:
+            raise DataError(
+                f"{path}: has {angle.size} angles, and the last of its axes ({_text(shape)}) another length: "
+                "store it as y, x, wavelength, angle"
+            )
+        axes, notes = array_axes(shape[:-1], bands, path)
+        return (*axes, ANGLE), notes
     pixels = _PIXELS.get(len(shape) - 1)
     if pixels is None:
         raise DataError(
@@ -149,8 +149,7 @@ def array_axes(shape: tuple[int, ...], bands: int, path: str) -> tuple[tuple[str
             f"{path}: {bands} wavelengths are given, and none of its axes ({_text(shape)}) has that length: "
             "give one for each band with `wavelengths`"
         )
-    last = len(shape) - 1
-    place = last if shape[last] == bands else shape.index(bands)
+    place = len(pixels) if shape[-1] == bands else shape.index(bands)
     axes = (*pixels[:place], WAVELENGTH, *pixels[place:])
     return axes, [f"axes: {', '.join(axes)}, since that of the wavelengths has {bands} bands"]
 
@@ -170,3 +169,74 @@ def need_wavelengths(shape: tuple[int, ...], path: str) -> UsageError:
 
 def _text(shape: tuple[int, ...]) -> str:
     return " x ".join(map(str, shape))
+
+
+def choose_variables(
+    written: Mapping[str, str | None], variable: str | None, signal: str | None, path: str
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """Choose the variables to read among those with an axis of wavelengths.
+
+    `written` gives the unit of each as its file states it; `variable` is the name of the one to read, and
+    `signal` may settle which one is meant. Raises UsageError where several remain.
+
+    **Returns:** names by role ("values", "delta", "sigma", "delta_sigma"), and what they state, as arguments
+    of a `RawCube`.
+    """
+    if variable is not None and variable not in written:
+        raise UsageError(
+            f"{path}: has no variable {variable!r}{did_you_mean(variable, written)} of pixels and bands, but "
+            f"{', '.join(map(repr, written))}"
+        )
+    roles = {name: recognise(name) for name in written}
+    errors = {name: match for name in written if (match := _ERRORS.fullmatch(name)) and name != variable}
+    values = {name: column for name, column in roles.items() if name not in errors}
+    if variable is None and signal in (None, "psi-delta"):
+        pair = {c.role: name for name, c in values.items() if c.role in ("psi", "delta")}
+        if len(pair) == 2 and (signal or not any(c.role in ("R", "T") for c in values.values())):
+            radians = [name for name in pair.values() if (written[name] or "").strip().lower()[:3] == "rad"]
+            if radians:
+                raise DataError(f"{path}: {radians[0]!r} is in radians: convert it to degrees")
+            sigma = {
+                key: _errors_of(pair[role], role, errors, alone=False)
+                for role, key in (("psi", "sigma"), ("delta", "delta_sigma"))
+            }
+            arrays = {"values": pair["psi"], "delta": pair["delta"]}
+            return arrays | {key: name for key, name in sigma.items() if name}, {"signal": "psi-delta"}
+    names = [variable] if variable else _measured(values, signal)
+    if not names and (half := [name for name, column in roles.items() if column.role in ("psi", "delta")]):
+        raise DataError(
+            f"{path}: has {half[0]!r} alone, and ellipsometry needs psi and delta: write both into the file"
+        )
+    if len(names) != 1:
+        raise UsageError(
+            f"{path}: has several variables of pixels and bands, {', '.join(map(repr, names or written))}: "
+            "choose one with `variable`"
+        )
+    [name] = names
+    column = roles[name]
+    sigma = _errors_of(name, column.role, errors, alone=len(values) == 1)
+    unit = None if (stated := written[name]) is None else stated.strip().lower()
+    counted = unit in _COUNTS or column.role in ("counts", "sample counts")
+    return {"values": name} | ({"sigma": sigma} if sigma else {}), {
+        "signal": column.role if column.role in ("R", "T") else None,
+        "polarisation": column.polarisation,
+        "signal_unit": COUNTS if counted else (unit is not None and signal_unit(unit)) or column.unit,
+        "calibrated": column.role != "intensity",
+    }
+
+
+def _measured(values: Mapping[str, Column], signal: str | None) -> list[str]:
+    """Names of the variables that may be meant: those of known quantities first."""
+    for wanted in ((signal,), ("R", "T"), ("intensity", "counts", "sample counts")):
+        if named := [name for name, column in values.items() if column.role in wanted]:
+            return named
+    return [name for name, column in values.items() if column.role not in ("psi", "delta", "foreign")]
+
+
+def _errors_of(name: str, role: str, errors: Mapping[str, re.Match[str]], *, alone: bool) -> str | None:
+    """The variable of the standard deviations of another one."""
+    for error, match in errors.items():
+        of = match["of"] or match["name"]
+        if (of is None and alone) or (of is not None and of in (name, role)):
+            return error
+    return None

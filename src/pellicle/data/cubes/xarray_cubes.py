@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.numpy_files import arrays_to_raw
+from pellicle.data.cubes.numpy_files import arrays_to_raw, choose_variables
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
-from pellicle.data.cubes.variable_names import choose_variables
 from pellicle.data.formats.hdf5_reading import SIGNATURE
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.data.tabular.columns import recognise
@@ -50,10 +49,10 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
     written = {
         n: v.attrs.get("units") for n, v in measured.items() if v.ndim > 1 or n.lower() != "wavelength"
     }
-    chosen = choose_variables(written, asked.variable, asked.signal, path)
-    main = measured[chosen.arrays["values"]]
+    chosen, stated = choose_variables(written, asked.variable, asked.signal, path)
+    main = measured[chosen["values"]]
     dataset, lengths, notes = _without_single(dataset, main, roles)
-    dims = _pixel_dims(dataset, chosen.arrays["values"], lengths, roles, path)
+    dims = _pixel_dims(dataset, chosen["values"], lengths, roles, path)
     renamed = {dim: role for dim, role in roles.items() if role is not None}
     stored = {
         str(name): Stored(variable.variable, tuple(renamed.get(str(d), str(d)) for d in variable.dims))
@@ -62,12 +61,12 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
     wavelength, unit = _band_axis(dataset, band, asked, path)
     angle, polarisation = _light(dataset, main, roles, path)
     coords, units, told = _coordinates(dataset, renamed, dims)
-    delta = f", {chosen.arrays['delta']!r}" if "delta" in chosen.arrays else ""
-    errors = [name for role, name in chosen.arrays.items() if role in ("sigma", "delta_sigma")]
-    stated: Any = chosen.stated | {"polarisation": chosen.polarisation or polarisation}
+    delta = f", {chosen['delta']!r}" if "delta" in chosen else ""
+    errors = [name for role, name in chosen.items() if role in ("sigma", "delta_sigma")]
+    stated["polarisation"] = stated.get("polarisation") or polarisation
     return RawCube(
         path,
-        {role: stored[name] for role, name in chosen.arrays.items()},
+        {role: stored[name] for role, name in chosen.items()},
         dims,
         wavelength,
         unit,
@@ -75,9 +74,9 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         angle=angle,
         coords=coords,
         units=units,
-        others={name: one for name, one in stored.items() if name not in chosen.arrays.values()},
+        others={name: one for name, one in stored.items() if name not in chosen.values()},
         notes=(
-            f"variable {chosen.arrays['values']!r} ({_listed(lengths)}){delta}",
+            f"variable {chosen['values']!r} ({_listed(lengths)}){delta}",
             *(f"standard deviations: {name!r}" for name in errors),
             *notes,
             *told,
