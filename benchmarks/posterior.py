@@ -26,9 +26,12 @@ from pellicle.dispersion import Constant  # noqa: E402
 from pellicle.fitting.film.fit import fitted  # noqa: E402
 from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
-from pellicle.sampling.density import Target, log_density  # noqa: E402
-from pellicle.sampling.ensemble import run  # noqa: E402
-from pellicle.sampling.modes import modes  # noqa: E402
+from pellicle.sampling.density import (  # noqa: E402
+    Target,
+    log_density,
+    modes,
+)
+from pellicle.sampling.sample import run  # noqa: E402
 from pellicle.simulation.spectra import simulate_signal  # noqa: E402
 
 WALKERS, STEPS, BURN = 32, 2000, 500

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.film_colours import COMPARED, EXACT, colour_maps, films_of
+from pellicle.accuracy.colour_methods import COMPARED, EXACT, colour_maps, films_of
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
 

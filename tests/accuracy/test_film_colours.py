@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.colour_methods import COLOUR_METHODS, reference_colours
-from pellicle.accuracy.film_colours import colour_cost, films_of_scene
+from pellicle.accuracy.colour_methods import COLOUR_METHODS, colour_cost, films_of_scene, reference_program
 
 
 def test_the_reference_is_the_simulation_of_the_scene():
@@ -14,7 +13,7 @@ def test_the_reference_is_the_simulation_of_the_scene():
     thickness = films.numbers["thickness"]
     assert thickness.min() > 50
     assert thickness.max() < 200
-    made = reference_colours(films)
+    made = reference_program(films).run()
     for draw in (0, 7):
         one = pl.Scene(pl.Layer("Fe2O3", float(thickness[draw])), "Si", ambient=1.33)
         expected = pl.simulate(one, space="xyz", angle=[0.0, 50.0]).values
@@ -24,7 +23,7 @@ def test_the_reference_is_the_simulation_of_the_scene():
 def test_a_table_of_films_at_normal_incidence():
     films = films_of_scene(pl.Scene(pl.Layer(1.4, pl.Free(50, 80)), 3.9), np.array([0.0]))
     table = next(method for method in COLOUR_METHODS if method.name == "table of the film")
-    np.testing.assert_allclose(table.apply(films).run(), reference_colours(films), atol=1e-3)
+    np.testing.assert_allclose(table.apply(films).run(), reference_program(films).run(), atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.effects import presence
-from pellicle.effects.anisotropy import anisotropy
 from pellicle.effects.averaging import angle_spread
 from pellicle.effects.film_plan import exact
+from pellicle.effects.presence import anisotropy
 from pellicle.errors import UsageError
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Row

@@ -13,7 +13,7 @@ from pellicle.accuracy.surface import SurfaceCost
 from pellicle.fitting.comparison import compare
 from pellicle.reporting.fit_text import report as fit_report
 from pellicle.sampling.chain import Checks
-from pellicle.sampling.modes import mixture
+from pellicle.sampling.density import mixture
 from pellicle.sampling.result import Axis, Posterior, Prediction
 
 FILES = {

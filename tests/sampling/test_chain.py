@@ -16,9 +16,8 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting.progress import quiet
 from pellicle.reporting.posterior import write_netcdf
 from pellicle.sampling.chain import empty
-from pellicle.sampling.density import Target
-from pellicle.sampling.ensemble import run
-from pellicle.sampling.modes import Modes
+from pellicle.sampling.density import Modes, Target
+from pellicle.sampling.sample import run
 
 HERE = Path(__file__).parent
 RUN = """

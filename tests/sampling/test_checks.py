@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pellicle.sampling.chain import autocorrelation_time, check, empty, split_rhat
-from pellicle.sampling.modes import Modes
+from pellicle.sampling.density import Modes
 
 ONE = Modes(np.array([[0.5]]), np.array([[[0.1]]]), np.array([1.0]))
 TWO = Modes(np.array([[0.2], [0.8]]), np.full((2, 1, 1), 0.01), np.array([0.6, 0.4]))

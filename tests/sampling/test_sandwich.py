@@ -3,7 +3,7 @@
 import numpy as np
 
 from pellicle.fitting.covariance import Errors
-from pellicle.sampling.modes import Modes, sandwich_stretch, unchanged
+from pellicle.sampling.density import Modes, sandwich_stretch, unchanged
 
 CENTRES = np.array([[0.3, 0.5], [0.7, 0.02]])
 NARROW = 1e-4 * np.array([[1.0, 0.6], [0.6, 2.0]])

@@ -12,11 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.effects.film_plan import full_plan
-from pellicle.effects.removal import FilmRemoval
 from pellicle.errors import UsageError
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.forward_model.film_signal import build, tabulated
-from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.plan import Plan, Removal
 from pellicle.scene.film import Scene, media, with_wavelength
 from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.layers import Plate
@@ -81,23 +80,25 @@ def disperses(case: Case) -> bool:
     return any(np.ptp(np.asarray(m(case.wavelength))) > 0 for m in media(scene))
 
 
-def remaining_parameters(scene: Scene, changed: Scene) -> list[int]:
+def remaining_parameters(scene: Scene, variant: Scene) -> list[int]:
     """Positions, among the free parameters of a scene, of those that a changed scene still has."""
-    names, positions = [_name(path) for path, _ in free_leaves(scene)], []
-    for path, _ in free_leaves(changed):
-        positions.append(names.index(_name(path), positions[-1] + 1 if positions else 0))
+    # paths are the same for a medium that is wrapped in another one (`base`)
+    names, others = (
+        [
+            "".join(str(step) for step in path if getattr(step, "name", "") != "base")
+            for path, _ in free_leaves(x)
+        ]
+        for x in (scene, variant)
+    )
+    positions: list[int] = []
+    for name in others:
+        positions.append(names.index(name, positions[-1] + 1 if positions else 0))
     return positions
-
-
-def _name(path: tuple) -> str:
-    """A path as text, the same for a medium that is wrapped in another one (`base`)."""
-    return "".join(str(step) for step in path if getattr(step, "name", "") != "base")
 
 
 def with_effect(plan: Plan, effect: str, on: bool, count: int = 0) -> Plan:
     """The plan with one effect switched on or off, and its number of orders or nodes."""
-    rows: Any = [replace(row, on=on, count=count) if row.effect == effect else row for row in plan.rows]
-    return replace(plan, rows=tuple(rows))
+    return plan.with_rows(replace(plan.row(effect), on=on, count=count))
 
 
 class Variant(NamedTuple):
@@ -108,11 +109,13 @@ class Variant(NamedTuple):
     finish: Callable[[Any], Any] | None = None
 
 
-def without(effect: str, absent: str, case: Case) -> Variant | str:
-    """The scene without one effect, otherwise in full; `absent` is the reason where it does not have it."""
-    if not case.plan.on(effect):
-        return absent
-    removal = FilmRemoval(effect)
+def changed(scene: Scene) -> Variant:
+    """Another scene in full."""
+    return Variant(full_plan(scene), scene)
+
+
+def removed(removal: Removal, case: Case) -> Variant:
+    """The scene without what a removal takes away, otherwise in full."""
     return Variant(replace(full_plan(removal(case.scene)), left_out=(removal,)), case.scene)
 
 
@@ -151,9 +154,15 @@ def compiled(case: Case, variant: Variant, double: bool = True) -> Program:
     values = case.draws[:, remaining_parameters(case.scene, variant.scene)]
     simulate = build(variant.plan)
 
+    def first_thickness(scene: Scene) -> Any:
+        first = scene.layers[0]
+        return first.plate_mm if isinstance(first, Plate) else first.thickness
+
     def signals(scene, values, zeros):
-        def one(numbers, zero):
-            return simulate(_with_added(zero, insert(scene, list(numbers))))
+        def one(numbers: Any, zero: Any) -> Any:
+            # 0 is added to the first thickness, so that no compiler simulates it once for all draws
+            whole = insert(scene, list(numbers))
+            return simulate(eqx.tree_at(first_thickness, whole, first_thickness(whole) + zero))
 
         return jax.vmap(one)(values, zeros)
 
@@ -183,10 +192,3 @@ def compiled_function(
     counts = counts[0] if isinstance(counts, list) else counts
     flops = float(counts["flops"]) / samples if "flops" in counts else None
     return Program(call, second, converted, double, samples, compile_seconds, flops)
-
-
-def _with_added(zero: Any, scene: Scene) -> Scene:
-    """The scene with 0 added to its first thickness, so that no compiler simulates it once for all draws."""
-    thickness = "plate_mm" if isinstance(scene.layers[0], Plate) else "thickness"
-    where = lambda s: getattr(s.layers[0], thickness)  # noqa: E731
-    return eqx.tree_at(where, scene, where(scene) + zero)

@@ -81,24 +81,19 @@ def compare_intervals(
 ) -> Comparison:
     """Compute intervals for every data set by every method; see `measure_on_data`."""
     comparison = Comparison("interval", requested=len(data))
-    how = OnData(
-        "intervals",
-        lambda one: rank(one.problem, search(one.problem, quiet)).counted,
-        _score_of_intervals,
-        _summary_of_intervals,
-    )
+
+    def problem(one: DataSet) -> RankedMinima:
+        return rank(one.problem, search(one.problem, quiet)).counted
+
+    how = OnData("intervals", problem, partial(partial, _score_of_intervals), _summary_of_intervals)
     return measure_on_data(comparison, methods, data, how, progress, time_limit)
 
 
-def _score_of_intervals(data: DataSet) -> Callable[[Interval], tuple[np.ndarray, np.ndarray]]:
+def _score_of_intervals(data: DataSet, ends: Interval) -> tuple[np.ndarray, np.ndarray]:
     """Score of intervals: which true values they contain, and how wide they are."""
-
-    def score(ends: Interval) -> tuple[np.ndarray, np.ndarray]:
-        lower, upper = ends
-        inside = (lower <= data.truth) & (data.truth <= upper)
-        return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
-
-    return score
+    lower, upper = ends
+    inside = (lower <= data.truth) & (data.truth <= upper)
+    return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
 
 
 def _summary_of_intervals(scores: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, dict[str, Any]]:

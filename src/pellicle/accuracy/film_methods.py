@@ -10,12 +10,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.accuracy.case import Case, Program, Variant, compiled, disperses, with_effect, without
+from pellicle.accuracy.case import Case, Program, Variant, changed, compiled, disperses, removed, with_effect
 from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.effects.film_plan import full_plan, plan
-from pellicle.effects.removal import RealPart
+from pellicle.effects.film_plan import plan
+from pellicle.effects.removal import FilmRemoval, RealPart
 from pellicle.errors import UsageError, install_command
 from pellicle.fitting.progress import Progress
 from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL
@@ -25,17 +25,36 @@ from pellicle.scene.free import is_free, start_values
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Layer, Plate
 
+Apply = Callable[[Case], Variant | str]
+
+
+def having(effect: str, absent: str, apply: Apply) -> Apply:
+    """A method for scenes with one effect; `absent` is the reason where a scene does not have it."""
+    return lambda case: apply(case) if case.plan.on(effect) else absent
+
+
+def without(effect: str, absent: str) -> Apply:
+    """A method that leaves one effect out, otherwise in full, if the signal has a meaning without it."""
+
+    def apply(case: Case) -> Variant | str:
+        if effect == "oblique" and case.ellipsometric:
+            return "ellipsometry compares s and p, which are equal at normal incidence"
+        if effect == "polarisation" and (case.ellipsometric or case.scene.instrument.has_cone):
+            return "this signal needs both polarisations"
+        if effect == "back-face" and case.plan.signal == "T":
+            return "light transmitted by a plate passes its back face"
+        return having(effect, absent, partial(removed, FilmRemoval(effect)))(case)
+
+    return apply
+
 
 def transparent(case: Case) -> Variant | str:
     """Layers without absorption: the real parts of their indices."""
-    if not case.plan.on("absorption"):
-        return "no layer absorbs"
     layers = tuple(
         replace(x, material=each_medium(RealPart, x.material)) if isinstance(x, Layer) else x
         for x in case.scene.layers
     )
-    clear = eqx.tree_at(lambda s: s.layers, case.scene, layers)
-    return Variant(full_plan(clear), clear)
+    return changed(eqx.tree_at(lambda s: s.layers, case.scene, layers))
 
 
 @final
@@ -63,30 +82,20 @@ def constant_index(case: Case) -> Variant | str:
 
 def fewer_slices(count: int, case: Case) -> Variant | str:
     """Fewer slices of graded layers than in the full plan."""
-    if not case.plan.on("gradient"):
-        return "no layer is graded"
     if case.plan.row("gradient").count <= count:
         return f"the full plan has {case.plan.row('gradient').count} slices"
     return Variant(with_effect(case.plan, "gradient", True, count), case.scene)
 
 
 @dataclass(frozen=True)
-class _HomogeneousSlices:
-    """Replaces every graded layer of a scene by homogeneous slices."""
+class HomogeneousSlices:
+    """Replaces every graded layer of a scene by homogeneous slices, as programs without graded layers do."""
 
     count: int
     effect: str = "gradient"
 
     def __call__(self, scene: Scene) -> Scene:
         return sliced(scene, self.count)
-
-
-def homogeneous_slices(count: int, case: Case) -> Variant | str:
-    """Graded layers as homogeneous slices, as programs without graded layers take them."""
-    if not case.plan.on("gradient"):
-        return "no layer is graded"
-    removal = _HomogeneousSlices(count)
-    return Variant(replace(full_plan(removal(case.scene)), left_out=(removal,)), case.scene)
 
 
 def aligned_axes(case: Case) -> Variant | str:
@@ -110,50 +119,29 @@ def general_matrices(case: Case) -> Variant | str:
 
 
 def _with_angles(angle: Callable[[Any], Any], case: Case) -> Variant:
-    scene = jax.tree_util.tree_map(
-        lambda x: x.with_angles(angle) if isinstance(x, Anisotropic) else x,
-        case.scene,
-        is_leaf=lambda x: isinstance(x, Anisotropic) or is_free(x),
+    return changed(
+        jax.tree_util.tree_map(
+            lambda x: x.with_angles(angle) if isinstance(x, Anisotropic) else x,
+            case.scene,
+            is_leaf=lambda x: isinstance(x, Anisotropic) or is_free(x),
+        )
     )
-    return Variant(full_plan(scene), scene)
-
-
-def _without_angle(case: Case) -> Variant | str:
-    if case.ellipsometric:
-        return "ellipsometry compares s and p, which are equal at normal incidence"
-    return without("oblique", "the light is at normal incidence", case)
-
-
-def _s_alone(case: Case) -> Variant | str:
-    if case.ellipsometric or case.scene.instrument.has_cone:
-        return "this signal needs both polarisations"
-    return without("polarisation", "there is only one polarisation", case)
-
-
-def _half_space(case: Case) -> Variant | str:
-    if case.plan.signal == "T":
-        return "light transmitted by a plate passes its back face"
-    return without("back-face", "the substrate has no back face", case)
 
 
 def _collection(reflections: int | None, case: Case) -> Variant | str:
     """The scene with all light from its back face collected, or that of so many reflections there."""
-    if not case.plan.on("back-face"):
-        return "the substrate has no back face"
     if reflections is None:
         scene = all_collected(case.scene)
         same = scene.substrate == case.scene.substrate and scene.layers == case.scene.layers
-        return "all light from the back face is collected" if same else Variant(full_plan(scene), scene)
+        return "all light from the back face is collected" if same else changed(scene)
     plates = [x for x in case.scene.layers if isinstance(x, Plate)]
     if plates or case.scene.substrate.back_reflections is not None:
         return "reflections are counted at the back of a substrate, where all are collected"
-    scene = replace(case.scene, substrate=replace(case.scene.substrate, back_reflections=reflections))
-    return Variant(full_plan(scene), scene)
+    substrate = replace(case.scene.substrate, back_reflections=reflections)
+    return changed(replace(case.scene, substrate=substrate))
 
 
 def _closed_form(case: Case) -> Variant | str:
-    if not case.plan.on("coherence"):
-        return "the full plan is the closed form"
     return Variant(with_effect(with_effect(case.plan, "coherence", False), "orders", False), case.scene)
 
 
@@ -209,6 +197,7 @@ def _finer(case: Case) -> Variant | str:
     )
 
 
+_BACK, _GRADED = ("back-face", "the substrate has no back face"), ("gradient", "no layer is graded")
 ORDERS = (1, 2, 3, 5, 8)
 SLICES, HOMOGENEOUS_SLICES = (2, 4, 8), (8, 32)
 
@@ -220,27 +209,39 @@ METHODS = (
         "what its plan leaves out",
         lambda case: Variant(plan(case.scene, case.tolerance), case.scene),
     ),
-    Method("closed form", "the damping of fringes", _closed_form),
+    Method(
+        "closed form",
+        "the damping of fringes",
+        having("coherence", "the full plan is the closed form", _closed_form),
+    ),
     *(Method(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
     Method("incoherent", "interference", partial(_orders, 0)),
     *(Method(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
-    Method("normal incidence", "the angle", _without_angle),
-    Method("s alone", "p", _s_alone),
-    Method("one ray", "the cone of light", partial(without, "angle-spread", "no cone of light")),
-    Method("half space", "the plate's back face", _half_space),
-    Method("one back reflection", "later ones", partial(_collection, 1)),
-    Method("all collected", "that part of the light misses the detector", partial(_collection, None)),
-    Method("smooth faces", "roughness", partial(without, "roughness", "every face is smooth")),
-    Method("isotropic average", "birefringence", partial(without, "anisotropy", "no medium is birefringent")),
+    Method("normal incidence", "the angle", without("oblique", "the light is at normal incidence")),
+    Method("s alone", "p", without("polarisation", "there is only one polarisation")),
+    Method("one ray", "the cone of light", without("angle-spread", "no cone of light")),
+    Method("half space", "the plate's back face", without(*_BACK)),
+    Method("one back reflection", "later ones", having(*_BACK, partial(_collection, 1))),
+    Method(
+        "all collected",
+        "that part of the light misses the detector",
+        having(*_BACK, partial(_collection, None)),
+    ),
+    Method("smooth faces", "roughness", without("roughness", "every face is smooth")),
+    Method("isotropic average", "birefringence", without("anisotropy", "no medium is birefringent")),
     Method("aligned axes", "the tilt of optic axes", aligned_axes),
     Method("4×4 matrices", "nothing", general_matrices),
-    Method("mean of the depth", "the gradient", partial(without, "gradient", "no layer is graded")),
-    *(Method(f"{n} slices", "finer slices", partial(fewer_slices, n)) for n in SLICES),
+    Method("mean of the depth", "the gradient", without(*_GRADED)),
+    *(Method(f"{n} slices", "finer slices", having(*_GRADED, partial(fewer_slices, n))) for n in SLICES),
     *(
-        Method(f"{n} homogeneous slices", "the gradient within each", partial(homogeneous_slices, n))
+        Method(
+            f"{n} homogeneous slices",
+            "the gradient within each",
+            having(*_GRADED, partial(removed, HomogeneousSlices(n))),
+        )
         for n in HOMOGENEOUS_SLICES
     ),
-    Method("transparent layer", "its absorption", transparent),
+    Method("transparent layer", "its absorption", having("absorption", "no layer absorbs", transparent)),
     Method("constant index", "dispersion: the index of mid-band", constant_index),
     Method("twice the wavelengths", "nothing", _finer),
     *(

@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.accuracy.case import Case
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.forward_model.plan import GENERAL
-from pellicle.scene.film import Plate, Scene, groups, thickness_spread, with_wavelength
+from pellicle.scene.film import Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.psi_delta import PsiDelta
@@ -74,6 +74,10 @@ class _Point(NamedTuple):
 
 def _points(scene: Scene) -> list[_Point]:
     described, plates = groups(scene)
+    # a scene with several plates collects all light
+    part = plates[0] if len(plates) == 1 else None
+    share = 1.0 if part is None or part.back_collected is None else part.back_collected
+    reflections = None if part is None else part.back_reflections
     wavelength = np.asarray(scene.light.wavelength)
     tables = [
         (_indices(g.above, wavelength), [_indices(x.material, wavelength) for x in g.layers],
@@ -89,17 +93,11 @@ def _points(scene: Scene) -> list[_Point]:
                 for above, layers, below, depths in tables
             ],
             [_exact(plate.plate_mm) for plate in plates],
-            *_collected(plates),
+            _exact(share),
+            reflections,
         )
         for i, nm in enumerate(wavelength)
     ]
-
-
-def _collected(plates: tuple[Plate, ...]) -> tuple[Any, int | None]:
-    """Share and reflections that are collected; a scene with several plates collects all."""
-    part = plates[0] if len(plates) == 1 else None
-    share = 1.0 if part is None or part.back_collected is None else part.back_collected
-    return _exact(share), None if part is None else part.back_reflections
 
 
 def _exact(number: Any) -> Any:
@@ -116,21 +114,17 @@ class _Principal(NamedTuple):
 
 def _indices(medium: Any, wavelength: np.ndarray) -> list[Any]:
     if isinstance(medium, Anisotropic) and medium.order is not None:
-        own = [medium.x, medium.x if medium.y is None else medium.y, medium.z]
-        return [
-            _Principal(*n) for n in zip(*(_indices(own[i], wavelength) for i in medium.order), strict=True)
-        ]
+        principal = [medium.x, medium.x if medium.y is None else medium.y, medium.z]
+        columns = (_indices(principal[i], wavelength) for i in medium.order)
+        return [_Principal(*n) for n in zip(*columns, strict=True)]
     return [mpc(float(n.real), float(n.imag)) for n in np.asarray(medium(wavelength))]
 
 
 def _signal(scene: Scene, point: _Point) -> list[Any]:
     light = scene.light
     if light.ellipsometric:
-        s, p, cross = (
-            mp.re(_product(point, 0, "ss")),
-            mp.re(_product(point, 0, "pp")),
-            _product(point, 0, "ps"),
-        )
+        s, p, cross = (_product(point, 0, letters) for letters in ("ss", "pp", "ps"))
+        s, p = mp.re(s), mp.re(p)
         # tan Ψ e^{iΔ} = conj(r_p/r_s): N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ
         N, C, S = (s - p) / (s + p), 2 * mp.re(cross) / (s + p), -2 * mp.im(cross) / (s + p)
         if isinstance(light.kind, Generalised):
@@ -145,16 +139,21 @@ def _signal(scene: Scene, point: _Point) -> list[Any]:
 
 def _powers(point: _Point, first: int, letter: str) -> tuple[Any, Any]:
     """R of a group and all under it, and T through them."""
-    R, T, R_below, T_below = _faces(point, point.groups[first], letter)
+    above, below = _sides(point, point.groups[first], letter)
     if first == len(point.groups) - 1:
-        return R, T
+        return above.R, above.T
     R_next, T_next = _powers(point, first + 1, letter)
-    q, _ = _wave(point, point.groups[first].below, letter)
-    passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
-    round_trip = R_below * R_next * passed**2
-    returned = T * T_below * R_next * passed**2 * _orders(point, round_trip)
+    passed = _passed(point, first, letter)
+    round_trip = below.R * R_next * passed**2
+    returned = above.T * below.T * R_next * passed**2 * _orders(point, round_trip)
     further = round_trip * _orders(point, round_trip)
-    return R + point.collected * returned, T * T_next * passed * (1 + point.collected * further)
+    return above.R + point.collected * returned, above.T * T_next * passed * (1 + point.collected * further)
+
+
+def _passed(point: _Point, first: int, letter: str) -> Any:
+    """Transmittance of one passage through the plate below a group."""
+    q, _ = _wave(point, point.groups[first].below, letter)
+    return mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
 
 
 def _orders(point: _Point, round_trip: Any) -> Any:
@@ -165,14 +164,13 @@ def _orders(point: _Point, round_trip: Any) -> Any:
 
 def _product(point: _Point, first: int, letters: str) -> Any:
     """r conj(r) of a group and all under it, for two polarisations, summed over the plates' orders."""
-    (r, back, twice), (r_, back_, twice_) = (_amplitudes(point, point.groups[first], x) for x in letters)
+    (above, below), (above_, below_) = (_sides(point, point.groups[first], x) for x in letters)
     if first == len(point.groups) - 1:
-        return r * mp.conj(r_)
-    q, _ = _wave(point, point.groups[first].below, letters[0])
-    passed = mp.exp(-4 * mp.pi * mp.im(q) * point.plates_mm[first] * 10**6 / point.wavelength)
-    beneath = _product(point, first + 1, letters) * passed**2
-    returned = twice * mp.conj(twice_) * beneath * _orders(point, back * mp.conj(back_) * beneath)
-    return r * mp.conj(r_) + point.collected * returned
+        return above.r * mp.conj(above_.r)
+    beneath = _product(point, first + 1, letters) * _passed(point, first, letters[0]) ** 2
+    twice = above.t * below.t * mp.conj(above_.t * below_.t)
+    returned = twice * beneath * _orders(point, below.r * mp.conj(below_.r) * beneath)
+    return above.r * mp.conj(above_.r) + point.collected * returned
 
 
 def _wave(point: _Point, index: Any, letter: str) -> tuple[Any, Any]:
@@ -183,43 +181,29 @@ def _wave(point: _Point, index: Any, letter: str) -> tuple[Any, Any]:
     return -q if mp.im(q) < 0 else q, mpc(1) if letter == "s" else x**2
 
 
-def _admittance(point: _Point, index: Any, letter: str) -> Any:
-    q, weight = _wave(point, index, letter)
-    return q / weight
+class _Side(NamedTuple):
+    """Amplitudes r and t of one group from one side, and its powers R and T."""
+
+    r: Any
+    t: Any
+    R: Any
+    T: Any
 
 
-def _fields(point: _Point, layers: list[tuple[Any, Any]], bottom: Any, letter: str) -> tuple[Any, Any]:
-    """(E, H) at the upper face for a unit wave that leaves below; in p they change places."""
+def _sides(point: _Point, group: _Group, letter: str) -> list[_Side]:
+    """One group from above and from below; at normal incidence r_p = −r_s."""
+    turned = _Group(group.below, group.layers[::-1], group.above)
+    return [_side(point, one, letter) for one in (group, turned)]
+
+
+def _side(point: _Point, group: _Group, letter: str) -> _Side:
+    top, bottom = (q / weight for q, weight in (_wave(point, x, letter) for x in (group.above, group.below)))
+    # (E, H) at the upper face for a unit wave that leaves below; in p they change places
     E, H = mpc(1), bottom
-    for index, depth in reversed(layers):
+    for index, depth in reversed(group.layers):
         q, weight = _wave(point, index, letter)
         k0d = 2 * mp.pi * depth / point.wavelength
         cosine, sine = mp.cos(k0d * q), k0d * mp.sinc(k0d * q)  # the latter over q
         E, H = E * cosine - 1j * sine * weight * H, H * cosine - 1j * sine * q**2 / weight * E
-    return E, H
-
-
-def _amplitudes(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any]:
-    """r of one group from above and from below, and t t′; at normal incidence r_p = −r_s."""
-    top, bottom = _admittance(point, group.above, letter), _admittance(point, group.below, letter)
-    E, H = _fields(point, group.layers, bottom, letter)
-    E_, H_ = _fields(point, group.layers[::-1], top, letter)
-    start, start_ = top * E + H, bottom * E_ + H_
-    return (top * E - H) / start, (bottom * E_ - H_) / start_, 4 * top * bottom / (start * start_)
-
-
-def _faces(point: _Point, group: _Group, letter: str) -> tuple[Any, Any, Any, Any]:
-    """R and T from above, R and T from below."""
-    faces = []
-    for above, layers, below in (
-        (group.above, group.layers, group.below),
-        (group.below, group.layers[::-1], group.above),
-    ):
-        top, bottom = _admittance(point, above, letter), _admittance(point, below, letter)
-        E, H = _fields(point, layers, bottom, letter)
-        start = top * E + H
-        faces += [
-            abs((top * E - H) / start) ** 2,
-            4 * abs(top) ** 2 * mp.re(bottom) / abs(start) ** 2 / mp.re(top),
-        ]
-    return tuple(faces)
+    r, t = (top * E - H) / (top * E + H), 2 * top / (top * E + H)
+    return _Side(r, t, abs(r) ** 2, abs(t) ** 2 * mp.re(bottom) / mp.re(top))

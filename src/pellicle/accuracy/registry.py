@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,7 +24,7 @@ import numpy as np
 from pellicle.accuracy.case import Case, Program, Variant, compiled
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Measured
-from pellicle.fitting.problem import Explained, Form, Problem
+from pellicle.fitting.problem import Form, Problem
 from pellicle.fitting.progress import Progress
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import free_leaves
@@ -151,14 +151,10 @@ class Comparison:
 
 def mark_pareto(results: Sequence[Result]) -> None:
     """Mark the results that no other one beats in error or time without being worse in the other."""
-    for result in results:
-        beaten = (
-            other.error <= result.error
-            and other.seconds <= result.seconds
-            and (other.error < result.error or other.seconds < result.seconds)
-            for other in results
-        )
-        result.pareto = not any(beaten)
+    figures = np.array([(result.error, result.seconds) for result in results]).reshape(-1, 2)
+    for result, own in zip(results, figures, strict=True):
+        beaten = np.all(figures <= own, axis=1) & np.any(figures < own, axis=1)
+        result.pareto = not beaten.any()
 
 
 @dataclass
@@ -172,10 +168,8 @@ class _Run:
     scores: list[Any] = field(default_factory=list)
 
     def result(self, error: float, compile_seconds: float, details: dict[str, Any]) -> Result:
-        seconds = statistics.median(self.times)
-        return Result(
-            self.method.name, self.method.leaves_out, error, seconds, max(compile_seconds, 0.0), details
-        )
+        about = self.method.name, self.method.leaves_out, error
+        return Result(*about, statistics.median(self.times), max(compile_seconds, 0.0), details)
 
 
 def measure(
@@ -253,7 +247,10 @@ def measure_on_data(
             began = time.perf_counter()
             method.apply(first)
             runs.append(_Run(method, time.perf_counter() - began))
-        for done, one in enumerate(within(data, time_limit)):
+        began_all = time.perf_counter()
+        for done, one in enumerate(data):
+            if done and time.perf_counter() - began_all > time_limit:
+                break
             progress(how.stage, done, len(data))
             problem, score = how.problem(one), how.score(one)
             for run in runs:
@@ -270,18 +267,6 @@ def measure_on_data(
             compiling = run.compile_seconds - statistics.median(run.times)
             results.append(run.result(error, compiling, details | {"datasets": len(run.times)}))
     return comparison.finish(results)
-
-
-Item = TypeVar("Item")
-
-
-def within(items: Iterable[Item], seconds: float) -> Iterator[Item]:
-    """Yield the first item, and further ones until `seconds` have passed since then."""
-    began = time.perf_counter()
-    for item in items:
-        yield item
-        if time.perf_counter() - began > seconds:
-            return
 
 
 class DataSet(NamedTuple):
@@ -324,21 +309,16 @@ def data_sets(case: Case, scene: Scene, noise: float, count: int, seed: int = 0)
     ]
 
 
-def _explained(form: Form, arrays: Any, box: Any, unit: Any) -> tuple[Explained, Any]:
-    values = box.lower + unit * (box.upper - box.lower)
-    return form.explain(arrays, list(values)), box.prior_rows(values)
-
-
 def residual(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     """Weighted residuals at one point of the unit cube, with those of the priors."""
-    spectrum, prior = _explained(form, arrays, box, unit)
-    return jnp.concatenate([spectrum.residual, prior])
+    values = box.lower + unit * (box.upper - box.lower)
+    return jnp.concatenate([form.explain(arrays, list(values)).residual, box.prior_rows(values)])
 
 
 def deviance(form: Form, arrays: Any, box: Any, unit: Any) -> Any:
     """Deviance (−2 ln evidence) at one point of the unit cube."""
-    spectrum, prior = _explained(form, arrays, box, unit)
-    return spectrum.deviance + jnp.sum(prior**2)
+    values = box.lower + unit * (box.upper - box.lower)
+    return form.explain(arrays, list(values)).deviance + jnp.sum(box.prior_rows(values) ** 2)
 
 
 @partial(jax.jit, static_argnums=0)

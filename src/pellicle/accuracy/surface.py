@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from pellicle.accuracy.case import Program, check_tolerance, compiled_function, random_draws
-from pellicle.accuracy.colour_methods import COLOUR_METHODS, COLOUR_TOLERANCE, Films, compare_colours
+from pellicle.accuracy.colour_methods import COLOUR_METHODS, COLOUR_TOLERANCE, DRAWS, Films, compare_colours
 from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.brdf.directions import angle_to_half
 from pellicle.dispersion.empirical import along_the_spectrum
@@ -23,8 +23,6 @@ from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import insert
 from pellicle.scene.surface import SurfaceView
 
-DRAWS = 64
-"""Number of surfaces drawn between the bounds: enough to hide the cost of a call."""
 VALUE_TOLERANCE = 1e-3
 """Default tolerance: relative error of a BRDF."""
 
@@ -94,8 +92,7 @@ def films_of(view: SurfaceView, draws: np.ndarray) -> Films | str:
 def _without(effect: str, absent: str, view: SurfaceView, tolerance: float) -> Plan | str:
     if not any(row.effect == effect and row.on for row in exact(view).rows):
         return absent
-    other = {"roughness": "diffuse", "coat": "specular", "diffuse": "specular"}.get(effect)
-    if other is not None and other not in view.numbers:
+    if not surface_plan.something_left(effect, view):
         return "nothing else is left of the BRDF"
     removal = SurfaceRemoval(effect)
     return replace(exact(removal(view)), left_out=(removal,))
@@ -105,8 +102,7 @@ def _by_angles(count: int, view: SurfaceView, tolerance: float) -> Plan | str:
     plan = exact(view)
     if not any(row.effect == "oblique" and row.on for row in plan.rows):
         return "no film whose colour depends on the angle"
-    rows = (replace(row, count=count) if row.effect == "oblique" else row for row in plan.rows)
-    return replace(plan, rows=tuple(rows))
+    return plan.with_rows(replace(plan.row("oblique"), count=count))
 
 
 BRDF_METHODS = (

@@ -16,9 +16,8 @@ from pellicle.fitting.joint import fit as fit_jointly
 from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
-from pellicle.sampling.ensemble import STEPS, sampled
 from pellicle.sampling.result import Posterior
-from pellicle.sampling.sample import OF_A_FILM, measured, subject_of
+from pellicle.sampling.sample import OF_A_FILM, STEPS, measured, sampled, subject_of
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene, refuse
 

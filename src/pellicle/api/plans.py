@@ -127,10 +127,9 @@ def cost(
     scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
     colour-science.
     """
-    from pellicle.accuracy.colour_methods import COLOUR_METHODS
+    from pellicle.accuracy.colour_methods import COLOUR_METHODS, colour_cost
     from pellicle.accuracy.cost import INTERVAL_METHODS
     from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
-    from pellicle.accuracy.film_colours import colour_cost
     from pellicle.accuracy.surface import cost as surface_cost
     from pellicle.rendering.renderer_methods import RENDERER_METHODS
     from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, mixes_polarisations, principal_media
-from pellicle.effects.anisotropy import scene_media
 from pellicle.effects.differences import (
     largest_index,
     largest_ratio,
@@ -15,7 +14,7 @@ from pellicle.effects.differences import (
     smallest_index,
     upper,
 )
-from pellicle.effects.presence import roughness
+from pellicle.effects.presence import roughness, scene_media
 from pellicle.forward_model.plan import GENERAL, Plan, Row
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
@@ -54,10 +53,8 @@ def _blurs(scene: Scene) -> list[str]:
     """Names of the spreads that damp the fringes; empty without layers."""
     layers = coherent_layers(scene)
     uneven = any(thickness_spread(scene, layer) is not None for layer in layers)
-    if not layers:
-        return []
-    bandwidth = scene.instrument.bandwidth is not None
-    return [*(["bandwidth"] if bandwidth else []), *(["uneven thickness"] if uneven else [])]
+    bandwidth = bool(layers) and scene.instrument.bandwidth is not None
+    return ["bandwidth"] * bandwidth + ["uneven thickness"] * uneven
 
 
 UNRESOLVED_ERROR = 4 * float(np.exp(-0.5 * (4 * np.pi / series.FWHM) ** 2))
@@ -176,8 +173,7 @@ def angle_spread(scene: Scene) -> Row:
     count, around, error = _lens_rays(scene) if mixed else _rays(scene)
     half = np.rad2deg(scene.instrument.largest_half_angle(least_ambient(scene)))
     why = f"light within {half:.3g}° of its axis, averaged over {count * around} rays"
-    if mixed:
-        why += ", each with its own plane of incidence"
+    why += ", each with its own plane of incidence" * mixed
     return Row("angle-spread", True, why, error, count, around)
 
 

@@ -21,14 +21,11 @@ from pellicle.scene.film import Scene, groups
 from pellicle.scene.free import Free, free_leaves, insert, is_free, start_values
 
 
-def is_zero(number: Any) -> bool:
-    """True for None and for a fixed number that is exactly 0."""
-    return number is None or (not isinstance(number, Free) and np.ndim(number) == 0 and float(number) == 0.0)
-
-
 def normal_incidence(scene: Scene) -> bool:
     """True where the axis of the light is provably normal to the layers."""
-    return is_zero(scene.light.angle) and scene.instrument.angle_shift is None
+    angle = scene.light.angle
+    zero = not isinstance(angle, Free) and np.ndim(angle) == 0 and float(angle) == 0.0
+    return zero and scene.instrument.angle_shift is None
 
 
 def least_ambient(scene: Scene) -> float:
@@ -72,9 +69,8 @@ def largest_attenuation(material: AbstractDispersion, thickness: Any, scene: Sce
     least = np.min(np.real(indices), axis=0)
     if not np.all(least > 1.01 * a):
         return np.inf
-    extinction = (
-        np.max(np.real(indices), axis=0) * np.max(np.imag(indices), axis=0) / np.sqrt(least**2 - a**2)
-    )
+    most_n, most_k = np.max(np.real(indices), axis=0), np.max(np.imag(indices), axis=0)
+    extinction = most_n * most_k / np.sqrt(least**2 - a**2)
     return float(np.max(2 * np.pi / wavelength * upper(thickness) * extinction))
 
 
@@ -86,9 +82,7 @@ def _corner_indices(material: AbstractDispersion, wavelength: np.ndarray) -> np.
 
     if isinstance(material, Tabulated):
         return row(material.value)[None]
-    free = [leaf for _, leaf in free_leaves(material)]
-    corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
-    return np.stack([row(known_index(insert(material, corner), wavelength)) for corner in corners])
+    return np.stack([row(known_index(insert(material, x), wavelength)) for x in _corners(material)])
 
 
 def largest_ratio(scene: Scene) -> float:
@@ -96,9 +90,13 @@ def largest_ratio(scene: Scene) -> float:
 
     An estimate, not a proof: the largest of the corners (at most 64) and the start values, times 1.05.
     """
-    free = [leaf for _, leaf in free_leaves(scene)]
-    corners = itertools.islice(itertools.product(*[(f.lower, f.upper) for f in free]), 64)
-    return 1.05 * max(_ratio(insert(scene, values)) for values in [*corners, start_values(scene)])
+    return 1.05 * max(_ratio(insert(scene, values)) for values in [*_corners(scene), start_values(scene)])
+
+
+def _corners(scene: Any) -> list[tuple[float, ...]]:
+    """Corners of the bounds of the free numbers of a scene or of a part of it, the first 64."""
+    bounds = [(leaf.lower, leaf.upper) for _, leaf in free_leaves(scene)]
+    return [*itertools.islice(itertools.product(*bounds), CORNERS)]
 
 
 def _ratio(scene: Scene) -> float:
@@ -106,24 +104,19 @@ def _ratio(scene: Scene) -> float:
     group = next(group for group in groups(scene)[0] if group.layers)
     media = (group.above, group.layers[0].material, group.below)
     above, layer, below = (medium.index(at) for medium in media)
-    squares = []
-    for angle in _extreme_angles(scene):
+    squares, shift = [], upper(scene.instrument.angle_shift)
+    # None is normal incidence
+    angles: list[Any] = [None if normal_incidence(scene) else jnp.deg2rad(scene.light.angle + shift)]
+    if scene.instrument.has_cone:
+        half = scene.instrument.largest_half_angle(least_ambient(scene))
+        angles.append(jnp.minimum(half + (0.0 if angles[0] is None else angles[0]), jnp.pi / 2))
+    for angle in angles:
         a, _ = interface.transverse(scene.ambient.index(at), angle)
         inside = None if angle is None else interface.Inside(a)
         for polarisation in "s" if angle is None and all(map(isotropic_in_plane, media)) else "sp":
             b = orders.airy_series(above, layer, below, 0.0 * at, inside, polarisation)
             squares.append(np.asarray(abs2(b.upper * b.lower)))
     return float(np.sqrt(np.nanmax(np.stack(squares))))
-
-
-def _extreme_angles(scene: Scene) -> list[Any]:
-    """The angles of incidence in radians, also at the rim of a cone; None is normal incidence."""
-    shift = upper(scene.instrument.angle_shift)
-    angle = None if normal_incidence(scene) else jnp.deg2rad(scene.light.angle + shift)
-    if not scene.instrument.has_cone:
-        return [angle]
-    rim = (0.0 if angle is None else angle) + scene.instrument.largest_half_angle(least_ambient(scene))
-    return [angle, jnp.minimum(rim, jnp.pi / 2)]
 
 
 Build = Callable[[Plan], Callable[[Any], Any]]
@@ -148,7 +141,7 @@ def design(scene: Any) -> np.ndarray:
     from scipy.stats import qmc  # slow to import
 
     lower, upper = (np.array([getattr(f, side) for f in free]) for side in ("lower", "upper"))
-    corners = [*itertools.islice(itertools.product(*zip(lower, upper, strict=True)), CORNERS)]
+    corners = _corners(scene)
     between = qmc.Sobol(len(free), rng=np.random.default_rng(0)).random(POINTS)
     start = np.tile(start_values(scene), (_BATCH - len(corners) % _BATCH, 1))  # whole batches compile faster
     return np.concatenate([corners, start, lower + between * (upper - lower)])
@@ -177,7 +170,8 @@ class Evaluation(NamedTuple):
         """
         structure, free, *numbers = _split(self.scene, self.points)
         numbers = jax.device_put(numbers)
-        runs = [partial(_signals, self.build, plan.static_key, structure, free, *numbers) for plan in plans]
+        known = False, structure, free, *numbers
+        runs = [partial(_signals, self.build, plan.static_key, *known) for plan in plans]
         times: list[list[float]] = [[] for _ in runs]
         jax.block_until_ready([run() for run in runs])  # compiles
         end = time.perf_counter() + TIMING_SECONDS
@@ -189,22 +183,25 @@ class Evaluation(NamedTuple):
         return [statistics.median(some) for some in times]
 
     def slope_change(self, one: Plan, other: Plan, count: int) -> float:
-        """`largest_slope_change` between two plans at the last `count` points; 0 if nothing is free."""
+        """Largest difference of derivatives between two plans at the last `count` points, relative to the
+        largest derivative of each parameter by the first plan; 0 if nothing is free."""
         if not self.points.shape[1]:
             return 0.0
         last = self.points[-count:]
-        return largest_slope_change(*(gradients(plan, self.scene, last, self.build) for plan in (one, other)))
+        first, second = (gradients(plan, self.scene, last, self.build) for plan in (one, other))
+        apart, size = (np.max(np.abs(x), axis=(0, 1), initial=0.0) for x in (first - second, first))
+        return float(np.max(apart / np.where(size > 0, size, 1.0), initial=0.0))
 
 
 def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
     each wavelength (and ratio), for a surface the channels of each pair of directions."""
-    return np.asarray(_signals(build, plan.static_key, *_split(scene, points)), dtype=float)
+    return np.asarray(_signals(build, plan.static_key, False, *_split(scene, points)), dtype=float)
 
 
 def gradients(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Derivatives of the signal in the free parameters at each point, (points, values, parameters)."""
-    return np.asarray(_gradients(build, plan.static_key, *_split(scene, points)), dtype=float)
+    return np.asarray(_signals(build, plan.static_key, True, *_split(scene, points)), dtype=float)
 
 
 def largest_difference(one: np.ndarray, other: np.ndarray, degrees: bool) -> float:
@@ -219,46 +216,27 @@ def largest_difference(one: np.ndarray, other: np.ndarray, degrees: bool) -> flo
     return float(np.max(np.where(np.isfinite(apart), apart, np.inf), initial=0.0))
 
 
-def largest_slope_change(one: np.ndarray, other: np.ndarray) -> float:
-    """Largest difference of two arrays of gradients, relative to the largest derivative of each parameter in
-    the first."""
-    apart, size = (np.max(np.abs(x), axis=(0, 1), initial=0.0) for x in (one - other, one))
-    return float(np.max(apart / np.where(size > 0, size, 1.0), initial=0.0))
-
-
 def _split(scene: Any, points: np.ndarray) -> tuple[Any, tuple[bool, ...], list[Any], np.ndarray]:
     """The static arguments of a program (structure, and which leaves are free) and its numbers."""
-    leaves = jax.tree_util.tree_leaves(scene, is_leaf=is_free)
     fixed, structure = jax.tree_util.tree_flatten(insert(scene, points[0]))
-    free = tuple(is_free(leaf) for leaf in leaves)
+    free = tuple(map(is_free, jax.tree_util.tree_leaves(scene, is_leaf=is_free)))
     return structure, free, [x for x, f in zip(fixed, free, strict=True) if not f], points
 
 
-def _join(structure: Any, free: tuple[bool, ...], fixed: list[Any], values: Any) -> Any:
-    free_values, fixed_values = iter(values), iter(fixed)
-    leaves = [next(free_values) if f else next(fixed_values) for f in free]
-    return jax.tree_util.tree_unflatten(structure, leaves)
-
-
-@partial(jax.jit, static_argnums=(0, 1, 2, 3))
+@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
 def _signals(
-    build: Build, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
+    build: Build, plan: Plan, derive: bool, structure: Any, free: tuple[bool, ...], fixed: list, points: Any
 ) -> Any:
+    """Signals, or their derivatives in the free numbers, a few points at a time: a cone of light over a long
+    spectrum would not fit into memory at once."""
     simulate = build(plan)
-    return _in_batches(lambda v: jnp.ravel(simulate(_join(structure, free, fixed, v))), points)
 
+    def signal(values: Any) -> Any:
+        numbers, others = iter(values), iter(fixed)
+        leaves = [next(numbers if is_free else others) for is_free in free]
+        return jnp.ravel(simulate(jax.tree_util.tree_unflatten(structure, leaves)))
 
-@partial(jax.jit, static_argnums=(0, 1, 2, 3))
-def _gradients(
-    build: Build, plan: Plan, structure: Any, free: tuple[bool, ...], fixed: list[Any], points: Any
-) -> Any:
-    simulate = build(plan)
-    return _in_batches(jax.jacfwd(lambda v: jnp.ravel(simulate(_join(structure, free, fixed, v)))), points)
-
-
-def _in_batches(function: Callable[[Any], Any], points: Any) -> Any:
-    """`function` at each point, a few at a time: a cone of light over a long spectrum would not fit into
-    memory at once."""
+    function = jax.jacfwd(signal) if derive else signal
     return jax.lax.map(function, points, batch_size=min(_BATCH, len(points)))
 
 

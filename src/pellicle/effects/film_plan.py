@@ -6,7 +6,7 @@ from functools import partial
 
 import jax
 
-from pellicle.effects import anisotropy, averaging, gradient, presence
+from pellicle.effects import averaging, gradient, presence
 from pellicle.effects.differences import Evaluation, Savings, design, measured
 from pellicle.effects.removal import (
     REMOVABLE,
@@ -27,7 +27,7 @@ from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, absorbs
 
 EFFECTS = (
-    *(presence.absorption, anisotropy.anisotropy, presence.stack, gradient.gradient, presence.roughness),
+    *(presence.absorption, presence.anisotropy, presence.stack, gradient.gradient, presence.roughness),
     *(presence.tunnelling, presence.oblique, presence.polarisation, presence.transmission),
     *(presence.back_face, averaging.coherence, averaging.orders, averaging.angle_spread),
     *(presence.dispersion, presence.opaque, presence.precision),
@@ -76,8 +76,11 @@ def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan
 
 
 def full_plan(scene: Scene) -> Plan:
-    """The exact plan with averages taken over nodes in place of orders of interference."""
-    return _by_nodes(exact(scene), scene)
+    """The exact plan with the closed form averaged over nodes in place of orders, whose phase is linear."""
+    plan = exact(scene)
+    if not plan.row("orders").count:
+        return plan
+    return plan.with_rows(averaging.coherence_by_nodes(scene), Row("orders", False, "nodes instead"))
 
 
 def evaluation(scene: Scene) -> Evaluation:
@@ -95,14 +98,6 @@ def savings(scene: Scene, chosen: Plan) -> Savings:
     with jax.enable_x64(True):
         cheaper = {effect: alternatives(effect, scene)[:1] for effect in REMOVABLE}
         return measured(full_plan(scene), chosen, cheaper, evaluation(scene))
-
-
-def _by_nodes(plan: Plan, scene: Scene) -> Plan:
-    """The plan with the closed form averaged over nodes in place of orders, whose phase is linear."""
-    if not plan.row("orders").count:
-        return plan
-    rows = {"coherence": averaging.coherence_by_nodes(scene), "orders": Row("orders", False, "nodes instead")}
-    return replace(plan, rows=tuple(rows.get(row.effect, row) for row in plan.rows))
 
 
 def _by_orders(stage: Stage) -> Iterator[Step]:
@@ -153,5 +148,4 @@ def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
                 around |= 1  # odd: see `lens_rays`
             why = f"{count} suffice of {row.count}: {row.why}"
             cheaper = replace(row, count=count, around=around, why=why)
-            rows = tuple(cheaper if r.effect == effect else r for r in stage.plan.rows)
-            yield Step(replace(stage.plan, rows=rows), stage.scene, cheaper)
+            yield Step(stage.plan.with_rows(cheaper), stage.scene, cheaper)

@@ -1,23 +1,124 @@
 """Presence of each effect in a scene, judged from types and from the *bounds* of free parameters.
 
 Start values decide nothing: a layer whose k is free and starts at 0 keeps its absorption, because
-dR/dk is not 0 there.
+dR/dk is not 0 there. Anisotropic media have closed forms of s and p, or the 4×4 method where s and p mix.
 """
 
 import numpy as np
 
-from pellicle.dispersion.anisotropic import isotropic_in_plane, mixes_polarisations, principal_media
+from pellicle.dispersion.anisotropic import (
+    Anisotropic,
+    isotropic_in_plane,
+    mixes_polarisations,
+    principal_media,
+)
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
-from pellicle.effects.anisotropy import scene_media
-from pellicle.effects.differences import normal_incidence, upper
-from pellicle.forward_model.plan import Row
+from pellicle.effects.differences import largest_attenuation, normal_incidence, upper
+from pellicle.errors import UsageError
+from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL, SLICED, Row
 from pellicle.materials import Material
+from pellicle.optics.berreman.slices import DIRECT
 from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Interface, Quantity, absorbs
+from pellicle.scene.surface import SurfaceView
+
+
+def anisotropy(scene: Scene) -> Row:
+    """On where a medium is anisotropic, by matrices of 2×2 or 4×4, chosen by the type of its orientation.
+
+    **Raises:** UsageError for what is not computed: see `_check`.
+    """
+    media = [medium for medium in scene_media(scene) if isinstance(medium, Anisotropic)]
+    apart = "s and p stay apart" + (
+        ", r_ps = r_sp = 0" if scene.light.kind.degrees and scene.light.kind.parts else ""
+    )
+    if scene.light.azimuth is not None and all(map(isotropic_in_plane, media)):
+        apart += ", and the azimuth of the sample has no effect"
+    if not media:
+        unusual = apart != "s and p stay apart"
+        return Row("anisotropy", False, "no medium is birefringent" + f": {apart}" * unusual)
+    _check(scene)
+    if any(map(mixes_polarisations, media)):
+        why = "an optic axis is tilted or its angles are free: s and p mix, matrices of 4×4"
+        if not any(map(mixes_polarisations, scene_media(scene, turned=False))):
+            turns = "the rays of the cone have different planes of incidence"
+            turns = turns if scene.light.azimuth is None else "the sample is turned"
+            why = f"{turns}: s and p mix, matrices of 4×4"
+        mixing = [x for x in coherent_layers(scene) if mixes_polarisations(_turned(x.material, scene))]
+        # one of the waves that mix in a layer may be absorbed while the other passes
+        if all(largest_attenuation(x.material, x.thickness, scene) <= DIRECT for x in mixing):
+            return Row("anisotropy", True, why, count=GENERAL)
+        return Row("anisotropy", True, f"{why}, in slices where one wave decays", count=SLICED)
+    why = f"axes along the normal and the plane of incidence: {apart}, closed forms of 2×2"
+    if scene.light.ellipsometric and groups(scene)[1]:
+        why = f"{why}, and 4×4 where light crosses absorbing layers to the back face"
+    return Row("anisotropy", True, why, count=CLOSED_FORMS)
+
+
+def scene_media(scene: Scene, turned: bool = True) -> list[AbstractDispersion]:
+    """Every medium of a scene but the ambient, from the top down; interfaces have none of their own.
+
+    They are `turned` by the azimuth of the sample and, in a cone of light, against the planes of incidence of
+    its rays.
+    """
+    back = [] if scene.substrate.back is None else [scene.substrate.back]
+    layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
+    media = [*layers, scene.substrate.material, *back]
+    return [_turned(medium, scene) for medium in media] if turned else media
+
+
+def _turned(medium: AbstractDispersion, scene: Scene) -> AbstractDispersion:
+    azimuth = scene.light.azimuth
+    if azimuth is None and scene.instrument.has_cone:
+        azimuth = 0.0
+    return medium.turned(azimuth) if azimuth is not None and isinstance(medium, Anisotropic) else medium
+
+
+def _check(scene: Scene) -> None:
+    """UsageError for an anisotropic medium where it is not computed."""
+    if is_graded(scene):
+        raise UsageError("a graded layer and a birefringent medium in one scene are not computed: omit one")
+    thick = [_turned(plate.material, scene) for plate in groups(scene)[1]]
+    if any(map(mixes_polarisations, thick)):
+        axis = "the optic axis of an incoherent plate must be the normal"
+        if scene.instrument.has_cone:
+            axis = f"in a cone of light {axis}: give its angles as 0"
+        else:
+            axis += " or along the plane of incidence: give its angles as 0 or 90"
+        raise UsageError(f"{axis}, or the plate one index")
+    if scene.light.ellipsometric and any(isinstance(m, Anisotropic) for m in thick):
+        raise UsageError(
+            "the polarisation of light from the back face of a birefringent plate is not computed: leave out"
+            " `back`, or measure R or T"
+        )
+    mixed = any(map(mixes_polarisations, scene_media(scene)))
+    if mixed and any(isinstance(medium, Anisotropic) for medium in thick):
+        raise UsageError(
+            "a birefringent plate in a scene whose optic axis is tilted elsewhere is not computed: give the"
+            " plate one index"
+        )
+    if roughness(scene).on and not computes_roughness(scene):
+        if mixed:
+            raise UsageError(
+                "`roughness` under a tilted optic axis is not computed: in its place put a layer on top, of"
+                " twice that thickness, whose principal media are mixtures with the ambient, half of each"
+            )
+        raise UsageError(
+            "`roughness` of a birefringent film on a plate is computed for R and T only: leave out one of"
+            " `roughness` and `back`"
+        )
+
+
+def computes_roughness(scene: Scene) -> bool:
+    """True where rough faces of a scene are computed: not where s and p mix, or lose their phase."""
+    media = scene_media(scene)
+    phase_lost = scene.light.ellipsometric and groups(scene)[1]
+    birefringent = any(isinstance(medium, Anisotropic) for medium in media)
+    return not (any(map(mixes_polarisations, media)) or (birefringent and phase_lost))
 
 
 def absorption(scene: Scene) -> Row:
@@ -66,26 +167,24 @@ def tunnelling(scene: Scene) -> Row:
     """Off where every real index is provably above n₀ sin θ: the square root then needs no branch."""
     if not oblique(scene).on:
         return Row("tunnelling", False, "normal incidence: every wave propagates")
-    unsure = [name for name, m in _media(scene) if not absorbs(m) and not _propagates(m, scene)]
+    unsure = dict.fromkeys(x for x, m in _media(scene) if not absorbs(m) and not _propagates(m, scene))
     if unsure:
-        named = " and ".join(dict.fromkeys(unsure))
-        return Row("tunnelling", True, f"total reflection in the {named} is possible")
+        return Row("tunnelling", True, f"total reflection in the {' and '.join(unsure)} is possible")
     return Row("tunnelling", False, "no real index can fall below n₀ sin θ")
 
 
 def _media(scene: Scene) -> list[tuple[str, AbstractDispersion]]:
     """Every medium that a wave enters, with its name in messages; of anisotropic ones the principal media."""
-    own = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
-    names = {id(material): name(scene, i) for i, material in own}
-    coherent = [
-        (names.get(id(x.material), "interface"), part)
-        for x in coherent_layers(scene)
-        for part in (
-            (x.material.first, x.material.second) if isinstance(x.material, Graded) else (x.material,)
-        )
+    layers = [(i, x.material) for i, x in enumerate(scene.layers) if not isinstance(x, Interface)]
+    names = {id(material): name(scene, i) for i, material in layers}
+    named = [(names.get(id(x.material), "interface"), x.material) for x in coherent_layers(scene)]
+    named += [(names.get(id(g.below), "substrate"), g.below) for g in groups(scene)[0]]
+    return [
+        (name, principal)
+        for name, medium in named
+        for part in ((medium.first, medium.second) if isinstance(medium, Graded) else (medium,))
+        for principal in principal_media(part)
     ]
-    thick = [(names.get(id(g.below), "substrate"), g.below) for g in groups(scene)[0]]
-    return [(name, own) for name, medium in (*coherent, *thick) for own in principal_media(medium)]
 
 
 def name(scene: Scene, position: int) -> str:
@@ -161,13 +260,11 @@ def dispersion(scene: Scene) -> Row:
     at = scene.light.wavelength
     media = [*_media(scene), ("ambient", scene.ambient)]
     bare = [(name, m.dispersion if isinstance(m, Material) else m) for name, m in media]
-    varying = [name for name, m in bare if not isinstance(m, Constant)]
+    varying = dict.fromkeys(name for name, m in bare if not isinstance(m, Constant))
     if at is not None and np.size(np.unique(at)) == 1:
         return Row("dispersion", False, "one wavelength")
-    if not varying:
-        return Row("dispersion", False, "no index varies with the wavelength")
-    named = " and ".join(dict.fromkeys(varying))
-    return Row("dispersion", True, f"the index of {named} varies with the wavelength")
+    words = f"the index of {' and '.join(varying)}" if varying else "no index"
+    return Row("dispersion", bool(varying), f"{words} varies with the wavelength")
 
 
 def opaque(scene: Scene) -> Row:
@@ -175,6 +272,6 @@ def opaque(scene: Scene) -> Row:
     return Row("opaque", False, "light may reach every layer and the substrate")
 
 
-def precision(scene: Scene) -> Row:
-    """On: only a tolerance permits single precision (`pellicle.effects.film_plan`)."""
+def precision(scene: Scene | SurfaceView) -> Row:
+    """On: only a tolerance permits single precision (`effects.film_plan`, `effects.surface_plan`)."""
     return Row("precision", True, "double precision, where JAX has it enabled")

@@ -18,6 +18,7 @@ from pellicle.brdf.directions import angle_to_half
 from pellicle.brdf.film_colour import node_count
 from pellicle.brdf.sensor_bands import ERROR
 from pellicle.effects.differences import Evaluation, Savings, design, measured, signals
+from pellicle.effects.presence import precision
 from pellicle.effects.removal import (
     Stage,
     Step,
@@ -66,17 +67,12 @@ def bands(view: SurfaceView) -> Row:
 
 def roughness(view: SurfaceView) -> Row:
     """On where there is a lobe."""
-    if "specular" not in _keys(view):
-        return Row("roughness", False, "the diffuse part alone: no lobe")
     if "specular" not in view.numbers:
-        return Row("roughness", False, "the lobe has no weight")
+        weightless = "specular" in _keys(view)
+        why = "the lobe has no weight" if weightless else "the diffuse part alone: no lobe"
+        return Row("roughness", False, why)
     lobe = "a lobe of GGX microfacets" if "roughness" in view.numbers else "cosine lobes"
     return Row("roughness", True, lobe)
-
-
-def deviation(view: SurfaceView) -> Row | None:
-    """On where the two normals may differ; only models with two boundaries have them."""
-    return _of_number(view, "deviation", "the angle between the two normals", "the boundaries are parallel")
 
 
 def multiple_scattering(view: SurfaceView) -> Row | None:
@@ -89,35 +85,23 @@ def multiple_scattering(view: SurfaceView) -> Row | None:
     return Row("multiple-scattering", "specular" in view.numbers, why)
 
 
-def coat(view: SurfaceView) -> Row | None:
-    """On where a clear coat may have a lobe; only models with a coat have one."""
-    return _of_number(view, "coat", "the lobe of the clear coat", "the clear coat has no lobe")
-
-
-def diffuse(view: SurfaceView) -> Row | None:
-    """On where there may be a diffuse part."""
-    return _of_number(view, "diffuse", "the diffuse part", "there is no diffuse part")
-
-
-def absorption(view: SurfaceView) -> Row | None:
-    """On where the extinction of the film is free or not zero; only microfacet models have one."""
-    row = _of_number(view, "k", "the film's extinction", "the film has no extinction")
-    return None if row is None else Row("absorption", row.on, row.why)
-
-
 def _keys(view: SurfaceView) -> set[str]:
     return {parameter.key for parameter in view.brdf.parameters}
 
 
-def _of_number(view: SurfaceView, key: str, what: str, absent: str) -> Row | None:
-    """The row of an effect with a number of its own; None where the model does not have it."""
-    if key not in _keys(view):
-        return None
-    if key not in view.numbers:
-        return Row(key, False, absent)
-    number = view.numbers[key]
-    free = any(map(is_free, number)) if isinstance(number, list) else is_free(number)
-    return Row(key, True, f"{what} is {'free' if free else 'not zero'}")
+def of_number(effect: str, key: str, what: str, absent: str) -> Callable[[SurfaceView], Row | None]:
+    """Judge of an effect that is on where a number is free or not zero, for models that have the number."""
+
+    def judge(view: SurfaceView) -> Row | None:
+        if key not in _keys(view):
+            return None
+        if key not in view.numbers:
+            return Row(effect, False, absent)
+        number = view.numbers[key]
+        free = any(map(is_free, number)) if isinstance(number, list) else is_free(number)
+        return Row(effect, True, f"{what} is {'free' if free else 'not zero'}")
+
+    return judge
 
 
 def coherence(view: SurfaceView) -> Row:
@@ -183,13 +167,14 @@ def _totally_reflecting(view: SurfaceView) -> list[str]:
     ]
 
 
-def precision(view: SurfaceView) -> Row:
-    """On: only a tolerance permits single precision."""
-    return Row("precision", True, "double precision, where JAX has it enabled")
-
-
 JUDGES = (
-    *(spectral_sampling, bands, roughness, multiple_scattering, deviation, coat, diffuse, absorption),
+    *(spectral_sampling, bands, roughness, multiple_scattering),
+    # only models with two boundaries have two normals, only those with a coat its lobe, and only microfacet
+    # models an extinction
+    of_number("deviation", "deviation", "the angle between the two normals", "the boundaries are parallel"),
+    of_number("coat", "coat", "the lobe of the clear coat", "the clear coat has no lobe"),
+    of_number("diffuse", "diffuse", "the diffuse part", "there is no diffuse part"),
+    of_number("absorption", "k", "the film's extinction", "the film has no extinction"),
     *(coherence, tunnelling, oblique, polarisation, precision),
 )
 """One function for each effect of a surface, in the order of a plan; it returns None where the model cannot
@@ -198,8 +183,8 @@ have the effect."""
 
 def exact(view: SurfaceView) -> Plan:
     """The effects that a surface has; one is off only where it is provably absent."""
-    rows = [judge(view) for judge in JUDGES]
-    return Plan(tuple(row for row in rows if row is not None), SURFACE, view.polarisation)
+    rows = tuple(row for judge in JUDGES if (row := judge(view)) is not None)
+    return Plan(rows, SURFACE, view.polarisation)
 
 
 def largest_angle(view: SurfaceView) -> float:
@@ -210,9 +195,9 @@ def largest_angle(view: SurfaceView) -> float:
 
 def _bound(number: Any, side: str) -> float:
     """The largest (side "upper") or smallest value of a number, or of the bounds of a free one."""
-    each = number if isinstance(number, list) else [number]
-    values = [getattr(x, side) if isinstance(x, Free) else np.asarray(x) for x in each]
-    return float(max(map(np.max, values)) if side == "upper" else min(map(np.min, values)))
+    parts = number if isinstance(number, list) else [number]
+    values = np.concatenate([np.ravel(getattr(x, side) if isinstance(x, Free) else x) for x in parts])
+    return float(np.max(values) if side == "upper" else np.min(values))
 
 
 FLOOR = 0.01 / math.pi
@@ -234,9 +219,9 @@ def plan(view: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) ->
     if tolerance == 0:
         return exact(view)
     kept = set(keep)
-    removals = [partial(_removal, effect) for effect in REMOVABLE if effect not in kept]
+    moves = [partial(_removal, effect) for effect in REMOVABLE if effect not in kept]
     with jax.enable_x64(True):
-        moves = [*removals, *([] if "oblique" in kept else [_by_nodes])]
+        moves += [] if "oblique" in kept else [_by_nodes]
         return reduced_plan(exact(view), view, evaluation(view), moves, tolerance)
 
 
@@ -263,27 +248,30 @@ def _removal(effect: str, stage: Stage) -> Iterator[Step]:
     """Removal of one effect, where it is present and something else remains."""
     numbers = stage.scene.numbers
     present = any(row.effect == effect and row.on for row in stage.plan.rows)
-    other = {"roughness": "diffuse", "coat": "specular", "diffuse": "specular"}.get(effect)
-    if effect == "coherence":
-        removable = not is_free(numbers.get("thickness"))  # without interference it has no gradient
-    else:
-        removable = other is None or other in numbers
-    removals = [SurfaceRemoval(effect)] if present and removable else []
+    # without interference a thickness has no gradient
+    lost = effect == "coherence" and is_free(numbers.get("thickness"))
+    stays = lost or not present or not something_left(effect, stage.scene)
+    removals = [] if stays else [SurfaceRemoval(effect)]
     return removal_steps(stage, removals, exact, lambda _: left_out_row(stage.plan.row(effect)))
 
 
 def _by_nodes(stage: Stage) -> Iterator[Step]:
     """The colour of the film at more and more angles, while they are fewer than the samples."""
     rows = {row.effect: row for row in stage.plan.rows}
-    if "oblique" not in rows or not (rows["oblique"].on and rows["roughness"].on and rows["coherence"].on):
+    if "oblique" not in rows or not all(rows[x].on for x in ("oblique", "roughness", "coherence")):
         return
-    for count in NODES:
-        if 4 * count > len(stage.scene.i):
-            break
+    for count in (n for n in NODES if 4 * n <= len(stage.scene.i)):
         why = f"{rows['oblique'].why.partition(':')[0]}: the film's colour at {count} angles"
         row = replace(rows["oblique"], count=count, why=why)
-        nodes = tuple(row if r.effect == "oblique" else r for r in stage.plan.rows)
-        yield Step(replace(stage.plan, rows=nodes), stage.scene, row)
+        yield Step(stage.plan.with_rows(row), stage.scene, row)
+
+
+def something_left(effect: str, view: SurfaceView) -> bool:
+    """True where a surface reflects without one of its effects."""
+    return {"roughness": "diffuse", "coat": "specular", "diffuse": "specular"}.get(effect) in (
+        None,
+        *view.numbers,
+    )
 
 
 _LOBES = ("specular", "roughness", "exponent", "exponent_reflection", "exponent_transmission")
@@ -302,9 +290,9 @@ class SurfaceRemoval:
 
 def _roughness(view: SurfaceView) -> SurfaceView:
     """Keep the diffuse part alone; where that is grey, nothing of the layer remains."""
-    if view.model in LAYERED:
-        return _drop(view, *_LOBES, *_NORMALS)
-    return _drop(view, *(view.numbers.keys() - {"wavelengths", "weights", "diffuse"}))
+    layered = view.model in LAYERED
+    grey = view.numbers.keys() - {"wavelengths", "weights", "diffuse"}
+    return _drop(view, *((*_LOBES, *_NORMALS) if layered else grey))
 
 
 def _spectral_sampling(view: SurfaceView) -> SurfaceView:

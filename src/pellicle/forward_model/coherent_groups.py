@@ -68,6 +68,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
             internal = _per_polarisation(partial(_internal, medium, a, plates[i], wavelength), medium)
             part = plates[i].back_collected, plates[i].back_reflections
             collected = plate.Collection(*part) if any(x is not None for x in part) else None
+        smooth = all(face is None for face in group.roughness)
+        rough = [0.0 if face is None else 2 * jnp.pi / wavelength * face for face in group.roughness]
         evaluated.append(
             CoherentGroup(
                 above=thick[i],
@@ -77,18 +79,11 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
                 angle=angle if i == 0 or angle is None else interface.Inside(a),
                 internal=internal,
                 collected=collected,
-                roughness=_roughness(group, wavelength),
+                roughness=None if smooth else rough,
                 phase_variance=_phase_variance(plan, scene, group, angle),
             )
         )
     return evaluated
-
-
-def _roughness(group: Group, wavelength: Any) -> list[Any] | None:
-    if all(face is None for face in group.roughness):
-        return None
-    wavenumber = 2 * jnp.pi / wavelength
-    return [0.0 if face is None else wavenumber * face for face in group.roughness]
 
 
 def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
@@ -104,27 +99,18 @@ def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisatio
     return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
 
 
-def reflected(plan: Plan, groups: list[CoherentGroup], polarisation: str):
-    """R of the first group and everything below it."""
+def power(plan: Plan, groups: list[CoherentGroup], polarisation: str, transmitted: bool) -> Any:
+    """R of the first group and everything below it, or T through them into the last medium."""
     group, *below = groups
     powers = _powers(plan, group, polarisation)
     if not below:
-        return powers.R()
+        return powers.T() if transmitted else powers.R()
     front = plate.Face(powers.R(), powers.T(), powers.R_below())
-    back, internal = reflected(plan, below, polarisation), _of(group.internal, polarisation)
-    return plate.plate_reflectance(front, back, internal, group.collected)
-
-
-def transmitted(plan: Plan, groups: list[CoherentGroup], polarisation: str):
-    """T through the first group and everything below it, into the last medium."""
-    group, *below = groups
-    powers = _powers(plan, group, polarisation)
-    if not below:
-        return powers.T()
-    front = plate.Face(powers.R(), powers.T(), powers.R_below())
-    back, passed = reflected(plan, below, polarisation), transmitted(plan, below, polarisation)
-    internal = _of(group.internal, polarisation)
-    return plate.plate_transmittance(front, back, passed, internal, group.collected)
+    back = power(plan, below, polarisation, False)
+    medium = _of(group.internal, polarisation), group.collected
+    if not transmitted:
+        return plate.plate_reflectance(front, back, *medium)
+    return plate.plate_transmittance(front, back, power(plan, below, polarisation, True), *medium)
 
 
 class _Powers(NamedTuple):
@@ -137,23 +123,16 @@ class _Powers(NamedTuple):
 
 def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
     if not group.layers and group.roughness is None:
-        return _bare_face(group, polarisation)
+        above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
+        a, q_above = interface.transverse(above, group.angle)
+        face = (above, q_above, below, interface.normal(below, a), polarisation)
+        reflectance = partial(interface.reflectance, *face)
+        return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
     if plan.on("orders"):
         return _damped_orders(plan, group, polarisation)
     amplitudes = response_of(plan, group, polarisation)
-    return _Powers(
-        partial(response.reflectance, amplitudes),
-        partial(response.transmittance, amplitudes),
-        partial(response.reflectance_below, amplitudes),
-    )
-
-
-def _bare_face(group: CoherentGroup, polarisation: str) -> _Powers:
-    above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
-    a, q_above = interface.transverse(above, group.angle)
-    face = (above, q_above, below, interface.normal(below, a), polarisation)
-    reflectance = partial(interface.reflectance, *face)
-    return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
+    functions = response.reflectance, response.transmittance, response.reflectance_below
+    return _Powers(*(partial(function, amplitudes) for function in functions))
 
 
 def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
@@ -167,9 +146,8 @@ def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powe
     """Sums of orders of interference, each damped by the instrument."""
     layer = interface.allow_tunnelling(group.layers[0]) if plan.on("tunnelling") else group.layers[0]
     series = orders.airy_series(group.above, layer, group.below, group.phases[0], group.angle, polarisation)
-    damped = group.phase_variance is not None
     variance = _of(group.phase_variance, polarisation)
-    window = orders.gaussian(variance) if damped else orders.monochromatic
+    window = orders.monochromatic if group.phase_variance is None else orders.gaussian(variance)
     count = plan.row("orders").count
     from_below = orders.reversed_series(series)
     return _Powers(
@@ -188,7 +166,6 @@ def _phase_variance(plan: Plan, scene: Scene, group: Group, angle: Any) -> Any:
     if widths == (None, None):
         return None
     wavelength = scene.light.wavelength
-
     bandwidth, spread = (0.0 if width is None else width for width in widths)
 
     def variance(polarisation):

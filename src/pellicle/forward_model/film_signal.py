@@ -22,9 +22,8 @@ from pellicle.forward_model import mixed_polarisations
 from pellicle.forward_model.coherent_groups import (
     CoherentGroup,
     coherent_groups,
-    reflected,
+    power,
     response_of,
-    transmitted,
 )
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, materials_in
@@ -41,48 +40,43 @@ Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
 
 
-def _weighted(at: Callable[[Any], Any], nodes: Any, weights: np.ndarray, wavelength: Any) -> Any:
-    """Σ weights · at(nodes), in the precision of the wavelengths."""
-    like = jnp.result_type(wavelength)
-    return _weighted_mean(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)))
-
-
 def _weighted_mean(weights: Any, rows: list[Any]) -> list[Any]:
     """Σ weights · row over the first axis of each row."""
     return [jnp.tensordot(weights, row, 1) for row in rows]
 
 
-def over_bandwidth(simulate: Intensities, count: int) -> Intensities:
-    """The mean over the window of the spectrometer, a normal distribution with the bandwidth as its FWHM."""
+def over_normal(
+    simulate: Intensities, count: int, shifted: Callable[[Scene, Any], tuple[Callable[[Any], Any], Any]]
+) -> Intensities:
+    """The mean over a normal distribution of one number of a scene.
+
+    `shifted(scene, node)` is where that number is, and its value `node` standard deviations from its own.
+    """
     nodes, weights = normal_rule(count)
 
     def average(scene: Scene):
-        bandwidth: Any = scene.instrument.bandwidth
+        like = jnp.result_type(scene.light.wavelength)
 
         def at(node):
-            shifted = scene.light.wavelength + node * (bandwidth / FWHM)
-            return simulate(eqx.tree_at(lambda s: s.light.wavelength, scene, shifted))
+            where, value = shifted(scene, node)
+            return simulate(eqx.tree_at(where, scene, value))
 
-        return _weighted(at, nodes, weights, scene.light.wavelength)
+        return _weighted_mean(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)))
 
     return average
 
 
-def over_thickness(simulate: Intensities, count: int, position: int) -> Intensities:
-    """The mean over the thickness spread of one layer, a normal distribution truncated at 0."""
-    nodes, weights = normal_rule(count)
+def _of_bandwidth(scene: Scene, node: Any) -> tuple[Callable[[Any], Any], Any]:
+    """A wavelength in the window of the spectrometer, whose FWHM is the bandwidth."""
+    bandwidth: Any = scene.instrument.bandwidth
+    return lambda s: s.light.wavelength, scene.light.wavelength + node * (bandwidth / FWHM)
 
-    def average(scene: Scene):
-        layer: Any = scene.layers[position]
-        spread = thickness_spread(scene, layer)
 
-        def at(node):
-            uneven = jnp.maximum(layer.thickness + node * spread, 0.0)
-            return simulate(eqx.tree_at(lambda s: s.layers[position].thickness, scene, uneven))
-
-        return _weighted(at, nodes, weights, scene.light.wavelength)
-
-    return average
+def _of_thickness(position: int, scene: Scene, node: Any) -> tuple[Callable[[Any], Any], Any]:
+    """A thickness within the spread of one layer, 0 at least."""
+    layer: Any = scene.layers[position]
+    uneven = jnp.maximum(layer.thickness + node * thickness_spread(scene, layer), 0.0)
+    return lambda s: s.layers[position].thickness, uneven
 
 
 def cone_sine(scene: Scene) -> Any:
@@ -141,14 +135,10 @@ def over_lens(of_ray: Callable[[Turn], Intensities], count: int, around: int) ->
     return average
 
 
-def power_mix(polarisation: str) -> Callable[[Any, Any, Any], Any]:
+def mixed_powers(polarisation: str, rows: Any, cosine: Any, square: Any) -> list[Any]:
     """Weighted sum of s and p of a ray: one half each for unpolarised light, else by the lens's rotation."""
-
-    def mix(rows, cosine, square):
-        half = {"s": 0.5, "p": -0.5, "unpolarised": 0.0}[polarisation] * cosine
-        return [(0.5 + half) * rows[0] + (0.5 - half) * rows[1]]
-
-    return mix
+    half = {"s": 0.5, "p": -0.5, "unpolarised": 0.0}[polarisation] * cosine
+    return [(0.5 + half) * rows[0] + (0.5 - half) * rows[1]]
 
 
 def turned_stokes(rows: Any, cosine: Any, square: Any) -> Any:
@@ -162,14 +152,8 @@ def turned_stokes(rows: Any, cosine: Any, square: Any) -> Any:
     """
     n, c, s, intensity = rows
     sine = 1 - square
-    return [
-        n * cosine,
-        c * square - intensity * sine,
-        s * cosine,
-        intensity,
-        intensity * square - c * sine,
-        c,
-    ]
+    c_turned, m22 = c * square - intensity * sine, intensity * square - c * sine
+    return [n * cosine, c_turned, s * cosine, intensity, m22, c]
 
 
 Simulate = Callable[[Scene], Any]
@@ -251,7 +235,7 @@ def build(plan: Plan) -> Simulate:
     if cone.on and mixed:
         intensities = over_lens(of_ray, cone.count, cone.around)
     elif cone.on:
-        mix = turned_stokes if ellipsometric else power_mix(plan.polarisation)
+        mix = turned_stokes if ellipsometric else partial(mixed_powers, plan.polarisation)
         intensities = over_cone(intensities, cone.count, cone.around, mix)
 
     def simulate(scene: Scene) -> Any:
@@ -304,9 +288,9 @@ def _averaged(intensities: Intensities, count: int) -> Intensities:
         averaged = intensities
         for position, layer in enumerate(scene.layers):
             if isinstance(layer, Layer) and thickness_spread(scene, layer) is not None:
-                averaged = over_thickness(averaged, count, position)
+                averaged = over_normal(averaged, count, partial(_of_thickness, position))
         if scene.instrument.bandwidth is not None:
-            averaged = over_bandwidth(averaged, count)
+            averaged = over_normal(averaged, count, _of_bandwidth)
         return averaged(scene)
 
     return average
@@ -329,12 +313,11 @@ def _normalised_rows(rows: Sequence[Any]) -> Sequence[Any]:
 
 def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     """R or T of one polarisation, or of both."""
-    power = transmitted if plan.kind.transmitted else reflected
     polarisations = "sp"
     if not plan.on("polarisation"):
         one = (plan.on("oblique") or plan.on("anisotropy")) and plan.polarisation != "unpolarised"
         polarisations = plan.polarisation if one else "s"
-    return [power(plan, groups, p) for p in polarisations]
+    return [power(plan, groups, p, plan.kind.transmitted) for p in polarisations]
 
 
 def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes:
@@ -347,9 +330,8 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
         if through:
             raise UsageError(mixed_polarisations.NO_PLATE)
         return mixed_polarisations.stokes(plan, groups)
-    s, p = ((transmitted if through else reflected)(plan, groups, polarisation) for polarisation in "sp")
-    cross = _transmitted_product(plan, groups) if through else _cross_product(plan, groups)
-    return ellipsometry.stokes_from_sums(s, p, cross)
+    s, p = (power(plan, groups, polarisation, through) for polarisation in "sp")
+    return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups, through))
 
 
 def _birefringent_on_plates(plan: Plan) -> bool:
@@ -361,22 +343,14 @@ def _birefringent_on_plates(plan: Plan) -> bool:
     return plan.on("anisotropy") and plan.on("back-face") and plan.ellipsometric and scaled
 
 
-def _cross_product(plan: Plan, groups: list[CoherentGroup]):
-    """conj(r_p) r_s of the first group and everything below it."""
+def _cross_product(plan: Plan, groups: list[CoherentGroup], through: bool) -> Any:
+    """conj(r_p) r_s of the first group and everything below it, or conj(t_p) t_s through them."""
     group, *below = groups
     front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
     if not below:
-        return front.reflected
-    orders = front.reflected, front.passed_twice, front.below, _cross_product(plan, below)
-    return plate.multiple_reflections(*orders, group.internal, group.collected)
-
-
-def _transmitted_product(plan: Plan, groups: list[CoherentGroup]):
-    """conj(t_p) t_s through the first group and everything below it."""
-    group, *below = groups
-    front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
-    if not below:
-        return front.passed
+        return front.passed if through else front.reflected
+    medium, back = (group.internal, group.collected), _cross_product(plan, below, False)
+    if not through:
+        return plate.multiple_reflections(front.reflected, front.passed_twice, front.below, back, *medium)
     face = plate.Face(front.reflected, front.passed, front.below)
-    back, passed = _cross_product(plan, below), _transmitted_product(plan, below)
-    return plate.plate_transmittance(face, back, passed, group.internal, group.collected)
+    return plate.plate_transmittance(face, back, _cross_product(plan, below, True), *medium)

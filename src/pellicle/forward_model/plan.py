@@ -71,10 +71,12 @@ class Plan:
 
     def row(self, effect: str) -> Row:
         """The row of one effect. Raises KeyError for an unknown name."""
-        for row in self.rows:
-            if row.effect == effect:
-                return row
-        raise KeyError(effect)
+        return {row.effect: row for row in self.rows}[effect]
+
+    def with_rows(self, *rows: Row) -> Plan:
+        """The plan with these rows in place of those of their effects."""
+        others = {row.effect: row for row in rows}
+        return replace(self, rows=tuple(others.get(row.effect, row) for row in self.rows))
 
     def on(self, effect: str) -> bool:
         """True where the effect is simulated. Raises KeyError for an unknown name."""
@@ -104,5 +106,4 @@ class Plan:
 
     def __str__(self) -> str:
         width = max(len(row.effect) for row in self.rows)
-        lines = [f"{row.effect:<{width}}  {'on ' if row.on else 'off'}  {row.why}" for row in self.rows]
-        return "\n".join(lines)
+        return "\n".join(f"{x.effect:<{width}}  {'on ' if x.on else 'off'}  {x.why}" for x in self.rows)

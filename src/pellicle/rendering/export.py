@@ -14,7 +14,7 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant, Table, along_the_spectrum
-from pellicle.effects.anisotropy import scene_media
+from pellicle.effects.presence import scene_media
 from pellicle.errors import DataError, UsageError
 from pellicle.files import write_text
 from pellicle.fitting.film.parameters import parameters

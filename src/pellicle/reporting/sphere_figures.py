@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
+from pellicle.accuracy.colour_methods import EXACT, ColourMap, colour_maps
 from pellicle.accuracy.colour_methods import EYE as OBSERVER
-from pellicle.accuracy.film_colours import EXACT, ColourMap, colour_maps
 from pellicle.colour import linear_srgb, sensor
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.rendering_display import display, encode, exposure

@@ -24,7 +24,7 @@ import numpy as np
 from pellicle.errors import DataError, UsageError
 from pellicle.files import replacing
 from pellicle.fitting.noise import integrated_time
-from pellicle.sampling.modes import Modes
+from pellicle.sampling.density import Modes
 
 GROUP = "mcmc"
 _PATIENCE = 2.0

@@ -19,7 +19,7 @@ from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.result import Fit, Part
 from pellicle.sampling.chain import Checks
-from pellicle.sampling.modes import Modes
+from pellicle.sampling.density import Modes
 
 DRAWS = 256
 """Curves behind a band: 2.5 % of them are six."""

@@ -1,16 +1,23 @@
-"""Sample the posterior of a fit's free parameters, from every minimum that the fit found."""
+"""Sample the posterior of a fit's free parameters, by an ensemble of walkers from every minimum found.
 
+A chain is extended until its checks pass, a limit is reached, or the user interrupts.
+"""
+
+import os
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from logging import getLogger
 from typing import Any, NamedTuple, TypeVar
 
 import jax
+import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.measurement import Measurement
 from pellicle.data.spectrum import Spectrum
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError, install_command
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.brdf.summary import BrdfMeasurements
@@ -22,12 +29,193 @@ from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.sampling.density import fingerprint, log_density, systematics
-from pellicle.sampling.ensemble import Subject, installed
-from pellicle.sampling.modes import modes, sandwich_stretch
-from pellicle.sampling.result import predictions
+from pellicle.sampling.chain import Chain, ChainFile, Checks, check, missing
+from pellicle.sampling.density import (
+    LogDensity,
+    Modes,
+    Stretch,
+    Target,
+    fingerprint,
+    log_density,
+    modes,
+    sandwich_stretch,
+    systematics,
+    unchanged,
+)
+from pellicle.sampling.result import Posterior, Prediction, predictions
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
+
+log = getLogger(__name__)
+
+BLOCK = 100
+"""Steps between two looks at the clock and the keyboard."""
+_GROWTH = 1.25
+"""The checks are made again when the chain has grown by this factor."""
+
+
+def run(
+    target: Target, modes: Modes, chain: Chain, steps: int, keep: Callable[[Chain], None], progress: Progress
+) -> tuple[Chain, Checks]:
+    """The chain extended to at most `steps`, and its checks.
+
+    `keep` is called with the chain after every block. Ctrl-C ends the chain with what it has; before the
+    first block it is raised again.
+    """
+    checks, checked = None, 0
+    progress("sample", chain.steps, steps)
+    try:
+        while chain.steps < steps:
+            if chain.steps >= 2 * BLOCK and chain.steps >= _GROWTH * checked:
+                checks, checked = check(chain, modes), chain.steps
+                log.info("chain: %d steps: %s", chain.steps, "; ".join(checks.doubts) or "long enough")
+                if checks.trusted:
+                    break
+            chain = _extended(target, modes, chain, min(BLOCK, steps - chain.steps))
+            keep(chain)
+            progress("sample", chain.steps, steps)
+        progress("sample", chain.steps, chain.steps)
+    except KeyboardInterrupt:
+        if not chain.steps:
+            raise
+    if checks is None or chain.steps != checked:
+        checks = check(chain, modes)
+    return chain, checks
+
+
+def _extended(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
+    import emcee
+
+    walkers, size = chain.draws.shape[1:]
+    if chain.steps:
+        state = emcee.State(chain.draws[-1], log_prob=chain.log_density[-1], random_state=chain.random)
+    else:
+        random = np.random.RandomState()
+        random.set_state(chain.random)
+        start = modes.start(walkers, random)
+        state = emcee.State(start, log_prob=target(start), random_state=random.get_state(legacy=True))
+    sampler = emcee.EnsembleSampler(walkers, size, target, moves=moves(modes), vectorize=True)
+    # emcee's wrapper prints to stdout where the target is interrupted
+    sampler.log_prob_fn = target  # pyright: ignore[reportAttributeAccessIssue]
+    sampler.run_mcmc(state, steps, skip_initial_state_check=True)
+    more = Chain(
+        np.asarray(sampler.get_chain()),
+        np.asarray(sampler.get_log_prob()),
+        np.asarray(sampler.backend.accepted),
+        tuple(sampler.random_state),
+    )
+    return chain.extended(more)
+
+
+def moves(modes: Modes) -> list[tuple[Any, float]]:
+    """emcee's moves with their shares.
+
+    Differential evolution (C. J. F. ter Braak, 2006, Stat. Comput. 16, 239) and its snooker update (ter
+    Braak and Vrugt, 2008, ibid. 18, 435) need no tuning, but rarely cross from one minimum to another.
+    The third proposes a draw from the mixture of all minima, whatever the walker's place (an independence
+    sampler: Tierney, 1994, Ann. Stat. 22, 1701, section 2.3.3).
+    """
+    from emcee.moves import DEMove, DESnookerMove, MHMove
+
+    def jump(walkers: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+        there = modes.draw(len(walkers), random)
+        return there, modes.log_density(walkers) - modes.log_density(there)
+
+    return [(DEMove(), 0.4), (DESnookerMove(), 0.1), (MHMove(jump), 0.5)]
+
+
+STEPS = 20_000
+"""Maximum number of steps of a chain."""
+FEWEST_WALKERS = 32
+_LIVE = 40
+"""Numbers of float64 that one point of the data of one walker keeps alive at once, roughly."""
+
+
+class Subject(NamedTuple):
+    """A finished fit and the posterior of its parameters, in the unit cube of their bounds.
+
+    `values` takes points of the cube to the parameters' own units; `fingerprint` identifies the problem;
+    `points` how many data one evaluation compares; `predict` makes predictions of draws, from a seed;
+    `stretch` widens draws to the covariance of the fit.
+    """
+
+    fit: Fit
+    names: tuple[str, ...]
+    log_density: LogDensity
+    modes: Modes
+    values: Callable[[np.ndarray], np.ndarray]
+    fingerprint: str
+    points: int
+    predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
+    assumption: str = ""
+    stretch: Stretch = unchanged
+
+    def walkers(self, count: int | None, steps: int) -> int:
+        """The number of walkers: `count` if it is possible, or four for each parameter and at least 32.
+
+        Raises UsageError where they are too few, or need more than the machine's memory.
+        """
+        size = len(self.names)
+        if count is None:
+            return max(FEWEST_WALKERS, 4 * size)
+        if count < max(2 * size, 4) or count % 2:
+            raise UsageError(f"walkers must be an even number of at least {max(2 * size, 4)}, got {count}")
+        try:
+            memory = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+        except (AttributeError, ValueError, OSError):  # unknown to the system, and so without limit
+            memory = float("inf")
+        needed = 8.0 * count * (_LIVE * self.points + 3 * steps * (size + 1))
+        if needed > memory:
+            most = int(count * memory / needed) // 2 * 2
+            raise UsageError(
+                f"{count} walkers of {steps} steps need about {needed / 2**30:.3g} GiB and the machine has"
+                f" {memory / 2**30:.3g}: take {most} at most, or fewer steps"
+            )
+        return count
+
+
+def sampled(
+    subject: Subject,
+    walkers: int | None,
+    steps: int,
+    seed: int,
+    chain: str | os.PathLike[str] | None,
+    progress: Progress,
+    began: float,
+) -> Posterior:
+    """Sample a posterior, in float64.
+
+    Walkers start in every minimum in proportion to its share and move by differential evolution, its snooker
+    update, and jumps between minima. The chain ends when it is 50 autocorrelation times long and passes the
+    other checks, or after `steps`. With a `chain` file it is kept there as it grows, and a run that was cut
+    short goes on where it stopped.
+
+    **Raises:** UsageError for too few walkers (two for each parameter at least) or more than the machine's
+    memory holds; DataError for a chain of another problem.
+    """
+    file = ChainFile(chain, subject.fingerprint, subject.names)
+    with jax.enable_x64(True):
+        count = subject.walkers(walkers, steps)
+        target = Target(subject.log_density, (count + 1) // 2)
+        grown, checks = run(target, subject.modes, file.begin(count, seed), steps, file.keep, progress)
+        try:
+            file.write(grown)
+        except DataError as error:  # of the disk: the chain in memory is complete
+            log.warning("%s; this chain cannot be continued", error)
+    units = subject.stretch(grown.draws[checks.discard :])
+    return Posterior(
+        fit=subject.fit,
+        names=subject.names,
+        draws=np.asarray(subject.values(units)),
+        units=units,
+        log_density=grown.log_density[checks.discard :],
+        modes=subject.modes,
+        checks=checks,
+        predict=subject.predict,
+        seconds=time.perf_counter() - began,
+        assumption=subject.assumption,
+    )
+
 
 Kind = TypeVar("Kind")
 
@@ -53,7 +241,10 @@ def subject_of(
 
     **Raises:** as `fit` does, and UsageError without the sampler's packages.
     """
-    installed()
+    if absent := missing():
+        raise UsageError(
+            f"posteriors need {', '.join(absent)}, not installed here: {install_command('posterior')}"
+        )
     if isinstance(scene, Surface):
         fitted = _of_surface(data, scene, tolerance, residual, progress)
     elif joint.of_both_kinds(scene):
@@ -83,8 +274,7 @@ def _of_surface(
     unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
     rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
     compared = fit.layer_test.residual if fit.layer_test else ""
-    numbers = dict(scene.numbers), tuple(scene.bands), scene.media
-    identity = fingerprint([*_columns(rows), numbers], scene.model, compared, tolerance)
+    identity = fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
     assumption = "there is a layer" if unsure else ""
     return _Fitted(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
 
@@ -95,9 +285,8 @@ def _of_both_kinds(
     fit, ranked = joint.fitted(data, scene, tolerance, progress, residual=residual)
     with jax.enable_x64(True):
         own = joint.apart(data, scene)
-        surface = dict(own.surface.numbers), tuple(own.surface.bands), own.surface.media
         targets = spectra.measurements(own.films, own.scenes)
-        known = [*map(arrays, targets), *_columns(own.samples), surface]
+        known = [*map(arrays, targets), *_columns(own.samples, own.surface)]
         identity = fingerprint(known, own.surface.model, residual, tolerance)
     return _Fitted(fit, ranked, partial(joint.together, own, targets), identity)
 
@@ -111,8 +300,9 @@ def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> _Fi
     return _Fitted(fit, ranked, partial(FilmMeasurements, spectra.listed(measurements), targets), identity)
 
 
-def _columns(samples: Sequence[BrdfSamples]) -> list[tuple[Any, ...]]:
-    return [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in samples]
+def _columns(samples: Sequence[BrdfSamples], surface: Surface) -> list[tuple[Any, ...]]:
+    columns = [(s.theta_i, s.phi_i, s.theta_o, s.phi_o, s.values, s.sigma) for s in samples]
+    return [*columns, (dict(surface.numbers), tuple(surface.bands), surface.media)]
 
 
 def _subject(fitted: _Fitted) -> Subject:

@@ -9,9 +9,8 @@ from pellicle.accuracy.registry import Method
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.chain import empty, missing
-from pellicle.sampling.density import Target, log_density
-from pellicle.sampling.ensemble import run
-from pellicle.sampling.modes import modes
+from pellicle.sampling.density import Target, log_density, modes
+from pellicle.sampling.sample import run
 
 _WALKERS = 32
 _STEPS = 20_000

@@ -23,9 +23,8 @@ from pellicle.errors import UsageError
 from pellicle.forward_model.coherent_groups import (
     CoherentGroup,
     coherent_groups,
-    reflected,
+    power,
     response_of,
-    transmitted,
 )
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
@@ -65,7 +64,7 @@ def absorbed_power(
             up.append(jnp.zeros_like(arriving))
             layers.append(absorbed)
             break
-        below, passed = reflected(plan, groups[i + 1 :], polarisation), group.internal
+        below, passed = power(plan, groups[i + 1 :], polarisation, False), group.internal
         returning = response.reflectance_below(responses[i])
         first = arriving * response.transmittance(responses[i]) / (1 - returning * below * passed**2)
         arriving = first * passed
@@ -77,7 +76,7 @@ def absorbed_power(
         faces = back * _upward_difference(groups, i, responses[i], q, polarisation)
         faces += arriving * _exchange(group.below, q, _ratio(responses[i + 1]), polarisation)
         inner.append((first + arriving * below) * lost + faces)
-    R, T = reflected(plan, groups, polarisation), transmitted(plan, groups, polarisation)
+    R, T = (power(plan, groups, polarisation, through) for through in (False, True))
     return AbsorbedPower(R, T, layers, inner, down, up)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.layer_test import evidence
+from pellicle.fitting.brdf.summary import evidence
 from pellicle.fitting.result import Baseline, Estimate, Rival
 
 

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -14,10 +13,9 @@ from pellicle.errors import UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.assembly import Assembly, assemble
 from pellicle.fitting.brdf import summary
-from pellicle.fitting.brdf.layer_test import Evidence as LayerEvidence
-from pellicle.fitting.brdf.layer_test import evidence
 from pellicle.fitting.brdf.problem import incoherent, make, restricted, together, without_layer
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
+from pellicle.fitting.brdf.summary import LayerEvidence
 from pellicle.fitting.brdf.view import RESIDUALS
 from pellicle.fitting.conclusion import common_rms, ranked_minima
 from pellicle.fitting.minima import Minima, deviance_at, minima
@@ -81,62 +79,39 @@ def fitted(
     stems = [Path(each.path).stem.replace(".", "_") for each in samples]
     names = stems if len(set(stems)) == len(stems) else [str(i + 1) for i in range(len(stems))]
     with jax.enable_x64(True):
-        return _fit(
-            samples,
-            [""] if isinstance(data, BrdfSamples) else names,
-            surface,
-            name,
-            tolerance,
-            loss,
-            progress,
-        )
+        names = [""] if isinstance(data, BrdfSamples) else names
+        return _fit(samples, names, surface, name, tolerance, loss, progress)
 
 
 def _check(samples: list[BrdfSamples], surface: Surface) -> None:
     if not surface.free_numbers():
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
-    for each in samples:
-        where = f"{each.path}: " if each.path else ""
+    places = [f"{each.path}: " if each.path else "" for each in samples]
+    for place, each in zip(places, samples, strict=True):
         if surface.channels != len(each.channels):
             raise UsageError(
-                f"{where}{len(each.channels)} channels ({', '.join(each.channels)}) for"
+                f"{place}{len(each.channels)} channels ({', '.join(each.channels)}) for"
                 f" {surface.channels} of the surface: give wavelengths one for each, or a sensor"
             )
     count = sum(len(each) for each in samples)
     if count < FEWEST:
-        where = f"{samples[0].path}: " if samples[0].path else ""
-        raise UsageError(f"{where}{count} samples are too few to fit and to judge: give {FEWEST} or more")
+        raise UsageError(f"{places[0]}{count} samples are too few to fit and to judge: give {FEWEST} or more")
 
 
-class _Split(NamedTuple):
-    """Rows of each view that are fitted and rows that judge, and how many numbers the latter are."""
-
-    fitted: list[np.ndarray]
-    judging: list[np.ndarray]
-    size: int
-
-
-def _split(samples: list[BrdfSamples]) -> _Split:
-    """Four fifths to fit, spread over each file, and the rest to judge."""
-    out = [spread(len(each), max(1, round(HELD_OUT * len(each)))) for each in samples]
-    fitted = [np.setdiff1d(np.arange(len(each)), rows) for each, rows in zip(samples, out, strict=True)]
-    return _Split(fitted, out, sum(rows.size * len(e.channels) for rows, e in zip(out, samples, strict=True)))
-
-
-def _held_out(
-    whole: Problem, split: _Split, effort: Effort, loss: str, progress: Progress
-) -> tuple[Minima, float]:
-    """Minima on the fitted rows, and the best one's error on the others: of their bulk for a robust loss."""
-    result = search(restricted(whole, split.fitted), effort, progress)
-    judging = restricted(whole, split.judging)
+def _held_out(whole: Problem, effort: Effort, loss: str, progress: Progress) -> tuple[Minima, float]:
+    """Minima on four fifths of the samples, spread over each file, and the best one's error on the rest: of
+    their bulk for a robust loss."""
+    out = [spread(view.rows, max(1, round(HELD_OUT * view.rows))) for view in whole.views]
+    rest = [np.setdiff1d(np.arange(view.rows), rows) for view, rows in zip(whole.views, out, strict=True)]
+    result, judging = search(restricted(whole, rest), effort, progress), restricted(whole, out)
     judging = judging._replace(box=judging.box._replace(prior_weight=np.zeros(len(judging.parameters))))
+    pairs = list(zip(judging.views, out, strict=True))
     if loss != LEAST_SQUARES:
         values = np.asarray(judging.values(result.units[0]))
-        pairs = zip(judging.views, split.judging, strict=True)
         rows = [v.residuals(v.local(judging.seen_by(v, values)))[own].ravel() for v, own in pairs]
         return result, bulk_spread(np.concatenate(rows))
     [chi2] = deviance_at(judging, result.units[:1])
-    return result, float(np.sqrt(chi2 / split.size))
+    return result, float(np.sqrt(chi2 / sum(rows.size * view.channels for view, rows in pairs)))
 
 
 def _fit(
@@ -148,8 +123,7 @@ def _fit(
     loss: str,
     progress: Progress,
 ) -> tuple[Fit, RankedMinima]:
-    began = time.perf_counter()
-    split, errors = _split(samples), {}
+    began, errors = time.perf_counter(), {}
     kept = {"most": THOROUGH.starts, "followed": 1}
 
     def build(allowed: float) -> Problem:
@@ -157,16 +131,16 @@ def _fit(
         return make(samples, names, surface, plans, residual)
 
     def searched(problem: Problem) -> Minima:
-        result, errors["layer"] = _held_out(problem, split, THOROUGH, loss, progress)
-        _, errors[_FLAT] = _held_out(incoherent(problem), split, SMOOTH, loss, progress)
-        _, errors[_PLAIN] = _held_out(without_layer(problem), split, FEW, loss, progress)
+        result, errors["layer"] = _held_out(problem, THOROUGH, loss, progress)
+        _, errors[_FLAT] = _held_out(incoherent(problem), SMOOTH, loss, progress)
+        _, errors[_PLAIN] = _held_out(without_layer(problem), FEW, loss, progress)
         return minima(problem, result.units, progress, **kept)
 
     ranked, notes = ranked_minima(build, searched, tolerance, loss, **kept)
     judged = assemble(summary.BrdfMeasurements(samples, surface, ranked), began, near=True)
     baselines = tuple(Baseline(name, errors[name]) for name in (_FLAT, _PLAIN))
     status, parameters = judged.conclusion.status, judged.conclusion.parameters
-    layer = evidence(parameters, judged.conclusion.rivals, errors["layer"], baselines)
+    layer = summary.evidence(parameters, judged.conclusion.rivals, errors["layer"], baselines)
     if not layer.layered and not layer.several:
         parameters = summary.without_layer_error(parameters)
         status = status if status in (Status.NOT_CONVERGED, Status.MISFIT) else Status.NOT_IDENTIFIABLE
@@ -204,8 +178,8 @@ def _warnings(
     parameters: dict[str, Estimate],
 ) -> list[str]:
     """Warnings on weights, directions, numbers and what the data do not determine."""
-    view, values = judged.ranked.problem.views[0], judged.ranked.values
-    numbers = {k: np.asarray(x) for k, x in view.form.numbers(values, surface.fixed_numbers()).items()}
+    form, values = judged.ranked.problem.views[0].form, judged.ranked.values
+    numbers = {k: np.asarray(x) for k, x in form.numbers(values, surface.fixed_numbers()).items()}
     return [
         *(summary.weight_warnings(parameters) if status is Status.MISFIT else ()),
         *summary.direction_warnings(together(samples), surface),

@@ -41,8 +41,7 @@ def make(
     tilt = (where[_TILT[0]], where[_TILT[1]]) if all(name in where for name in _TILT) else None
     if tilt is not None:
         deviation, azimuth = (free[at].free for at in tilt)
-        if deviation.lower > 0 or azimuth.upper - azimuth.lower < 360:
-            tilt = None
+        tilt = None if deviation.lower > 0 or azimuth.upper - azimuth.lower < 360 else tilt
     # samples in one plane cannot tell a tilt to one side of it from one to the other: its square is searched
     folded = tilt is not None and in_plane(together(samples))
     take = [np.log if number.log else float for number in free]
@@ -54,19 +53,12 @@ def make(
     if tilt is not None:
         lower[list(tilt)], upper[list(tilt)] = (-1.0, LEAST_SQUARE if folded else -1.0), 1.0
     log = tuple(number.log for number in free)
-    form = SamplesForm(
-        surface.model,
-        "layer",
-        plans[0].static_key,
-        tuple(number.key for number in free),
-        tuple(number.channel for number in free),
-        residual,
-    )
+    keys, channels = tuple(number.key for number in free), tuple(number.channel for number in free)
     fixed = {key: x for key, x in nonzero_numbers(surface).items() if key in surface.fixed_numbers()}
-    views = [
-        samples_view(each, name, plan, replace(form, plan=plan.static_key), fixed)
-        for each, name, plan in zip(samples, names, plans, strict=True)
-    ]
+    views = []
+    for each, name, plan in zip(samples, names, plans, strict=True):
+        form = SamplesForm(surface.model, "layer", plan.static_key, keys, channels, residual)
+        views.append(samples_view(each, name, plan, form, fixed))
     return Problem(
         tuple(views),
         tuple(_parameter(number, tilt is not None, folded) for number in free),
@@ -80,18 +72,12 @@ def _parameter(number: FreeNumber, tilted: bool, folded: bool) -> Parameter:
     turns = key == "azimuth" and tilted
     lower, upper = (0.0, 180.0) if turns and folded else (free.lower, free.upper)
     from_zero = (free.lower == 0 and key in NATURAL) or key in ("roughness", "coat_roughness")
-    resolution = np.inf if number.parameter.linear else _RESOLUTION if key == "thickness" else None
     return Parameter(
-        name=number.name,
-        key=key,
-        unit=number.parameter.unit,
-        start=free.start,
-        lower=lower,
-        upper=upper,
+        *(number.name, key, number.parameter.unit, free.start, lower, upper),
         prior=free.prior,
         natural=(True, True) if turns and folded else (from_zero, key in _MIRROR),
         periodic=turns,
-        resolution=resolution,
+        resolution=np.inf if number.parameter.linear else _RESOLUTION if key == "thickness" else None,
     )
 
 
@@ -127,7 +113,8 @@ def incoherent(problem: Problem) -> Problem:
 
     On PTFE, which has no film, interference halves the error of a fit: a small misfit proves nothing.
     """
-    return _of_form(problem, lambda view: replace(view.form, kind="incoherent"))
+    views = (replace(view, form=replace(view.form, kind="incoherent")) for view in problem.views)
+    return problem._replace(views=tuple(views))
 
 
 def without_layer(problem: Problem) -> Problem:
@@ -140,16 +127,12 @@ def without_layer(problem: Problem) -> Problem:
         Parameter(f"{key}_{channel + 1}", key, "", 1.0, 0.0, _STRONGEST, resolution=np.inf)
         for key, channel in weights
     ]
-    keys = (*shapes, *(key for key, _ in weights))
+    keys, log = tuple(p.key for p in parameters), tuple(p.key.startswith("roughness") for p in parameters)
     channels = (None,) * len(shapes) + tuple(channel for _, channel in weights)
-    log = tuple(key.startswith("roughness") for key in keys)
-    lower = np.array([np.log(p.lower) if each else p.lower for p, each in zip(parameters, log, strict=True)])
-    upper = np.array([np.log(p.upper) if each else p.upper for p, each in zip(parameters, log, strict=True)])
-    plain = _of_form(problem, lambda view: replace(view.form, kind="two lobes", keys=keys, channels=channels))
-    positions = tuple(range(len(keys)))
-    views = tuple(replace(view, fixed={}, takes=positions) for view in plain.views)
-    return Problem(views, tuple(parameters), box(lower, upper, [None] * len(keys)), Coordinates(log))
-
-
-def _of_form(problem: Problem, form) -> Problem:
-    return problem._replace(views=tuple(replace(view, form=form(view)) for view in problem.views))
+    bounds = np.array([(p.lower, p.upper) for p in parameters])
+    bounds = np.where(np.array(log)[:, None], np.log(np.maximum(bounds, 1e-300)), bounds)
+    about = {"fixed": {}, "takes": tuple(range(len(keys)))}
+    forms = (replace(v.form, kind="two lobes", keys=keys, channels=channels) for v in problem.views)
+    views = tuple(replace(v, form=form, **about) for v, form in zip(problem.views, forms, strict=True))
+    whole = box(bounds[:, 0], bounds[:, 1], [None] * len(keys))
+    return Problem(views, tuple(parameters), whole, Coordinates(log))

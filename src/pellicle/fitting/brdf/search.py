@@ -22,7 +22,7 @@ from pellicle.fitting.minima import Minima, minima, solve
 from pellicle.fitting.positive_definite import solve_positive
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress
-from pellicle.programs.cache import kept
+from pellicle.programs.cache import in_chunks, kept
 
 log = getLogger(__name__)
 
@@ -78,17 +78,17 @@ def search(problem: Problem, effort: Effort, progress: Progress) -> Minima:
 
 def _scan(few: Problem, units: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
     """Candidates with their weights beside them, and their χ²."""
-    chi2, weights = np.empty(len(units)), np.empty((len(units), linear_count(few)))
     [view] = few.views
-    progress("scan", 0, len(units))
-    for first in range(0, len(units), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        padded = np.resize(units[part], (_CHUNK, units.shape[1]))
-        result = scan((few.coordinates, view.form), *view.arrays, few.box, padded)
-        count = len(units[part])
-        chi2[part], weights[part] = (np.asarray(x)[:count] for x in result)
-        progress("scan", min(first + _CHUNK, len(units)), len(units))
-    return np.hstack([units, weights]), chi2
+    done = itertools.count(0, _CHUNK)
+    progress("scan", next(done), len(units))
+
+    def chunk(part: np.ndarray) -> Candidates:
+        result = jax.device_get(scan((few.coordinates, view.form), *view.arrays, few.box, part))
+        progress("scan", min(next(done), len(units)), len(units))
+        return result
+
+    scanned = in_chunks(chunk, units, _CHUNK)
+    return np.hstack([units, scanned.weights]), scanned.chi2
 
 
 def _short(
@@ -112,9 +112,8 @@ def candidates(problem: Problem, count: int, seed: int = 0) -> np.ndarray:
     form, spans = problem.views[0].form, np.asarray(problem.box.upper) - np.asarray(problem.box.lower)
     for at, (key, channel) in enumerate(zip(form.keys[:size], form.channels[:size], strict=True)):
         if channel:
-            first = form.keys.index(key)
             shift = _DISPERSION / spans[at] * (2 * units[:, at] - 1)
-            units[:, at] = np.clip(units[:, first] + shift, 0, 1)
+            units[:, at] = np.clip(units[:, form.keys.index(key)] + shift, 0, 1)
     if problem.coordinates.tilt is not None and problem.coordinates.folded:
         units[:, problem.coordinates.tilt[1]] **= 2  # even in y, as where it is searched itself
     return units
@@ -126,14 +125,12 @@ def _thinned(problem: Problem) -> Problem:
     of its own."""
     if len(problem.views) == 1 and len(problem.views[0].samples.values) <= SCAN_SAMPLES:
         return problem
-    every = Samples(
-        *(np.concatenate(columns) for columns in zip(*(v.samples[:5] for v in problem.views), strict=True)),
-        independent_fraction=np.float64(1.0),
-    )
+    columns = zip(*(view.samples[:5] for view in problem.views), strict=True)
+    every = Samples(*map(np.concatenate, columns))
     weighted = np.flatnonzero(np.any(every.weight > 0, axis=1))
     order = weighted[np.argsort(every.values[weighted].mean(axis=1), kind="stable")]
     chosen = np.sort(order[np.linspace(0, len(weighted) - 1, SCAN_SAMPLES).round().astype(int)])
-    picked = Samples(*(column[chosen] for column in every[:5]), independent_fraction=np.float64(1.0))
+    picked = Samples(*(column[chosen] for column in every[:5]))
     view = replace(problem.views[0], samples=picked, rows=len(chosen), stated=picked.weight)
     return problem._replace(views=(view,))
 
@@ -149,8 +146,8 @@ def _best(problem: Problem, units: np.ndarray, chi2: np.ndarray, most: int) -> n
     for at in range(len(ranked)):
         if len(chosen) < most and np.all(np.abs(depth[at] - depth[chosen]) >= _APART):
             chosen.append(at)
-    rest = [at for at in range(len(ranked)) if at not in chosen] if len(chosen) < most else []
-    return ranked[[*chosen, *rest[: most - len(chosen)]]]
+    others = np.setdiff1d(np.arange(len(ranked)), chosen)
+    return ranked[[*chosen, *others[: most - len(chosen)]]]
 
 
 class Candidates(NamedTuple):

@@ -1,8 +1,8 @@
-"""Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers, warnings."""
+"""Summary of a fit of BRDF samples: parts, misfit, limits, fixed numbers, warnings, evidence for a layer."""
 
-import dataclasses
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,8 +17,9 @@ from pellicle.fitting.curves import BrdfCurve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.result import Estimate, Part, Rival
-from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.result import Baseline, Estimate, Part, Rival
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.status import RIVAL, describe, limits_in_words
 from pellicle.materials import materials_in
 from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
@@ -45,8 +46,7 @@ class BrdfMeasurements(NamedTuple):
         blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
         for view, fit, block in zip(views, fits, blocks, strict=True):
             residual = view.residuals(fit.at)
-            columns = block.reshape(*residual.shape, -1)
-            one = np.ones(residual.shape)
+            columns, one = block.reshape(*residual.shape, -1), np.ones(residual.shape)
             weights = math.sqrt(view.samples.independent_fraction) * one
             result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
         return result
@@ -70,8 +70,12 @@ class BrdfMeasurements(NamedTuple):
 
     def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy) -> list[Part]:
         """The parts that the surface does not explain: residuals are large, and not noise."""
-        views = zip(parts, self.ranked.problem.views, self.ranked.fits, strict=True)
-        return [part for part, view, fit in views if _misses(view, fit)]
+        missed = []
+        for part, view, fit in zip(parts, self.ranked.problem.views, self.ranked.fits, strict=True):
+            given, chi2_reduced = view.noise.given, fit.chi2 / fit.freedom
+            structured = chi2_reduced > _FAR if given else 1 / fit.length < _STRUCTURED
+            missed += [part] if structured and view.rms(fit.at) > _LARGE * view.span() else []
+        return missed
 
     def fixed(self) -> list[Estimate]:
         """Every fixed number, one for each channel where they differ: the mean over its band with a
@@ -116,15 +120,8 @@ def with_curves(rivals: tuple[Rival, ...], problem: Problem) -> tuple[Rival, ...
         values = np.array(list(rival.parameters.values()))
         return tuple(_curve(view, view.local(problem.seen_by(view, values))) for view in problem.views)
 
-    count = len(problem.views)
-    return tuple(
-        dataclasses.replace(rival, curves=Deferred(count, partial(curves, rival))) for rival in rivals
-    )
-
-
-def _misses(view: SamplesView, fit: ViewFit) -> bool:
-    structured = fit.chi2 / fit.freedom > _FAR if view.noise.given else 1 / fit.length < _STRUCTURED
-    return bool(structured and view.rms(fit.at) > _LARGE * view.span())
+    deferred = [Deferred(len(problem.views), partial(curves, rival)) for rival in rivals]
+    return tuple(replace(rival, curves=own) for rival, own in zip(rivals, deferred, strict=True))
 
 
 def without_layer_error(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
@@ -132,7 +129,7 @@ def without_layer_error(parameters: dict[str, Estimate]) -> dict[str, Estimate]:
     depth = parameters.get("thickness")
     if depth is None or not depth.free:
         return parameters
-    return {**parameters, "thickness": dataclasses.replace(depth, stderr=math.inf, lower_limit=None)}
+    return {**parameters, "thickness": replace(depth, stderr=math.inf, lower_limit=None)}
 
 
 _STEEP, _TOLERANCE = 15.0, 0.5
@@ -170,14 +167,10 @@ def direction_warnings(samples: BrdfSamples, surface: Surface) -> list[str]:
 
 def weight_warnings(parameters: Mapping[str, Estimate]) -> list[str]:
     """A sentence on weights of lobes that are fixed, for a fit that does not explain the samples."""
-    fixed = [name for name, p in parameters.items() if name.split("_")[0] in _WEIGHTS and not p.free]
-    if not fixed:
-        return []
-    each = " and ".join(f"{name} at {parameters[name].value:g}" for name in fixed)
-    return [
-        f"fixed: {each}; unless they are known, give them bounds, as in {fixed[0]} = {{ lower = 0, "
-        "upper = 10 }"
-    ]
+    fixed = {name: p for name, p in parameters.items() if name.split("_")[0] in _WEIGHTS and not p.free}
+    listed = " and ".join(f"{name} at {p.value:g}" for name, p in fixed.items())
+    unless = "unless they are known, give them bounds, as in"
+    return [f"fixed: {listed}; {unless} {name} = {{ lower = 0, upper = 10 }}" for name in list(fixed)[:1]]
 
 
 def number_warnings(
@@ -197,11 +190,84 @@ def number_warnings(
         messages.append("the model's lobes are not normalised: specular is a weight and no albedo")
     media = [medium(value) for value in (surface.film, surface.base) if value is not None]
     messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
-    # over bands the colour of every direction of the quadrature would be an integral of its own
-    brdf = (
-        surface.brdf
-        if surface.sensor is None
-        else surface.brdf.for_thickness_up_to(float(fitted["thickness"]))
-    )
+    brdf = surface.brdf
+    if surface.sensor is not None:
+        # over bands the colour of every direction of the quadrature would be an integral of its own
+        brdf = brdf.for_thickness_up_to(float(fitted["thickness"]))
     energy = energy_warning(brdf, fitted)
     return [*messages, energy] if energy else messages
+
+
+GAIN = 0.10
+"""The held-out error must fall by more than this share against every baseline."""
+FLATTEST = 2.0
+"""A lobe of a smaller exponent is a second diffuse part."""
+ROUGHEST = 0.7
+"""GGX roughness above which a lobe is none: α = √(2/(e + 2)) is as wide as an exponent e."""
+
+
+class LayerEvidence(NamedTuple):
+    """Evidence for a layer, with reasons; `several`: one of several thicknesses, all else being clear."""
+
+    layered: bool
+    verdict: str
+    several: bool = False
+
+
+def evidence(
+    parameters: Mapping[str, Estimate],
+    rivals: tuple[Rival, ...],
+    held_out: float,
+    baselines: tuple[Baseline, ...],
+) -> LayerEvidence:
+    """The rule: better than both baselines by `GAIN`, one thickness, and parameters that mean something."""
+    doubts, depth = [], parameters.get("thickness")
+    if depth and depth.lower == 0 and depth.upper_limit is not None and depth.lower_limit is None:
+        doubts.append(f"a thickness of 0 fits as well, for it {limits_in_words(depth)}")
+    for b in baselines:
+        if not held_out < (1 - GAIN) * b.held_out:
+            ratio = held_out / b.held_out if b.held_out > 0 else math.inf
+            how = f"{100 * (1 - ratio):.0f} % below" if ratio < 0.995 else f"{ratio:.2f} times that of"
+            doubts.append(
+                f"its held-out error is {how} {b.name}, where at least {100 * GAIN:.0f} % below is required"
+            )
+    others = _other_thickness(depth, rivals) if depth and depth.free else []
+    doubts += [*others, *_empty(parameters)]
+    if doubts == others and doubts and depth and math.isfinite(depth.stderr):
+        words = f"The samples do not determine the thickness of the layer: {others[0]}."
+        return LayerEvidence(False, words, True)
+    if doubts:
+        return LayerEvidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
+    gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
+    lead = f"{describe(depth)}. The" if depth else "the"
+    return LayerEvidence(True, f"Evidence of a layer: {lead} held-out error is {gains}.")
+
+
+def _other_thickness(depth: Estimate, rivals: tuple[Rival, ...]) -> list[str]:
+    if not math.isfinite(depth.stderr):
+        return ["the thickness has no finite error"]
+    for rival in rivals:
+        other = rival.parameters.get("thickness", depth.value)
+        if rival.delta_chi2 < RIVAL and abs(other - depth.value) > 3 * depth.stderr:
+            return [f"{other:.4g} nm fits as well as {depth.value:.4g} nm (Δχ² {rival.delta_chi2:.1f})"]
+    return []
+
+
+def _empty(parameters: Mapping[str, Estimate]) -> list[str]:
+    """Free numbers that mean nothing where they are."""
+    reasons = []
+    for name, p in parameters.items():
+        key = name.split("_")[0]
+        if not p.free:
+            continue
+        if key == "exponent" and p.value <= FLATTEST:
+            reasons.append(f"{name} {p.value:.2f} is no lobe (it must be above {FLATTEST:g})")
+        elif name == "roughness" and p.value >= ROUGHEST:
+            reasons.append(f"roughness {p.value:.2f} is no lobe (it must be below {ROUGHEST:g})")
+        elif name == "specular" and p.value == p.lower:
+            reasons.append("the layered lobes have no weight")
+        elif p.at_bound and (
+            key in ("exponent", "n", "roughness") or (name == "deviation" and p.value > p.lower)
+        ):
+            reasons.append(f"{name} rests on its bound {p.value:g}")
+    return reasons

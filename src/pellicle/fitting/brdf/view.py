@@ -15,6 +15,7 @@ from pellicle.brdf.lobes import two_lobes
 from pellicle.brdf.models import Evaluate, model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
+from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.forward_model.plan import Plan
@@ -29,12 +30,12 @@ _ROUND = 128
 class Samples(NamedTuple):
     """Samples in numbers, padded: `weight` is 0 on the padding."""
 
-    i: Any  # unit vectors to the light and to the eye, (samples, 3)
-    o: Any
-    values: Any  # (samples, channels), 1/sr
-    weight: Any  # of the transformed residual, (samples, channels)
-    floor: Any  # 1/sr, (samples, 1)
-    independent_fraction: Any  # effective points per point: correlated errors count less
+    i: Array  # unit vectors to the light and to the eye, (samples, 3)
+    o: Array
+    values: Array  # (samples, channels), 1/sr
+    weight: Array  # of the transformed residual, (samples, channels)
+    floor: Array  # 1/sr, (samples, 1)
+    independent_fraction: Array | np.floating = np.float64(1.0)  # effective points per point
 
 
 Arrays = tuple[Samples, dict[str, Any]]
@@ -75,9 +76,8 @@ class SamplesForm:
 
     def compare(self, samples: Samples, rho: Any) -> Any:
         """Weighted residuals (samples, channels) of a BRDF's values: measured less computed."""
-        transform, cosine = RESIDUALS[self.residual], samples.i[:, 2:3]
-        measured = transform(samples.values, cosine, samples.floor)
-        difference = measured - transform(rho, cosine, samples.floor)
+        transform, about = RESIDUALS[self.residual], (samples.i[:, 2:3], samples.floor)
+        difference = transform(samples.values, *about) - transform(rho, *about)
         return jnp.where(samples.weight > 0, difference, 0.0) * samples.weight
 
     def explain(self, arrays: Arrays, values: Any, /) -> Explained:
@@ -92,9 +92,9 @@ class Local(NamedTuple):
     """The BRDF (samples, channels), weighted residuals, and the slope of the compared numbers, weighted, by
     each free number in its own unit: (samples, channels, numbers)."""
 
-    model: Any
-    residual: Any
-    slope: Any
+    model: Array
+    residual: Array
+    slope: Array
 
 
 @kept
@@ -137,7 +137,7 @@ class SamplesView:
     @property
     def independent(self) -> int:
         """Measured numbers: samples times channels."""
-        return self.rows * self.samples.values.shape[1]
+        return self.rows * self.channels
 
     @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
@@ -165,14 +165,10 @@ class SamplesView:
         """
         if self.relative is None:
             return 1.0
-        samples = self.samples
-        transform, cosine = RESIDUALS[self.form.residual], samples.i[:, 2:3]
-
-        def compared_noise(rho):
-            rho = jnp.maximum(rho, samples.floor)
-            return np.asarray(slope(transform, rho, cosine, samples.floor) * rho)
-
-        ratio = compared_noise(samples.values) / compared_noise(jnp.asarray(at.model))
+        samples, transform = self.samples, RESIDUALS[self.form.residual]
+        pair = (jnp.maximum(rho, samples.floor) for rho in (samples.values, jnp.asarray(at.model)))
+        measured, computed = (slope(transform, x, samples.i[:, 2:3], samples.floor) * x for x in pair)
+        ratio = np.asarray(measured) / np.asarray(computed)
         return np.where(np.array(self.relative) > 0, ratio, 1.0)[: self.rows]
 
     def jacobian(self, at: Local) -> np.ndarray:
@@ -217,8 +213,8 @@ class SamplesView:
         if not self.plan.tolerance:
             return 0.0
         numbers = {key: np.asarray(x) for key, x in self.form.numbers(values, self.fixed).items()}
-        keep = slice(self.rows)
-        view = SurfaceView(self.form.model, numbers, self.samples.i[keep], self.samples.o[keep])
+        i, o = (x[: self.rows] for x in self.samples[:2])
+        view = SurfaceView(self.form.model, numbers, i, o)
         values_of = evaluation(view).signals
         return float(np.max(np.abs(values_of(self.plan) - values_of(exact(view)))))
 
@@ -243,27 +239,25 @@ def samples_view(
     samples: BrdfSamples, name: str, plan: Plan, form: SamplesForm, fixed: dict[str, Any]
 ) -> SamplesView:
     """The view of a file's samples; weights are 1/σ where σ is known, else 1 for every transformed value."""
-    size = len(samples)
+    size, known = len(samples), samples.values
     extra = -size % _ROUND
 
-    def pad(x, edge):
+    def pad(x: np.ndarray, edge: Any) -> np.ndarray:
         return np.concatenate([x, np.broadcast_to(edge, (extra, *np.shape(x)[1:]))])
 
     i = np.asarray(direction(samples.theta_i, samples.phi_i))
     o = np.asarray(direction(samples.theta_o, samples.phi_o))
-    known = samples.values
     floor = np.full((size + extra, 1), DARKEST * max(float(np.median(known)), 1e-9))
     weight = np.ones_like(known)
     if samples.sigma is not None:
         rise = slope(RESIDUALS[form.residual], jnp.asarray(known), jnp.asarray(i[:, 2:3]), floor[:size])
         weight = 1 / (np.asarray(rise) * samples.sigma)
     up, weight = np.array([0.0, 0.0, 1.0]), pad(weight, 0.0)
-    numbers = Samples(pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor, np.float64(1.0))
+    numbers = Samples(pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor)
     # weights that suit the eye are not those of the noise, which grows with the signal
     noise = Noise(given=samples.sigma is not None, correlated=True, uneven=samples.sigma is None)
-    takes = tuple(range(len(form.keys)))
-    view = SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight)
-    return replace(view, relative=samples.relative)
+    takes, relative = tuple(range(len(form.keys))), samples.relative
+    return SamplesView(name, plan, form, numbers, fixed, takes, noise, size, weight, relative)
 
 
 Transform = Callable[[Any, Any, Any], Any]

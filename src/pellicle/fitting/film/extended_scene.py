@@ -12,8 +12,8 @@ import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, each_principal, ordinary_index
 from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
-from pellicle.effects.anisotropy import computes_roughness, scene_media
 from pellicle.effects.film_plan import exact
+from pellicle.effects.presence import computes_roughness, scene_media
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.parameters import anonymous
