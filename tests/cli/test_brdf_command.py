@@ -84,9 +84,8 @@ def fits(monkeypatch):
 
 
 def test_a_recipe_says_what_is_fitted_and_how(folder, fits, pellicle):
-    ran = pellicle(
-        "fit", "--recipe", folder / "paint.toml", "--json", "--verbose", "--out", folder / "out", code=4
-    )
+    flags = ("--json", "--verbose", "--out", folder / "out")
+    ran = pellicle("fit", "--recipe", folder / "paint.toml", *flags, code=4)
     assert "surface: microfacet-film, by 30 samples of R, G, B\n" in ran.err
     assert "free: thickness between 10 and 700\n" in ran.err
     (found,) = ran.objects

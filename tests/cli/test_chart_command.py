@@ -86,9 +86,8 @@ def test_inverse_of_a_chart(pellicle, tmp_path):
     rows = [line.split(",") for line in table.read_text().splitlines() if not line.startswith("#")]
     assert rows[0][:5] == ["hex", "red", "green", "blue", "thickness_nm"]
     assert rows[0][5:] == ["stderr_nm", "probability", "delta_e"]
-    rgb, nm, probability, delta_e = (
-        np.array([r[i] for r in rows[1:]], float) for i in (slice(1, 4), 4, 6, 7)
-    )
+    columns = (slice(1, 4), 4, 6, 7)
+    rgb, nm, probability, delta_e = (np.array([r[i] for r in rows[1:]], float) for i in columns)
     own = film_colour(nm, pl.material("SiO2"), pl.material("Si"), method="uniform-64")
     sure = probability > 0.2
     assert np.max(np.abs(255 * np.asarray(own.srgb) - rgb)[sure]) < 6  # four times the noise

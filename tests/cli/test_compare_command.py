@@ -11,9 +11,8 @@ CAUCHY = "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"
 def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_file, tmp_path):
     film = spectrum_file(index=1.52)
     a, b = scene_recipe(name="a.toml"), scene_recipe(name="b.toml", material=CAUCHY)
-    [again] = pellicle(
-        "compare", film, "--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out", code=0
-    ).objects
+    flags = ("--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out")
+    [again] = pellicle("compare", film, *flags, code=0).objects
     assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
     assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")
     assert again["verdict"].endswith("the data strongly favour A.")

@@ -73,9 +73,7 @@ def test_wavelengths_of_the_first_file(pellicle, recipe, tmp_path, monkeypatch):
     rows = "".join(f"{nm},0.2\n" for nm in (450, 500, 560, 640, 700))
     (tmp_path / "film.csv").write_text("wavelength_nm,R\n" + rows)
     lines = RECIPE.replace("wavelengths = { start = 400, stop = 790, step = 30 }", 'files = ["film.csv"]')
-    recipe.write_text(
-        lines.replace("thickness = { value = 321.5, lower = 10, upper = 800 }", "thickness = 321.5")
-    )
+    recipe.write_text(lines.replace("{ value = 321.5, lower = 10, upper = 800 }", "321.5"))
     ran = pellicle("cost", recipe, "--reference", "mpmath", "--json")
     (record,) = ran.objects
     assert (record["wavelengths"], record["draws"]) == (5, 1)

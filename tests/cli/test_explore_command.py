@@ -83,9 +83,8 @@ def test_a_recipe_comes_with_its_data(explore, tmp_path):
 
 
 def test_the_recipe_on_the_page_reads_its_data_as_they_were_read(explore, tmp_path):
-    rows = [
-        f"{nm},{angle},30,{delta}" for angle in (60, 70) for nm, delta in ((500, 20), (600, 60), (700, 90))
-    ]
+    points = ((500, 20), (600, 60), (700, 90))
+    rows = [f"{nm},{angle},30,{delta}" for angle in (60, 70) for nm, delta in points]
     (tmp_path / "e.csv").write_text("\n".join(["wavelength_nm,angle_deg,psi_deg,delta_deg", *rows]))
     text = RECIPE[RECIPE.index("[scene]") :]
     text = f'[data]\nfiles = ["e.csv"]\nsignal = "psi-delta"\nfolded = true\nnoise = 0.1\n{text}'

@@ -29,25 +29,21 @@ def test_the_command_writes_and_reports(pellicle, tmp_path):
 def test_a_fit_is_exported_with_its_values(pellicle, tmp_path):
     """The record of a fit names its recipe, or has its flags."""
     recipe, record = tmp_path / "steel.toml", tmp_path / "result.json"
-    free = "thickness = { lower = 10, upper = 100 }"
-    recipe.write_text(RECIPE.replace("thickness = 40", free))
+    recipe.write_text(RECIPE.replace("thickness = 40", "thickness = { lower = 10, upper = 100 }"))
     flags = {"layer": "2.9", "substrate": "2.7+2.8j", "thickness": "10:100"}
+    fit = {"parameters": {"thickness": {"value": 40.0}}}
     for number, source in enumerate(({"recipe": str(recipe)}, {"flags": flags})):
-        record.write_text(json.dumps({"parameters": {"thickness": {"value": 40.0}}, "scene": source}))
-        ran = pellicle(
-            "export", record, "--to", "gltf", "--out", tmp_path / f"{number}.glb", "--json", code=0
-        )
-        assert ran.objects[0]["thickness_nm"] == [40, 40]
-    recipe.unlink()
-    record.write_text(
-        json.dumps({"parameters": {"thickness": {"value": 40.0}}, "scene": {"recipe": "no.toml"}})
-    )
+        record.write_text(json.dumps(fit | {"scene": source}))
+        out = ("--to", "gltf", "--out", tmp_path / f"{number}.glb", "--json")
+        assert pellicle("export", record, *out, code=0).objects[0]["thickness_nm"] == [40, 40]
     out = ("--to", "gltf", "--out", tmp_path / "c.glb")
-    pellicle("export", record, *out).refused(2, "no.toml is not there", "--recipe")
-    record.write_text(json.dumps({"parameters": {}}))
-    pellicle("export", record, *out).refused(3, "no fitted parameters")
-    record.write_text("{")
-    pellicle("export", record, *out).refused(3, "is not JSON")
+    for text, code, words in (
+        (json.dumps(fit | {"scene": {"recipe": "no.toml"}}), 2, ("no.toml is not there", "--recipe")),
+        ('{"parameters": {}}', 3, ("no fitted parameters",)),
+        ("{", 3, ("is not JSON",)),
+    ):
+        record.write_text(text)
+        pellicle("export", record, *out).refused(code, *words)
 
 
 def test_the_help_names_every_renderer(pellicle):

@@ -49,9 +49,8 @@ def words(tmp_path, monkeypatch):
     nm = np.linspace(400.0, 700.0, 30)
     values = np.random.default_rng(0).uniform(0.2, 0.8, (24, 20, 30))
     values[0, 0] = np.nan
-    cube = xarray.DataArray(
-        values, {"wavelength": ("wavelength", nm, {"units": "nm"})}, ("y", "x", "wavelength")
-    )
+    axis = ("wavelength", nm, {"units": "nm"})
+    cube = xarray.DataArray(values, {"wavelength": axis}, ("y", "x", "wavelength"))
     cube.to_dataset(name="R").to_netcdf(tmp_path / "wafer.nc")
     (tmp_path / "film.toml").write_text(RECIPE)
     return "map", tmp_path / "wafer.nc", "--recipe", tmp_path / "film.toml", "--out", tmp_path / "out"
@@ -68,10 +67,8 @@ def test_the_folder_of_a_map(pellicle, words, fits, tmp_path):
     assert record["status"] == {"converged": 479, "no-data": 1}
     assert record == json.loads((tmp_path / "out/result.json").read_text())
     assert "converged" in (tmp_path / "out/report.txt").read_text()
-    with (
-        xarray.open_dataset(tmp_path / "wafer.nc") as cube,
-        xarray.open_dataset(tmp_path / "out/map.nc") as map,
-    ):
+    wafer, made = tmp_path / "wafer.nc", tmp_path / "out/map.nc"
+    with xarray.open_dataset(wafer) as cube, xarray.open_dataset(made) as map:
         np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0])
         assert map.attrs["recipe"] == RECIPE
     assert xarray.open_zarr(tmp_path / "out/map.zarr").status.shape == (24, 20)
@@ -166,10 +163,8 @@ def test_a_lamp_curve_of_a_region_divides_the_cube(pellicle, words, fits, tmp_pa
         lit = cube.R.values[2:8, 4:9]
     pellicle(*words, "--lamp-curve", "4,2,5,6", "--json", code=0)
     bare = (2.9**2 + 0.02**2) / (4.9**2 + 0.02**2)  # Fresnel, air on 3.9 + 0.02i
-    with (
-        xarray.open_dataset(tmp_path / "out/map.nc") as map,
-        xarray.open_dataset(tmp_path / "wafer.nc") as cube,
-    ):
+    wafer, made = tmp_path / "wafer.nc", tmp_path / "out/map.nc"
+    with xarray.open_dataset(wafer) as cube, xarray.open_dataset(made) as map:
         gain = lit[..., 0].mean() / bare
         np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0] / gain, rtol=1e-6)
         assert "lamp curve of region 4,2,5,6" in " ".join(map.attrs["notes"])

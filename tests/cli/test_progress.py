@@ -99,9 +99,7 @@ def test_nothing_is_shown_without_a_terminal(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize(
-    ("seconds", "words"), [(4.0, ""), (12.3, "12 s"), (180.0, "3 min"), (9000.0, "2.5 h")]
-)
+@pytest.mark.parametrize(("seconds", "words"), [(4.0, ""), (12.3, "12 s"), (180.0, "3 min"), (9e3, "2.5 h")])
 def test_durations(seconds, words):
     assert duration(seconds) == words
 

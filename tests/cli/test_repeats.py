@@ -13,9 +13,8 @@ import pytest
 def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path):
     files = [spectrum_file(f"{seed}.csv", seed=seed) for seed in range(4)]
     out = tmp_path / "out"
-    *fits, found = pellicle(
-        "fit", *files, *scene, "--repeats", "--json", "--out", out, "--jobs", "2", code=0
-    ).objects
+    flags = ("--repeats", "--json", "--out", out, "--jobs", "2")
+    *fits, found = pellicle("fit", *files, *scene, *flags, code=0).objects
     assert [fit["schema"] for fit in fits] == ["pellicle.fit/1"] * 4
     assert found["schema"] == "pellicle.repeats/1"
     assert [each["path"] for each in found["data"]] == list(map(str, files))
@@ -40,9 +39,8 @@ def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path
 def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, scene_recipe):
     for name, thickness in zip("abc", (299.0, 300.0, 301.5), strict=True):
         spectrum_file(f"{name}.csv", thickness)
-    ran = pellicle(
-        "fit", "--recipe", scene_recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true"), code=0
-    )
+    recipe = scene_recipe("files = ['a.csv', 'b.csv', 'c.csv']\nrepeats = true")
+    ran = pellicle("fit", "--recipe", recipe, code=0)
     assert ran.out.count("[[Verdict]]") == 3
     assert "the stated noise error is too small" in " ".join(ran.out.split())
 

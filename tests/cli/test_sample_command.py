@@ -55,9 +55,8 @@ def test_files_open_in_the_programs_they_are_for(sampled, folder):
     assert json.loads((folder / "result.json").read_text())["posterior"] == found["posterior"]
     data = arviz().from_netcdf(str(folder / "posterior.nc"))
     assert data.posterior["thickness"].shape[0] == found["posterior"]["checks"]["walkers"]
-    assert float(data.posterior["thickness"].mean()) == pytest.approx(
-        found["posterior"]["parameters"]["thickness"]["mean"]
-    )
+    mean = found["posterior"]["parameters"]["thickness"]["mean"]
+    assert float(data.posterior["thickness"].mean()) == pytest.approx(mean)
     repeated, measured = data.posterior_predictive["R"], data.observed_data["R"]
     low, high = np.quantile(repeated[0], [0.025, 0.975], axis=0)
     assert 0.88 <= float(np.mean((measured >= low) & (measured <= high))) <= 1.0
@@ -100,7 +99,6 @@ def test_what_cannot_be_is_refused_in_a_sentence(pellicle, spectrum_file, scene,
 def test_a_chain_of_another_problem_is_left_alone(sampled, pellicle, spectrum_file, scene, folder):
     sampled()
     before = (folder / "chain.h5").read_bytes()
-    pellicle("sample", spectrum_file(seed=5), *scene, "--out", folder).refused(
-        3, "is the chain of another problem"
-    )
+    other = pellicle("sample", spectrum_file(seed=5), *scene, "--out", folder)
+    other.refused(3, "is the chain of another problem")
     assert (folder / "chain.h5").read_bytes() == before

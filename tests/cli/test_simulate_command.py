@@ -85,9 +85,8 @@ def test_a_depolarisation_is_a_column(pellicle, recipe, tmp_path):
 @pytest.mark.slow
 def test_depth_profile(pellicle, recipe, tmp_path):
     """Figure, tables and JSON of where the light goes; the film is transparent, and the substrate takes T."""
-    recipe.write_text(
-        RECIPE.replace("noise = 0.002\n", "").replace("material = 1.46", 'material = "1.46+0.1j"')
-    )
+    text = RECIPE.replace("noise = 0.002\n", "")
+    recipe.write_text(text.replace("material = 1.46", 'material = "1.46+0.1j"'))
     out = tmp_path / "depth"
     ran = pellicle("simulate", recipe, "--depth", "450,600", "--out", out, "--json")
     (found,) = ran.objects
@@ -95,19 +94,14 @@ def test_depth_profile(pellicle, recipe, tmp_path):
     assert found["schema"] == "pellicle.depth/1"
     assert found["at_nm"] == [450, 600]
     assert sum(row[0] for row in found["shares"].values()) == pytest.approx(1, abs=1e-12)
-    assert {path.name for path in out.iterdir()} == {
-        "result.json",
-        "absorptance.csv",
-        "depth.csv",
-        "depth.png",
-    }
+    names = {path.name for path in out.iterdir()}
+    assert names == {"result.json", "absorptance.csv", "depth.csv", "depth.png"}
     table = np.loadtxt(out / "absorptance.csv", delimiter=",", skiprows=5)
     np.testing.assert_allclose(np.sum(table[:, 1:], axis=1), 1, atol=1e-9)
     exact = pl.field(450.0, 321.5, 1.46 + 0.1j, 3.9 + 0.02j, np.array(found["sections"][0]["depth_nm"]))
     np.testing.assert_allclose(found["sections"][0]["intensity"][0], exact.intensity, rtol=1e-9)
-    np.testing.assert_allclose(
-        found["sections"][0]["absorbed_per_nm"][0], exact.absorbed, rtol=1e-9, atol=1e-15
-    )
+    section = found["sections"][0]
+    np.testing.assert_allclose(section["absorbed_per_nm"][0], exact.absorbed, rtol=1e-9, atol=1e-15)
 
 
 @pytest.mark.parametrize(

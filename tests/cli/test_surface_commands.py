@@ -48,9 +48,8 @@ def test_the_command_writes_what_the_surface_sends_back(pellicle, tmp_path):
 def test_noise_seed_and_the_directions_of_a_file(pellicle, tmp_path):
     rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(80))
     (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
-    (tmp_path / "bare.toml").write_text(
-        RECIPE.replace('"brdf"\n', '"brdf"\nfiles = ["seen.csv"]\nnoise = 0.02\n')
-    )
+    more = '"brdf"\nfiles = ["seen.csv"]\nnoise = 0.02\n'
+    (tmp_path / "bare.toml").write_text(RECIPE.replace('"brdf"\n', more))
 
     def made(name, *flags):
         assert pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / name, *flags).code == 0
@@ -86,9 +85,8 @@ def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     (record,) = pellicle("plan", tmp_path / "paint.toml", "--tolerance", 1e-3, "--json").objects
     assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)
     found = {row["effect"]: row for row in record["effects"]}
-    assert list(found) == [
-        *("spectral-sampling", "bands", "roughness", "deviation", "diffuse", "coherence", "precision")
-    ]
+    names = ("spectral-sampling", "bands", "roughness", "deviation", "diffuse", "coherence", "precision")
+    assert tuple(found) == names
     assert sum(row["error_bound"] for row in found.values()) == record["error_bound"] <= 1e-3
     assert not found["deviation"]["on"]
     assert 0 < found["deviation"]["error_without"] < 1e-3 < found["diffuse"]["error_without"]

@@ -11,9 +11,8 @@ def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
     ran = pellicle("fit", spectrum_file(), *scene, "--verbose")
     sentences = re.findall(r"^ *\d+\.\d\d s  (.*)$", ran.err, re.MULTILINE)
     heads = [re.split(r":| of ", sentence)[0] for sentence in sentences if "oxide.csv" not in sentence]
-    assert list(dict.fromkeys(heads)) == [
-        *("scene", "free", "data", "plan", "scan", "polished", "weights", "status", "time")
-    ]
+    names = ("scene", "free", "data", "plan", "scan", "polished", "weights", "status", "time")
+    assert tuple(dict.fromkeys(heads)) == names
     assert "oxide.csv: 100 rows used: R from 400 to 796 nm" in ran.err
     assert "scene: from air (exactly 1): index 1.46, 10 to 800 nm, on index 3.9 + 0.02i" in sentences
     assert "free: thickness between 10 and 800 nm" in sentences
@@ -36,14 +35,9 @@ def test_where_the_time_went(capsys):
 
 
 def test_why_a_fit_is_no_answer(pellicle, spectrum_file):
-    ran = pellicle(
-        "fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250", "-v"
-    )
+    flags = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250")
+    ran = pellicle("fit", spectrum_file(), *flags, "-v")
     assert ran.code == 2  # there is no short form
-    ran = pellicle(
-        *("fit", spectrum_file(), "--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250"),
-        *("--noise", "0.002", "--verbose"),
-        code=4,
-    )
+    ran = pellicle("fit", spectrum_file(), *flags, "--noise", "0.002", "--verbose", code=4)
     assert "status: does the scene not explain the data? yes" in ran.err
     assert "its noise is given" in ran.err

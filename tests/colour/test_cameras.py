@@ -40,9 +40,8 @@ def test_linear_srgb_as_channels():
     channels = srgb_sensor(eye)
     np.testing.assert_allclose(channels.white, 1.0)
     spectrum = reflectance(eye.wavelength)
-    np.testing.assert_allclose(
-        spectrum @ channels.weights, linear_srgb(spectrum @ eye.weights, eye.white), atol=1e-6
-    )
+    expected = linear_srgb(spectrum @ eye.weights, eye.white)
+    np.testing.assert_allclose(spectrum @ channels.weights, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -31,10 +31,8 @@ def reference(layer, substrate, illuminant="D65", thickness=THICKNESS, angle=ANG
     observer = sensor("1931", illuminant)
     layer, substrate = (n(observer.wavelength) if callable(n) else n for n in (layer, substrate))
     cosine = np.cos(np.deg2rad(angle))[..., None]
-    xyz = (
-        airy(observer.wavelength, np.asarray(thickness)[..., None], layer, substrate, cosine)
-        @ observer.weights
-    )
+    film = np.asarray(thickness)[..., None], layer, substrate, cosine
+    xyz = airy(observer.wavelength, *film) @ observer.weights
     return np.asarray(lab(xyz, observer.white))
 
 
@@ -68,9 +66,8 @@ def test_other_illuminants(name, illuminant, limit):
 
 def test_optimised_samples_beat_equal_steps():
     thin = {"thickness": np.linspace(0.0, 500.0, 51), "angle": ANGLE}
-    ours, equal = (
-        np.mean(error(1.7, 2.7 + 2.8j, name, "E", **thin)) for name in ("nodes-8-500", "uniform-8")
-    )
+    names = ("nodes-8-500", "uniform-8")
+    ours, equal = (np.mean(error(1.7, 2.7 + 2.8j, name, "E", **thin)) for name in names)
     assert ours < 0.5 < equal
 
 
@@ -79,9 +76,8 @@ def test_error_of_the_constants_of_belcour_and_barla():
     films = {"thickness": np.arange(0.0, 2001.0, 50.0), "angle": ANGLE}
     errors = np.concatenate([error(n, 1.0, "belcour-barla", "E", **films).ravel() for n in (1.33, 1.7)])
     assert 0.7 < np.mean(errors) < 2.5
-    np.testing.assert_allclose(
-        integration_bands("belcour-barla", "1931", "E").weights.sum(axis=0), 1.0, atol=2e-3
-    )
+    bands = integration_bands("belcour-barla", "1931", "E")
+    np.testing.assert_allclose(bands.weights.sum(axis=0), 1.0, atol=2e-3)
     with pytest.raises(ValueError, match="gaussians-8"):
         film_colour(100.0, 2.0 + 0.1j, 1.5, method="belcour-barla")
 
@@ -126,9 +122,8 @@ def test_gradients(name):
 
     x, h = jnp.array([230.0, 1.8, 0.02, 35.0]), 1e-5 * np.eye(4)
     values = jax.jit(jax.vmap(lab_of))(jnp.concatenate([x + h, x - h]))
-    np.testing.assert_allclose(
-        jax.jit(jax.jacfwd(lab_of))(x), (values[:4] - values[4:]).T / 2e-5, rtol=1e-5, atol=1e-6
-    )
+    slopes, expected = jax.jit(jax.jacfwd(lab_of))(x), (values[:4] - values[4:]).T / 2e-5
+    np.testing.assert_allclose(slopes, expected, rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["rainbow", "points-645-525", "uniform-0", "nodes-7-500", "gaussians-9"])

@@ -77,9 +77,8 @@ def test_table_of_a_scene_is_that_of_the_film():
     """The forward model of scenes, with materials by name and a layer of no thickness."""
     scene = pl.Scene([pl.Layer(2.0, 0.0), pl.Layer("SiO2", pl.Free(0, 600), name="oxide")], "Si")
     table = colour_table(scene, (100.0, 300.0), (0.0, 60.0), "oxide", tolerance=1.0)
-    film = FilmColourTable.build(
-        pl.material("SiO2"), pl.material("Si"), (100, 300), angle=(0, 60), tolerance=1.0
-    )
+    media = pl.material("SiO2"), pl.material("Si")
+    film = FilmColourTable.build(*media, (100, 300), angle=(0, 60), tolerance=1.0)
     at = np.array([120.0, 200.0, 290.0])[:, None], np.array([0.5, 0.8, 1.0])
     np.testing.assert_allclose(table.xyz(*at), film.xyz(*at), atol=2e-6)
 

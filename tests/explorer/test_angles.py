@@ -70,16 +70,13 @@ def test_a_list_of_angles_has_no_slider_and_one_angle_has(session):
 
 def test_other_angles_use_the_same_program(session):
     view(session, ["curves"], thickness=250.0)
-    answer = session.answer(
-        "view", {"values": {"thickness": 180.0}, "want": ["curves"], "angles": [80, 55, 60]}
-    )
+    values = {"values": {"thickness": 180.0}, "want": ["curves"]}
+    answer = session.answer("view", values | {"angles": [80, 55, 60]})
     assert answer["compiling"] == []
     agrees(answer["curves"], (55.0, 60.0, 80.0), 180.0)
 
 
-@pytest.mark.parametrize(
-    "angles", [[], [91], [-1], "65", ["65"], [True], [float("nan")], list(range(13)), 65]
-)
+@pytest.mark.parametrize("angles", [[], [91], [-1], ["65"], [True], [float("nan")], list(range(13)), 65])
 def test_wrong_angles_are_refused(session, angles):
     for request in ("view", "scene", "recipe"):
         assert "1 to 12 numbers from 0 to 90" in session.answer(request, {"angles": angles})["error"]
@@ -158,15 +155,13 @@ def test_data_at_several_angles_replace_the_light_and_are_fitted_together(monkey
     for curve in answer["curves"]:
         rows = data.angle == float(curve["setting"].rstrip("°"))
         assert curve["x"] == NM.tolist()
-        assert np.allclose(
-            curve["y"], (data.values if curve["signal"] == "Ψ" else data.delta)[rows], atol=1e-4
-        )
+        truth = data.values if curve["signal"] == "Ψ" else data.delta
+        assert np.allclose(curve["y"], truth[rows], atol=1e-4)
     assert session.answer("scene", {})["angles"] == [60.0, 72.0]
     given = []
     monkeypatch.setattr(fit_run, "fit", lambda data, scene, progress: given.append((data, scene)))
-    assert session.answer("fit", {"values": {"thickness": 100.0}, "angles": [60.0, 65.0]}) == {
-        "stopped": True
-    }
+    several = {"values": {"thickness": 100.0}, "angles": [60.0, 65.0]}
+    assert session.answer("fit", several) == {"stopped": True}
     assert session.answer("fit", {"values": {"angle": 30.0}, "angles": [60.0]}) == {"stopped": True}
     for fitted, scene_of_fit in given:
         assert np.unique(fitted.angle).tolist() == [60.0, 72.0]
@@ -181,10 +176,8 @@ def test_data_at_one_wavelength_are_drawn_against_their_angles():
     angles = np.arange(50.0, 71.0, 1.0)
     answer = session.answer("data", {"name": "laser.csv", "text": csv(measured(angles, [658.0]))})
     assert answer["notes"][0] == "laser.csv: psi-delta, 21 points at 658 nm, at 21 angles from 50 to 70°"
-    assert [(curve["label"], curve["x"]) for curve in answer["curves"]] == [
-        ("Ψ", angles.tolist()),
-        ("Δ", angles.tolist()),
-    ]
+    drawn = {curve["label"]: curve["x"] for curve in answer["curves"]}
+    assert drawn == dict.fromkeys("ΨΔ", angles.tolist())
     curves = view(session, ["curves"], thickness=180.0)["curves"]
     for curve, own in zip(curves, answer["curves"], strict=True):
         assert np.allclose(np.interp(angles, curve["x"], curve["y"]), own["y"], rtol=0, atol=1e-3)
@@ -192,9 +185,8 @@ def test_data_at_one_wavelength_are_drawn_against_their_angles():
 
 def test_of_many_angles_twelve_are_drawn():
     session = Session(pl.Scene(pl.Layer(1.7, 100.0), 3.9 + 0.02j))
-    answer = session.answer(
-        "data", {"name": "many.csv", "text": csv(measured(np.arange(50.0, 80.0), NM[:6]))}
-    )
+    text = csv(measured(np.arange(50.0, 80.0), NM[:6]))
+    answer = session.answer("data", {"name": "many.csv", "text": text})
     settings = {curve["setting"] for curve in answer["curves"]}
     assert len(settings) == 12
     assert {"50°", "79°"} < settings
@@ -205,9 +197,8 @@ def test_folded_data_fold_the_curve():
     session = Session(pl.Scene(pl.Layer(1.7, 180.0), 3.9 + 0.02j))
     data = measured((60.0, 72.0), NM)
     delta = np.minimum(data.delta, 360 - data.delta)
-    folded = pl.Spectrum(
-        data.wavelength, data.values, "psi-delta", delta=delta, angle=data.angle, folded=True
-    )
+    about = {"delta": delta, "angle": data.angle, "folded": True}
+    folded = pl.Spectrum(data.wavelength, data.values, "psi-delta", **about)
     session.view = session.view.measured([folded])
     for curve in view(session, ["curves"])["curves"]:
         if curve["signal"] == "Δ":
@@ -231,9 +222,8 @@ def test_of_a_mueller_matrix_the_measured_elements_are_drawn():
 
 
 def test_data_without_an_angle_need_one(session):
-    answer = session.answer(
-        "data", {"name": "a.csv", "text": "wavelength_nm,psi_deg,delta_deg\n500,30,90\n600,30,90"}
-    )
+    text = "wavelength_nm,psi_deg,delta_deg\n500,30,90\n600,30,90"
+    answer = session.answer("data", {"name": "a.csv", "text": text})
     assert "a.csv: states no angle of incidence, and the scene has 65°, 70°, 75°" in answer["error"]
 
 

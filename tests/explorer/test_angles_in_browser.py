@@ -49,9 +49,8 @@ def agrees(page, angles, thickness, atol=2e-3):
     assert list(drawn) == [f"{signal} {angle:g}°" for signal in "ΨΔ" for angle in angles]
     layer = pl.Layer("SiO2", thickness)
     for angle in angles:
-        truth = pl.simulate(
-            pl.Scene(layer, "Si", light=pl.Light(angle=float(angle), signal="psi-delta")), nm(page)
-        )
+        light = pl.Light(angle=float(angle), signal="psi-delta")
+        truth = pl.simulate(pl.Scene(layer, "Si", light=light), nm(page))
         for quantity, values in (("Ψ", truth.values), ("Δ", truth.delta)):
             own = drawn[f"{quantity} {angle:g}°"]["y"]
             assert np.allclose([y for y in own if y is not None], values, rtol=0, atol=atol)
@@ -154,21 +153,11 @@ def test_an_address_with_wrong_angles_shows_the_scene(opened):
     assert agrees(page, (65, 70, 75), 300.0)
 
 
-def test_recipe_and_python_state_the_angles(opened):
-    page = opened("&angles=60,70&thickness=300")
-    for button, text in (("Recipe", "angle = [60, 70]"), ("Python", "np.repeat([60.0, 70.0], 101)")):
-        page.get_by_role("button", name=button).click()
-        page.get_by_role("heading", name=button).wait_for()
-        assert text in page.locator("dialog code").text_content()
-        page.keyboard.press("Escape")
-
-
 def drop_spectrum(page, name, spectrum):
     """Drop a file of Ψ and Δ on the page."""
     rows = np.transpose([spectrum.wavelength, spectrum.angle, spectrum.values, spectrum.delta])
-    text = "\n".join(
-        ["wavelength_nm,angle_deg,psi_deg,delta_deg", *(",".join(map(str, row)) for row in rows)]
-    )
+    lines = [",".join(map(str, row)) for row in rows]
+    text = "\n".join(["wavelength_nm,angle_deg,psi_deg,delta_deg", *lines])
     drop(page, name, text.encode())
     page.locator(".notes").get_by_text(name).first.wait_for()
     both = """() => {

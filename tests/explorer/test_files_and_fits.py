@@ -17,9 +17,8 @@ NM = np.linspace(400.0, 800.0, 128)
 @pytest.fixture
 def session(tmp_path):
     (tmp_path / "recipe").mkdir()
-    return Session(
-        pl.Scene(pl.Layer("SiO2", pl.Free(10.0, 1000.0)), "Si"), tmp_path / "recipe", wavelength=NM
-    )
+    film = pl.Scene(pl.Layer("SiO2", pl.Free(10.0, 1000.0)), "Si")
+    return Session(film, tmp_path / "recipe", wavelength=NM)
 
 
 def csv(header, *columns):

@@ -100,9 +100,8 @@ def test_it_opens_at_every_width_without_error_or_foreign_request(opened, width,
     assert agrees(page, 250.0)
     background = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert (background == "rgb(255, 255, 255)") == (scheme == "light")
-    beside = (
-        page.locator(".spectrum").bounding_box()["x"] > page.locator(".controls").bounding_box()["x"] + 100
-    )
+    left = [page.locator(place).bounding_box()["x"] for place in (".spectrum", ".controls")]
+    beside = left[0] > left[1] + 100
     assert beside == (width == 1400)
     assert page.locator(".trouble").is_hidden()
     assert "L*" in page.locator(".patch").get_attribute("aria-label")
@@ -162,12 +161,6 @@ def test_a_drag_moves_everything_and_a_double_click_resets(opened):
     settle(page)
     assert number(page).input_value() == "250"
     assert np.allclose(curve(page), before["curve"])
-
-
-def test_the_address_reproduces_the_state(opened):
-    page = opened("&thickness=333.5")
-    assert agrees(page, 333.5)
-    assert number(page).input_value() == "333.5"
 
 
 def test_a_number_is_typed(opened):
@@ -245,13 +238,6 @@ def test_the_recipe_reads_back_and_the_snippet_runs(opened, tmp_path):
     code = page.locator("dialog code").text_content()
     ran = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
-
-
-def test_a_wrong_token_is_refused(browser, address):
-    page = browser.new_page()
-    assert page.goto(address.replace("token=", "token=x")).status == 403
-    assert page.goto(address.split("?")[0]).status == 403
-    page.close()
 
 
 def test_one_request_is_sent_at_a_time_and_the_newest_next(browser, address):

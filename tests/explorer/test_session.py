@@ -52,9 +52,8 @@ def test_curve_is_that_of_the_values(session, values, film):
     assert (curve["label"], curve["x"]) == ("R", NM.tolist())
     assert np.allclose(curve["y"], [reflectance(nm, *film) for nm in NM], rtol=0, atol=2e-7)  # 7 digits
     plan = {row["effect"]: row["choice"] for row in answer["plan"]}
-    assert (plan["oblique"], plan["absorption"]) == tuple(
-        "on" if values.get(name) else "off" for name in ("angle", "k")
-    )
+    switches = tuple("on" if values.get(name) else "off" for name in ("angle", "k"))
+    assert (plan["oblique"], plan["absorption"]) == switches
 
 
 def test_colour_is_the_integral_over_the_spectrum(session):
@@ -67,9 +66,8 @@ def test_colour_is_the_integral_over_the_spectrum(session):
 
 
 def test_sphere_is_that_of_the_ball(session):
-    answer = session.answer(
-        "view", {"values": {"thickness": 250.0}, "want": ["sphere"], "size": 40, "wait": True}
-    )
+    body = {"values": {"thickness": 250.0}, "want": ["sphere"], "size": 40, "wait": True}
+    answer = session.answer("view", body)
     head, content = answer["sphere"].split(",")
     assert head == "data:image/png;base64"
     shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(content)))) / 255
@@ -140,9 +138,8 @@ def test_a_cone_beyond_grazing_incidence_is_a_warning(session):
 
 
 def test_a_colour_without_data_is_a_warning():
-    infrared = Session(
-        pl.Scene(pl.Layer("Si/Chandler-Horowitz", 2000.0), 1.5), wavelength=[7000.0, 8000.0, 9000.0]
-    )
+    film = pl.Scene(pl.Layer("Si/Chandler-Horowitz", 2000.0), 1.5)
+    infrared = Session(film, wavelength=[7000.0, 8000.0, 9000.0])
     answer = infrared.answer("view", {"want": ["curves", "colour"], "wait": True})
     assert len(answer["curves"][0]["y"]) == 3
     assert "colour" not in answer

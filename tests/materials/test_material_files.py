@@ -73,9 +73,8 @@ def test_latin_1(write, name):
 )
 def test_decimal_commas(write, name):
     suffix, text = FORMATS[name]
-    rows = [
-        line.replace(".", ",") if line[:1].isdigit() or line[:1] == " " else line for line in text.split("\n")
-    ]
+    number = re.compile(r"[\d ]")
+    rows = [row.replace(".", ",") if number.match(row) else row for row in text.split("\n")]
     check(write("\n".join(rows), suffix), name)
 
 
@@ -89,9 +88,8 @@ def test_a_file_cut_off_within_its_last_row_is_refused(write, name):
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_file_without_rows_is_refused(write, name):
     suffix, text = FORMATS[name]
-    head = [
-        line for line in text.split("\n") if not line.strip()[:1].isdigit() and not line.startswith("DATA1")
-    ]
+    row = re.compile(r"\s*\d|DATA1")
+    head = [line for line in text.split("\n") if not row.match(line)]
     refused(write("\n".join(head), suffix))
 
 
@@ -119,9 +117,7 @@ def test_what_a_file_says_of_itself_is_kept(write):
     assert "refractiveindex.info page" in page.note
     assert "a resin" in page.note
     mat = material(write(FORMATS["WVASE eV"][1], ".mat"))
-    assert (
-        mat.note == "WVASE or CompleteEASE material file; energy in eV, eps1, eps2; 3 rows; Resin made by me"
-    )
+    assert mat.note.endswith("material file; energy in eV, eps1, eps2; 3 rows; Resin made by me")
     assert mat.warnings() == []
 
 
@@ -149,9 +145,7 @@ def test_a_column_k_without_cells_is_none(write):
     assert is_real(source.index(500.0))
 
 
-@pytest.mark.parametrize(
-    "text", ["400 1.5 0.1\n600 1.4 0.05\n", "wavelength,n,k\n400,1.5,0.1\n600,1.4,0.05\n"]
-)
+@pytest.mark.parametrize("text", ["400 1.5 0.1\n600 1.4 0.05\n", "wl,n,k\n400,1.5,0.1\n600,1.4,0.05\n"])
 def test_nm_that_no_unit_states_is_said_with_every_result(write, text):
     assert "read as nm" in check(write(text)).warnings()[0]
 

@@ -11,6 +11,9 @@ BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'
 N, K = "{ lower = 1.5, upper = 2.5 }", "{ lower = 0, upper = 0.5 }"
 CONSTANT = f'{{ model = "constant", n = {N}, k = {K} }}'
 
+CLEAR = f'model = "constant", n = {N}'
+LINEAR = 'mix = "linear", inclusion = 1.0, fraction = 0.1'
+
 
 def film(material: str) -> str:
     return BASE.replace('"SiO2"', material)
@@ -31,14 +34,8 @@ def test_a_constant_index_of_a_layer(scene):
     [
         (BASE.replace('"Si"', CONSTANT), ["thickness", "substrate.n", "substrate.k"]),
         (BASE.replace('"Si"', f"{{ material = 1.5, back = {CONSTANT} }}"), ["thickness", "back.n", "back.k"]),
-        (
-            BASE.replace("[scene]", f'[scene]\nambient = {{ model = "constant", n = {N} }}'),
-            ["thickness", "ambient.n"],
-        ),
-        (
-            film(f'{{ mix = "linear", host = {CONSTANT}, inclusion = 1.0, fraction = 0.1 }}'),
-            ["host.n", "host.k", "thickness"],
-        ),
+        (BASE.replace("[scene]", f"[scene]\nambient = {{ {CLEAR} }}"), ["thickness", "ambient.n"]),
+        (film(f"{{ host = {CONSTANT}, {LINEAR} }}"), ["host.n", "host.k", "thickness"]),
     ],
     ids=["substrate", "back", "ambient", "mixture"],
 )

@@ -23,9 +23,8 @@ def names(scene):
 
 
 def test_a_porous_layer(scene_of):
-    scene = scene_of(
-        '{ mix = "bruggeman", host = "SiO2", inclusion = "air", fraction = { lower = 0, upper = 0.5 } }'
-    )
+    media = 'mix = "bruggeman", host = "SiO2", inclusion = "air"'
+    scene = scene_of(f"{{ {media}, fraction = {{ lower = 0, upper = 0.5 }} }}")
     assert isinstance(scene.layers[0].material, Bruggeman)
     (fraction,) = parameters(scene)
     assert (fraction.name, fraction.unit, fraction.lower, fraction.upper) == ("fraction", "", 0, 0.5)
@@ -72,9 +71,8 @@ def test_a_sum_of_oscillators(scene_of):
 
 
 def test_splines(scene_of):
-    scene = scene_of(
-        '{ model = "spline", knots = [400, 600, 900], n = { lower = 1.2, upper = 2.5 }, k = [0.1, 0, 0] }'
-    )
+    spline = '{ model = "spline", knots = [400, 600, 900], '
+    scene = scene_of(spline + "n = { lower = 1.2, upper = 2.5 }, k = [0.1, 0, 0] }")
     assert set(names(scene)) == {"n1", "n2", "n3"}
     assert scene.layers[0].material.knots == (400, 600, 900)
     scene = scene_of('{ model = "spline-kk", knots = [400, 600, 900], k = { lower = 0, upper = 1 } }')
@@ -178,9 +176,7 @@ def test_a_graded_layer(scene_of):
 
 
 def test_a_free_profile(scene_of):
-    graded = (
-        '{ graded = ["SiO2", "Si3N4"], profile = "spline", values = [0, { lower = 0, upper = 1 }, 0.4, 1] }'
-    )
+    graded = '{ graded = ["SiO2", "Si3N4"], profile = "spline", values = [0, { lower = 0, upper = 1 }, 1] }'
     (value,) = parameters(scene_of(graded))
     assert (value.name, value.group, value.natural) == ("values2", "values", (True, False))
 

@@ -11,9 +11,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 KEPT = json.loads((ROOT / "docs" / "recipe.schema.json").read_text(encoding="utf-8"))
 VALIDATOR = jsonschema.validators.validator_for(KEPT)(KEPT)
-RECIPES = sorted(
-    path for folder in ("docs", "fits", "measurements") for path in (ROOT / folder).rglob("*.toml")
-)
+FOLDERS = ("docs", "fits", "measurements")
+RECIPES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.toml"))
 
 
 def test_it_is_what_the_models_say():

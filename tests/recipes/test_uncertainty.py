@@ -1,5 +1,7 @@
 """Uncertainties in recipes: each replaces the usual one, of an instrument, a layer or the substrate."""
 
+from dataclasses import fields
+
 import pytest
 
 from pellicle.scene.layers import Uncertainty
@@ -7,19 +9,9 @@ from pellicle.scene.layers import Uncertainty
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
 BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'
 
-INSTRUMENT = [
-    "wavelength",
-    "bandwidth",
-    "angle",
-    "angle_spread",
-    "scale",
-    "offset",
-    "psi",
-    "delta",
-    "depolarisation",
-    "mueller",
-]
+MATERIAL = 'material = "SiO2"\n'
 SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer"]
+INSTRUMENT = [field.name for field in fields(Uncertainty) if field.name not in SAMPLE]
 
 
 @pytest.mark.parametrize("name", INSTRUMENT + SAMPLE)
@@ -37,9 +29,8 @@ def test_an_uncertainty_replaces_the_usual_one(scene, name):
 
 
 def test_uncertainties_of_a_layer_and_the_substrate(scene):
-    found = scene(
-        BASE.replace('"Si"', '{ material = "Si", index_uncertainty = 0.001 }') + "index_uncertainty = 0\n"
-    )
+    text = BASE.replace('"Si"', '{ material = "Si", index_uncertainty = 0.001 }')
+    found = scene(text + "index_uncertainty = 0\n")
     assert (found.layers[0].index_uncertainty, found.substrate.index_uncertainty) == (0, 0.001)
     plain = scene(BASE)
     assert plain.uncertainty == Uncertainty()
@@ -54,10 +45,7 @@ def test_uncertainties_of_a_layer_and_the_substrate(scene):
         (BASE + "[instrument]\nindex_uncertainty = 0.1\n", ("instrument.index_uncertainty",)),
         (BASE + "index_uncertainty = -1\n", ("index_uncertainty", "0")),
         (BASE.replace("[scene]\n", '[scene]\nuncertainty = "some"\n'), ("scene.uncertainty", "'some'")),
-        (
-            BASE.replace('material = "SiO2"\n', 'between = "linear"\nindex_uncertainty = 0.1\n'),
-            ("index_uncertainty does not go with between",),
-        ),
+        (BASE.replace(MATERIAL, 'between = "linear"\nindex_uncertainty = 0.1\n'), ("not go with between",)),
     ],
 )
 def test_uncertainties_refused(refused, text, said):

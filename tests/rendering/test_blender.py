@@ -24,9 +24,8 @@ SCALE = 1.25
 def _unsolved():
     """A scale in place of the solution, which takes seconds; test_cycles_formula.py has that."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            "pellicle.rendering.export.effective", lambda *film: physical(*film)._replace(scale=SCALE)
-        )
+        unsolved = lambda *film: physical(*film)._replace(scale=SCALE)  # noqa: E731
+        patch.setattr("pellicle.rendering.export.effective", unsolved)
         yield
 
 
@@ -64,9 +63,8 @@ class Sockets(dict):
 def test_a_metal_has_its_film_and_indices_in_the_script(steel, monkeypatch):
     path, record = steel.files
     found, nodes = script(path, monkeypatch)
-    assert found["RECORD"] == {
-        k: v for k, v in json.loads(record.read_text("utf-8")).items() if k != "target"
-    }
+    written = json.loads(record.read_text("utf-8"))
+    assert found["RECORD"] == {k: v for k, v in written.items() if k != "target"}
     found["film_material"]("physical")
     metal = nodes["ShaderNodeBsdfMetallic"]
     assert metal.fresnel_type == "PHYSICAL_CONDUCTOR"

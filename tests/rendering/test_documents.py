@@ -39,9 +39,8 @@ def folder(tmp_path_factory):
 def library():
     """MaterialX's own definitions of its nodes."""
     found = MaterialX.createDocument()
-    MaterialX.loadLibraries(
-        MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath(), found
-    )
+    folders, path = MaterialX.getDefaultDataLibraryFolders(), MaterialX.getDefaultDataSearchPath()
+    MaterialX.loadLibraries(folders, path, found)
     return found
 
 

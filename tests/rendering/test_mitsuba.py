@@ -12,6 +12,7 @@ import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
 from pellicle.rendering.mitsuba import ALPHA, write_surface
+from tests.directions import unit
 
 mi = pytest.importorskip("mitsuba")
 
@@ -53,11 +54,7 @@ def lobe(i, o, alpha):
 
 def directions():
     for light, viewer, off in LIGHTS:
-        theta, phi = np.deg2rad([light, viewer]), np.deg2rad([0, 180 + off])
-        yield [
-            np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
-            for t, p in zip(theta, phi, strict=True)
-        ]
+        yield [unit(light, 0), unit(viewer, 180 + off)]
 
 
 @pytest.fixture(scope="module")
@@ -194,11 +191,7 @@ def spread_directions(count):
     random = np.random.default_rng(0)
     for light, viewer in random.uniform(size=(count, 2, 2)):
         thetas = np.arccos(1 - (1 - np.cos(np.deg2rad(75))) * np.array([light[0], viewer[0]]))
-        phis = 2 * np.pi * np.array([light[1], viewer[1]])
-        yield [
-            np.array([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
-            for t, p in zip(thetas, phis, strict=True)
-        ]
+        yield list(unit(np.rad2deg(thetas), 360 * np.array([light[1], viewer[1]])))
 
 
 @pytest.mark.slow

@@ -18,9 +18,15 @@ from pellicle.scene.surface import Surface, surface_view
 @pytest.fixture
 def fit() -> Fit:
     """A free thickness and index, a fixed B, a drifting scale and an offset; one near rival."""
+    rows = (
+        Row("absorption", False, "the layer has no extinction, and none is free"),
+        Row("back-face", True, "the substrate is a plate; its back face adds incoherently"),
+    )
     nm = np.linspace(400.0, 800.0, 41)
     model = 0.3 + 0.1 * np.cos(nm / 30)
     noise = 0.002 * np.sin(nm)
+    above = np.zeros((5, 5))
+    above[np.triu_indices(5, 1)] = [0.62, 0.49, -0.97, 0.1, 0.2, 0.3, 0.0, -0.88, 0.93, 0.4]
     return Fit(
         parts=(
             Part(
@@ -36,14 +42,7 @@ def fit() -> Fit:
                     n_stderr=np.full(41, 0.0012),
                     k_stderr=np.zeros(41),
                 ),
-                plan=Plan(
-                    (
-                        Row("absorption", False, "the layer has no extinction, and none is free"),
-                        Row("back-face", True, "the substrate is a plate; its back face adds incoherently"),
-                    ),
-                    "R",
-                    "unpolarised",
-                ),
+                plan=Plan(rows, "R", "unpolarised"),
                 rms=0.00141,
                 chi2_reduced=1.02,
                 effective_points=12.0,
@@ -65,15 +64,7 @@ def fit() -> Fit:
         rms=0.00141,
         effective_points=12.0,
         correlation_names=("thickness", "A", "instrument.scale", "instrument.scale_1", "instrument.offset"),
-        correlation=np.array(
-            [
-                [1.0, 0.62, 0.49, -0.97, 0.1],
-                [0.62, 1.0, 0.2, 0.3, 0.0],
-                [0.49, 0.2, 1.0, -0.88, 0.93],
-                [-0.97, 0.3, -0.88, 1.0, 0.4],
-                [0.1, 0.0, 0.93, 0.4, 1.0],
-            ]
-        ),
+        correlation=above + above.T + np.eye(5),
         warnings=("SiO2 has no data for k: it is taken as transparent, which its source does not say.",),
         profile=Profile(np.linspace(10.0, 3000.0, 60), np.linspace(5.0, 400.0, 60)),
         seconds=0.42,
@@ -97,14 +88,8 @@ def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
     spectrum = Spectrum(
         wavelength, psi + 0.1, "psi-delta", angle=angle, path="/data/film.csv", sha256="ab" * 32, delta=turned
     )
-    zeros = np.zeros(size)
-    arrays = {
-        "sigma": zeros + 0.1,
-        "n": zeros + 1.46,
-        "k": zeros,
-        "n_stderr": zeros + 0.001,
-        "k_stderr": zeros,
-    }
+    numbers = {"sigma": 0.1, "n": 1.46, "k": 0.0, "n_stderr": 0.001, "k_stderr": 0.0}
+    arrays = {name: np.full(size, number) for name, number in numbers.items()}
     made = Curve(
         wavelength=spectrum.wavelength,
         data=spectrum.values,
@@ -119,9 +104,8 @@ def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
 @pytest.fixture
 def spectroscopic(fit, with_part) -> Fit:
     """Ψ and Δ at 20 wavelengths and two angles."""
-    return ellipsometric(
-        fit, np.repeat(np.linspace(400.0, 800.0, 20), 2), np.tile([65.0, 75.0], 20), with_part
-    )
+    nm, angle = np.repeat(np.linspace(400.0, 800.0, 20), 2), np.tile([65.0, 75.0], 20)
+    return ellipsometric(fit, nm, angle, with_part)
 
 
 @pytest.fixture

@@ -109,9 +109,8 @@ def test_an_infinite_error_leaves_a_gap_in_the_band(fit, with_part, tmp_path):
 
 def test_lines_cross_neither_gaps_nor_angles(fit, with_part):
     half = np.flatnonzero((fit.curve.wavelength < 500) | (fit.curve.wavelength > 700))
-    curve = replace(
-        fit.curve, **{name: array[half] for name, array in vars(fit.curve).items() if array is not None}
-    )
+    arrays = {name: array for name, array in vars(fit.curve).items() if array is not None}
+    curve = replace(fit.curve, **{name: array[half] for name, array in arrays.items()})
     spectrum = replace(fit.spectrum, wavelength=curve.wavelength, values=curve.data)
     gapped = draw(with_part(fit, curve=curve, data=spectrum)).axes[0]
     fitted = gapped.lines[1].get_xdata()
@@ -142,13 +141,8 @@ def test_a_figure_belongs_to_no_window(fit):
 def test_a_joint_fit_has_panels_for_each_file(fit, spectroscopic):
     parts = (replace(fit.parts[0], name="film"), replace(spectroscopic.parts[0], name="a$b"))
     drawn = draw(replace(fit, parts=parts, rms=None))
-    assert labels(drawn)[:5] == [
-        "reflectance",
-        "data − fit",
-        "Ψ (degrees)",
-        "Δ (degrees)",
-        "data − fit (degrees)",
-    ]
+    panels = ["reflectance", "data − fit", "Ψ (degrees)", "Δ (degrees)", "data − fit (degrees)"]
+    assert labels(drawn)[:5] == panels
     assert [at.get_title(loc="left") for at in drawn.axes[:5]] == ["film", "", r"a\$b", "", ""]
     assert drawn.axes[1].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[1])
     assert not drawn.axes[0].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[2])

@@ -215,9 +215,8 @@ def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tm
         chi2_reduced=1.5,
     )
     folder_per_file(tmp_path, ["a.csv", "b.csv", "c.csv"])
-    write_summary(
-        tmp_path / "summary.csv", [to_json(fit), failure("c, d.csv", "no such file"), to_json(other)]
-    )
+    records = [to_json(fit), failure("c, d.csv", "no such file"), to_json(other)]
+    write_summary(tmp_path / "summary.csv", records)
     assert (tmp_path / "summary.csv").read_text().startswith("# ")
     frame = pd.read_csv(tmp_path / "summary.csv", comment="#")
     names = ("thickness", "k", "instrument.scale", "n")

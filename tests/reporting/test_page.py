@@ -140,9 +140,8 @@ def test_a_missing_number_is_none(fit, with_part):
 
 def test_a_figure_of_many_points_is_thinned_and_says_so(fit, with_part):
     nm = np.linspace(400.0, 800.0, 50_000)
-    wide = {
-        name: np.full(nm.size, 0.3) for name in ("data", "model", "sigma", "n", "k", "n_stderr", "k_stderr")
-    }
+    names = ("data", "model", "sigma", "n", "k", "n_stderr", "k_stderr")
+    wide = {name: np.full(nm.size, 0.3) for name in names}
     curve = replace(fit.parts[0].curve, wavelength=nm, **wide)
     data = replace(fit.parts[0].data, wavelength=nm, values=wide["data"])
     text = fit_page(with_part(fit, curve=curve, data=data), IMAGE)

@@ -45,10 +45,8 @@ def opened(browser, tmp_path):
 
 def drawn(page, name, figure="data-0"):
     """Ordinates of the traces of a figure whose names begin with `name`."""
-    script = (
-        "([id, name]) => document.getElementById(id).data.filter(t => t.name.startsWith(name)).map(t => t.y)"
-    )
-    return page.evaluate(script, [figure, name])
+    traces = "document.getElementById(id).data.filter(t => t.name.startsWith(name))"
+    return page.evaluate(f"([id, name]) => {traces}.map(t => t.y)", [figure, name])
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -148,9 +146,8 @@ def test_the_numbers_of_a_figure_unfold_as_a_table(opened, curved):
     rows = page.locator("details[data-figure='data-0'] tbody tr")
     rows.last.wait_for()
     assert rows.count() == 41
-    assert float(rows.nth(4).locator("td").nth(1).inner_text()) == pytest.approx(
-        curved.curve.data[4], rel=1e-5
-    )
+    shown = float(rows.nth(4).locator("td").nth(1).inner_text())
+    assert shown == pytest.approx(curved.curve.data[4], rel=1e-5)
 
 
 def test_colours_follow_the_mode_while_the_page_is_open(opened, curved):
@@ -162,9 +159,7 @@ def test_colours_follow_the_mode_while_the_page_is_open(opened, curved):
 
 
 def test_nothing_in_a_file_name_or_message_runs(opened, curved):
-    nasty = (
-        "</script><script>alert(1)</script><img src=x onerror=alert(2)><a href='javascript:alert(3)'>x</a>"
-    )
+    nasty = "</script><script>alert(1)</script><img src=x onerror=alert(2)><a href='javascript:x()'>x</a>"
     [part] = curved.parts
     wrong = replace(curved, warnings=(nasty,), verdict=nasty, parts=(replace(part, name=nasty),))
     page = opened(fit_page(wrong, IMAGE, again=[(nasty, nasty)]))
@@ -181,9 +176,8 @@ def test_the_table_of_a_batch_sorts_filters_and_leads_to_pages(browser, curved, 
     write_index(root, records, [root / "none", root / "two", root / "one"])
     page = browser.new_page(viewport={"width": 1400, "height": 900})
     page.goto((root / "report.html").as_uri())
-    names = (
-        "[...document.querySelectorAll('tbody tr:not([hidden])')].map((row) => row.cells[3].dataset.value)"
-    )
+    rows = "[...document.querySelectorAll('tbody tr:not([hidden])')]"
+    names = f"{rows}.map((row) => row.cells[3].dataset.value)"
     assert page.evaluate(names) == ["900", "", "486.28"]
     head = page.get_by_role("button", name="thickness (nm)")
     head.click()

@@ -73,10 +73,7 @@ def posterior(fit) -> Posterior:
 
 
 def test_a_posterior_reports_draws_and_saves_itself(posterior, tmp_path):
-    assert (
-        posterior.report()
-        == posterior.fit.report() + "[[Posterior]]" + posterior.report().split("[[Posterior]]")[1]
-    )
+    assert posterior.report().startswith(posterior.fit.report() + "[[Posterior]]")
     assert len(posterior.plot().axes) == 4
     posterior.save(tmp_path / "out")
     assert {"result.json", "posterior.nc", "corner.png", "predictive.png", "figure.png"} <= {
@@ -125,6 +122,5 @@ def test_a_cost_reports_draws_and_saves_itself(tmp_path):
         assert words in text
         assert len(cost.plot().axes) == 1
         cost.save(tmp_path / "out")
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {
-        *("report.txt", "result.json", "cost.csv", "cost.png")
-    }
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"report.txt", "result.json", "cost.csv", "cost.png"}

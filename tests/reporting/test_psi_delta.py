@@ -60,24 +60,6 @@ def test_one_wavelength_is_drawn_against_the_angle(angular, tmp_path):
     assert (tmp_path / "figure.png").stat().st_size > 20_000
 
 
-def test_points_without_an_angle_are_one_line(spectroscopic, with_part):
-    half = {
-        name: array[::2] for name, array in vars(spectroscopic.curve).items() if isinstance(array, np.ndarray)
-    }
-    data = spectroscopic.spectrum
-    spectrum = dataclasses.replace(
-        data, wavelength=half["wavelength"], values=half["data"], delta=half["delta_data"], angle=None
-    )
-    curve = dataclasses.replace(spectroscopic.curve, **half)
-    drawn = draw(with_part(spectroscopic, curve=curve, data=spectrum))
-    assert named(drawn.axes[0]) == ["data", "fit"]
-
-
-def test_many_angles_are_not_all_named(as_ellipsometry):
-    many = as_ellipsometry(np.repeat(np.linspace(400.0, 800.0, 5), 9), np.tile(np.arange(9) + 60.0, 5))
-    assert named(draw(many).axes[0]) == ["data"]
-
-
 def test_the_report_says_degrees(spectroscopic, angular):
     text = " ".join(report(spectroscopic).split())
     assert "psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in text
@@ -88,9 +70,8 @@ def test_the_report_says_degrees(spectroscopic, angular):
 
 def test_the_table_is_read_again_as_it_is(spectroscopic, with_part, tmp_path):
     size = len(spectroscopic.spectrum)
-    data = dataclasses.replace(
-        spectroscopic.spectrum, sigma=np.full(size, 0.1), delta_sigma=np.full(size, 0.2)
-    )
+    sigma = {"sigma": np.full(size, 0.1), "delta_sigma": np.full(size, 0.2)}
+    data = dataclasses.replace(spectroscopic.spectrum, **sigma)
     for spectrum in (spectroscopic.spectrum, data):
         text = fit_csv(with_part(spectroscopic, data=spectrum))
         (tmp_path / "fit.csv").write_text(text)
@@ -107,9 +88,8 @@ def test_the_table_is_read_again_as_it_is(spectroscopic, with_part, tmp_path):
 def test_the_table_holds_model_and_residuals(spectroscopic):
     header, first, *others = fit_csv(spectroscopic).splitlines()[3:]
     assert {row.split(",")[-1] for row in others} == {"2"}
-    assert header == (
-        "wavelength_nm,angle_deg,psi_deg,psi_model,psi_residual,delta_deg,delta_model,delta_residual"
-    )
+    columns = "psi_deg,psi_model,psi_residual,delta_deg,delta_model,delta_residual"
+    assert header == f"wavelength_nm,angle_deg,{columns}"
     numbers = dict(zip(header.split(","), map(float, first.split(",")), strict=True))
     assert numbers["psi_residual"] == 0.1
     assert numbers["delta_residual"] == 2.0
@@ -118,14 +98,13 @@ def test_the_table_holds_model_and_residuals(spectroscopic):
 
 def test_reflectances_of_one_wavelength_are_drawn_against_the_angle(angular, with_part):
     """As those of a laser: one wavelength has no spectrum, in the figure as in the page."""
-    spectrum = dataclasses.replace(
-        angular.spectrum, signal="R", delta=None, values=angular.spectrum.values / 100
-    )
+    values = angular.spectrum.values / 100
+    spectrum = dataclasses.replace(angular.spectrum, signal="R", delta=None, values=values)
     curve = dataclasses.replace(angular.curve, delta_data=None, delta_model=None)
     of_laser = with_part(angular, data=spectrum, curve=curve)
-    values, residuals = draw(of_laser).axes[:2]
-    assert named(values) == ["data", "fit"]
+    panel, residuals = draw(of_laser).axes[:2]
+    assert named(panel) == ["data", "fit"]
     assert residuals.get_xlabel() == "angle of incidence (degrees)"
-    for line in (*values.lines, residuals.lines[0]):
+    for line in (*panel.lines, residuals.lines[0]):
         np.testing.assert_array_equal(line.get_xdata(), spectrum.angle)
     assert of_part(of_laser, 0)["layout"]["xaxis"]["title"]["text"] == "angle of incidence (degrees)"

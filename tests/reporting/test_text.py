@@ -107,9 +107,8 @@ def test_rivals_nearest_first_at_most_six(fit):
 def test_plan_warnings_and_statistics(fit):
     text = report(fit)
     # the column is as wide as the longest name of the plan
-    assert (
-        block(text, "Plan")[1] == "back-face  on   the substrate is a plate; its back face adds incoherently"
-    )
+    row = "back-face  on   the substrate is a plate; its back face adds incoherently"
+    assert block(text, "Plan")[1] == row
     assert block(text, "Warnings")[0].startswith("- SiO2 has no data for k")
     assert block(text, "Fit statistics") == [
         "rms residual        0.00141",
@@ -133,9 +132,8 @@ def test_no_line_is_longer_than_100_columns(fit, with_part):
     )
     text = report(long)
     assert max(map(len, text.splitlines())) <= 100
-    assert any(
-        line.startswith("file    …") and line.endswith("long/film.csv") for line in block(text, "Verdict")
-    )
+    [path] = [line for line in block(text, "Verdict") if line.startswith("file    …")]
+    assert path.endswith("long/film.csv")
     assert "\x1b" not in text
 
 
@@ -143,16 +141,13 @@ def test_a_joint_fit_has_a_line_for_each_file(fit, spectroscopic):
     text = report(joint(fit, spectroscopic))
     verdict = block(text, "Verdict")
     assert "film    R, 41 points from 400 to 800 nm, worth 12 independent ones" in verdict
-    assert "angles  psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in " ".join(
-        verdict
-    )
+    described = "angles  psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12"
+    assert described in " ".join(verdict)
     statistics = block(text, "Fit statistics")
     assert any(line.startswith("rms residual of film") and "0.00141" in line for line in statistics)
     assert any(line.startswith("rms residual of angles") and "0.123 degrees" in line for line in statistics)
-    assert [line for line in block(text, "Plan: what was simulated") if line.endswith(":")] == [
-        "film:",
-        "angles:",
-    ]
+    names = [line for line in block(text, "Plan: what was simulated") if line.endswith(":")]
+    assert names == ["film:", "angles:"]
     assert max(map(len, text.splitlines())) <= 100
 
 

@@ -68,9 +68,8 @@ def test_values_of_tmm(form, angle, polarisation):
 
 
 def test_a_bare_reference_and_a_plan_within_a_tolerance():
-    bare = pl.Scene(
-        pl.Layer(1.46, 100.0), "Si", light=pl.Light(NM, signal="contrast"), reference=pl.Reference("Si")
-    )
+    light = pl.Light(NM, signal="contrast")
+    bare = pl.Scene(pl.Layer(1.46, 100.0), "Si", light=light, reference=pl.Reference("Si"))
     sample, substrate = (pl.reflectance(NM, d, 1.46, "Si") for d in (100.0, 0.0))
     values = pl.simulate(bare, NM).values
     np.testing.assert_allclose(values, (sample - substrate) / substrate, atol=1e-12)
@@ -90,9 +89,8 @@ def test_scene_and_data_are_checked():
         pl.Spectrum(NM, np.full(64, -1.2), "contrast")
     with pytest.raises(DataError, match="above 50 for a contrast"):
         pl.Spectrum(NM, np.full(64, 120.0), "contrast")
-    scaled = pl.Scene(
-        scene().layers, SILICON, instrument=pl.Instrument(scale="free"), reference=scene().reference
-    )
+    free = pl.Instrument(scale="free")
+    scaled = pl.Scene(scene().layers, SILICON, instrument=free, reference=scene().reference)
     with pytest.raises(UsageError, match="contrast has no scale and no offset"):
         pl.fit(pl.simulate(scene(), NM), scaled)
 

@@ -62,9 +62,8 @@ def test_quantities_of_columns(depolarisation):
     columns = np.random.default_rng(0).normal(size=(4, 7, 6))
     psi, delta = psi_delta(columns.reshape(4, 7, 2, 3))
     ratios = kind("generalised-psi-delta", parts=("ane", "asp")).in_quantities(columns)
-    np.testing.assert_array_equal(
-        ratios, np.stack([psi[..., 0], delta[..., 0], psi[..., 1], delta[..., 1]], -1)
-    )
+    both = [psi[..., 0], delta[..., 0], psi[..., 1], delta[..., 1]]
+    np.testing.assert_array_equal(ratios, np.stack(both, -1))
     one = kind("psi-delta", depolarisation=depolarisation).in_quantities(columns[..., : 3 + depolarisation])
     np.testing.assert_array_equal(one[..., :2], ratios[..., :2])
     np.testing.assert_array_equal(one[..., 2:], columns[..., 3 : 3 + depolarisation])

@@ -18,20 +18,12 @@ LAYER, BASE, D = 1.46, 3.9 + 0.02j, 310.0
 @pytest.fixture(scope="module")
 def spectra():
     """Unpolarised reflectance of the film by tmm, (angles, wavelengths)."""
-    return np.array(
-        [
-            [
-                np.mean(
-                    [
-                        tmm.coh_tmm(s, [1, LAYER, BASE], [np.inf, D, np.inf], np.deg2rad(angle), nm)["R"]
-                        for s in "sp"
-                    ]
-                )
-                for nm in NM[::5]
-            ]
-            for angle in ANGLES
-        ]
-    )
+
+    def reflectance(angle, nm):
+        film = [1, LAYER, BASE], [np.inf, D, np.inf], np.deg2rad(angle), nm
+        return np.mean([tmm.coh_tmm(polarisation, *film)["R"] for polarisation in "sp"])
+
+    return np.array([[reflectance(angle, nm) for nm in NM[::5]] for angle in ANGLES])
 
 
 def scene(**light):
@@ -79,9 +71,8 @@ def test_channels_of_a_camera_with_gamma_exposure_and_matrix(spectra):
     made = pl.simulate(exposed, sensor=seen, space="rgb", angle=ANGLES, gamma=2.2)
     np.testing.assert_allclose(made.values, linear ** (1 / 2.2), atol=2e-3)
     like = pl.Colours(made.values, seen, "rgb", angle=made.angle, gamma=2.2, camera=matrix)
-    np.testing.assert_allclose(
-        pl.simulate(exposed, sensor=like).values, (linear @ matrix.matrix.T) ** (1 / 2.2), atol=2e-3
-    )
+    coded = (linear @ matrix.matrix.T) ** (1 / 2.2)
+    np.testing.assert_allclose(pl.simulate(exposed, sensor=like).values, coded, atol=2e-3)
 
 
 def test_noise_becomes_sigma_and_stays_within_the_codes():

@@ -72,9 +72,8 @@ def steel():
 def test_pixels_of_a_rough_uneven_film(steel, at):
     """The thickness is that of the noise at the pixel."""
     pixels = sphere(SIZE)
-    axes = np.asarray(
-        frame(*np.rad2deg([np.arccos(pixels.normal[:, 2]), np.arctan2(*pixels.normal.T[1::-1])]))
-    )
+    x, y, z = pixels.normal.T
+    axes = np.asarray(frame(*np.rad2deg([np.arccos(z), np.arctan2(y, x)])))
     maps = following(UNEVEN, relief(pixels.normal, axes, np.random.default_rng(0)))
     nm = maps["thickness"][np.count_nonzero(pixels.mask.ravel()[: at[0] * SIZE + at[1]])]
     for environment, rendering in steel.items():
@@ -120,9 +119,8 @@ def test_deviation_and_thickness_follow_the_noise_between_their_bounds():
 @pytest.mark.slow  # renders for 3 s
 def test_media_have_their_own_index_at_each_wavelength():
     """A table of a named film and base is that of `film_colour`, whatever the channels of the surface."""
-    oxide = pl.Surface(
-        "microfacet-film", {"thickness": 140.0}, wavelengths=(550.0,), film="Fe2O3", base="BK7"
-    )
+    media = {"film": "Fe2O3", "base": "BK7"}
+    oxide = pl.Surface("microfacet-film", {"thickness": 140.0}, wavelengths=(550.0,), **media)
     found = in_colour(oxide).numbers["table"].xyz(140.0, 1.0)
     expected = film_colour(140.0, pl.material("Fe2O3"), pl.material("BK7"), method="uniform-64").xyz
     np.testing.assert_allclose(found, expected, atol=3e-4)
