@@ -215,7 +215,7 @@ def test_missing_files_and_folders(tmp_path):
 def test_a_layer_and_a_recipe_take_a_file(write, tmp_path):
     path = Path(write(FORMATS["WVASE eV"][1], ".mat"))
     assert Layer(path, 100.0).material.wavelength_range == pytest.approx((400, 600), abs=1e-6)
-    assert recipe_medium("resin.mat", tmp_path).wavelength_range == pytest.approx((400, 600), abs=1e-6)
+    assert recipe_medium("resin.mat", folder=tmp_path).wavelength_range == pytest.approx((400, 600), abs=1e-6)
 
 
 @pytest.mark.parametrize("eps1", [-1e4, -7.3, -1e-9, 0.0, 1e-9, 2.2, 180.0])
