@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.settings import named, setting_numbers, settings
-from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum import Spectrum, named, setting_numbers, settings
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError
 from tests.data.tables import assert_read

@@ -26,7 +26,7 @@ from pellicle.colour.observers import (
 )
 from pellicle.data.colour_rows import bare_name, colour_cells, scaled
 from pellicle.data.colours import CameraMatrix
-from pellicle.data.tabular.axis import axis_unit, read_axis
+from pellicle.data.spectrum_rows import axis_unit, read_axis
 from pellicle.data.tabular.column_selection import AxisColumns, first_column
 from pellicle.data.tabular.columns import Column, listed, recognise_all
 from pellicle.data.tabular.layout import read_table

@@ -6,9 +6,8 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Reading, Rows
-from pellicle.data.tabular.column_names import MUELLER
 from pellicle.data.tabular.column_selection import Selection, error_columns, only, select, without_header
-from pellicle.data.tabular.columns import Column, listed
+from pellicle.data.tabular.columns import MUELLER, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma

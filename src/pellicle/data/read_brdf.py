@@ -9,8 +9,7 @@ import numpy as np
 from pellicle.data.brdf_samples import CHANNELS, ROUNDING, BrdfSamples, sigma_names
 from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
-from pellicle.data.formats.rgl import read_rgl
-from pellicle.data.formats.tensor_file import is_tensor_file
+from pellicle.data.formats.rgl import is_tensor_file, read_rgl
 from pellicle.data.tabular.column_selection import named_columns, only
 from pellicle.data.tabular.columns import DIRECTIONS, Column, listed
 from pellicle.data.tabular.layout import find_layout

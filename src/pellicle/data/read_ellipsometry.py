@@ -15,8 +15,7 @@ from jaxtyping import Float
 
 from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Reading, Rows
-from pellicle.data.tabular.axis import Axis
+from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Axis, Reading, Rows
 from pellicle.data.tabular.column_selection import (
     AxisColumns,
     Selection,

@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import Reading, Rows
-from pellicle.data.tabular.axis import axis_unit
-from pellicle.data.tabular.column_names import COUNTERS, MUELLER, RATIO_COLUMNS
+from pellicle.data.spectrum_rows import Reading, Rows, axis_unit
 from pellicle.data.tabular.column_selection import (
     AxisColumns,
     Selection,
@@ -17,7 +15,16 @@ from pellicle.data.tabular.column_selection import (
     only,
     select,
 )
-from pellicle.data.tabular.columns import COUNTS, SIGNALS, Column, listed, unknown_unit
+from pellicle.data.tabular.columns import (
+    COUNTERS,
+    COUNTS,
+    MUELLER,
+    RATIO_COLUMNS,
+    SIGNALS,
+    Column,
+    listed,
+    unknown_unit,
+)
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError

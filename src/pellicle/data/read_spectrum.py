@@ -14,9 +14,8 @@ from pellicle.data.read_ellipsometry import FORMS, PSI_DELTA, SIGNAL, ellipsomet
 from pellicle.data.read_power import power_columns, read_power
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import Reading
-from pellicle.data.tabular.column_names import RATIO_COLUMNS
 from pellicle.data.tabular.column_selection import Selection, named_columns
-from pellicle.data.tabular.columns import DIRECTIONS, SIGNALS, Column, listed
+from pellicle.data.tabular.columns import DIRECTIONS, RATIO_COLUMNS, SIGNALS, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import Generalised

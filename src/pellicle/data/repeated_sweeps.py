@@ -24,7 +24,7 @@ def sweep_numbers(
 ) -> Int[np.ndarray, " rows"]:
     """Number of the sweep of each row: how many earlier rows have the same wavelength and setting.
 
-    `setting` is that of `data.settings.setting_numbers`: an angle of incidence and an azimuth.
+    `setting` is that of `data.spectrum.setting_numbers`: an angle of incidence and an azimuth.
     """
     if setting is None and one_way(wavelength):
         return np.zeros(len(wavelength), dtype=np.int64)

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.data.formats.bilinear_warp import BilinearWarp, Corners
-from pellicle.data.formats.rgl import RglBrdf, unit_to_phi, unit_to_theta
-from pellicle.data.formats.tensor_file import write_tensors
+from pellicle.data.formats.rgl import RglBrdf, unit_to_phi, unit_to_theta, write_tensors
 from pellicle.data.half_angles import vectors
 
 Brdf = Callable[[np.ndarray, np.ndarray], np.ndarray]

@@ -16,8 +16,7 @@ from pellicle.colour.spaces import linear_srgb, srgb
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.half_angles import vectors
-from pellicle.data.settings import named
-from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum import Spectrum, named
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.reporting.drawable import CHANNELS, SERIES, Style
 from pellicle.signals.base import Quantity as Measured

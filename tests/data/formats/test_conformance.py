@@ -16,7 +16,7 @@ FOLDER = Path(__file__).with_name("samples")
 SAMPLES = {path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.glob("*/*"))}
 READERS = {
     "accurion": accurion.layout,
-    **{r.__module__.split(".")[-1] if r.__name__ == "layouts" else r.__name__: r for r in TEXT_READERS},
+    **{r.__module__.split(".")[-1] if r.__name__ == "read" else r.__name__: r for r in TEXT_READERS},
 }
 READING = {
     "ocean_optics": {"signal": "R", "signal_unit": "percent"},

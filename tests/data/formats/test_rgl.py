@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.data.formats.rgl import load_rgl, read_rgl
-from pellicle.data.formats.tensor_file import write_tensors
+from pellicle.data.formats.rgl import load_rgl, read_rgl, write_tensors
 from pellicle.data.half_angles import angles, vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.read_spectrum import read_spectrum

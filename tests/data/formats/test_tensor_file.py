@@ -6,7 +6,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from pellicle.data.formats.tensor_file import MAGIC, is_tensor_file, read_tensors, write_tensors
+from pellicle.data.formats.rgl import MAGIC, is_tensor_file, read_tensors, write_tensors
 from pellicle.errors import DataError, UsageError
 
 FIELDS = {

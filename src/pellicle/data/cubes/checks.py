@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.tabular.axis import LONGEST_ASSUMED, SHORTEST_ASSUMED
+from pellicle.data.spectrum_rows import LONGEST_ASSUMED, SHORTEST_ASSUMED
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError

@@ -9,10 +9,8 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from pellicle.data.formats import accurion, jcamp, nexus, procspec, vendor_binary, woollam
-from pellicle.data.formats.bench_spectrometers import bruker_dpt, jasco, perkin_elmer
+from pellicle.data.formats import accurion, jcamp, nexus, spectrometers, vendor_binary, woollam
 from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
-from pellicle.data.formats.fibre_spectrometers import avantes, ocean_optics, stellarnet
 from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
 from pellicle.data.tabular.layout import bulk_layout, find_layout
 from pellicle.data.tabular.table import Table
@@ -23,22 +21,22 @@ TextReader = Callable[[TextFile], Sequence[Table] | None]
 BinaryReader = Callable[[bytes, str], Sequence[Table] | None]
 
 TEXT_READERS: tuple[TextReader, ...] = (
-    jcamp.layouts,
-    woollam.layouts,
+    jcamp.read,
+    woollam.read,
     spectraray,
     film_sense,
     regress_pro,
     horiba,
-    ocean_optics,
-    avantes,
-    perkin_elmer,
-    jasco,
-    stellarnet,
-    bruker_dpt,
+    spectrometers.ocean_optics,
+    spectrometers.avantes,
+    spectrometers.perkin_elmer,
+    spectrometers.jasco,
+    spectrometers.stellarnet,
+    spectrometers.bruker_dpt,
     scans_side_by_side,
     stacked_tables,
 )
-BINARY_READERS: tuple[BinaryReader, ...] = (procspec.layouts, nexus.layouts, vendor_binary.layouts)
+BINARY_READERS: tuple[BinaryReader, ...] = (vendor_binary.procspec, nexus.read, vendor_binary.by_openreadout)
 
 
 def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[Table]:

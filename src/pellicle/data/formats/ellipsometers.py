@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from pellicle.data.formats.exports import Facts, Rows, export
-from pellicle.data.tabular.column_names import MUELLER
+from pellicle.data.tabular.columns import MUELLER
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit

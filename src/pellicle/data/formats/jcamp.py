@@ -70,7 +70,7 @@ class _Block:
         return [part.strip() for part in self.text(label).split(",")]
 
 
-def layouts(file: TextFile) -> list[Table] | None:
+def read(file: TextFile) -> list[Table] | None:
     """Return the spectra of a JCAMP-DX file, or None for another format.
 
     Raises DataError for a table that contradicts the records above it, and for one without spectra.

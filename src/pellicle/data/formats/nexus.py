@@ -30,7 +30,7 @@ _ERRORS |= dict.fromkeys(ONE_COLUMN, "sigma")
 _MOST_MEMBERS = 1000
 
 
-def layouts(content: bytes, path: str) -> list[Table] | None:
+def read(content: bytes, path: str) -> list[Table] | None:
     """Return the spectra of a NeXus or NetCDF file, or None for another format.
 
     Raises DataError where h5py is absent, and for a file without spectra, damaged, or with parts elsewhere.

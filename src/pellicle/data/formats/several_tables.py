@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
-from pellicle.data.tabular.columns import Column, declarations, is_header, recognise
+from pellicle.data.tabular.columns import Column, is_header, recognise
 from pellicle.data.tabular.layout import find_layout
-from pellicle.data.tabular.table import Table, plain_columns
+from pellicle.data.tabular.table import Table, declarations, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
 
 _MOST_HEADING = 40

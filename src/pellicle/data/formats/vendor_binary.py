@@ -1,12 +1,19 @@
-"""Binary files of spectrometers: GRAMS SPC, Bruker OPUS, PerkinElmer `.sp` and JASCO `.jws`.
+"""Binary files of spectrometers: GRAMS SPC, Bruker OPUS, PerkinElmer, JASCO, Ocean Optics ProcSpec.
 
-They are recognised by their first bytes and decoded by the package openreadout (extra `formats`), from
-memory. It gives each trace with the quantity and the unit of both axes; what it does not name is not guessed.
+All but the last are recognised by their first bytes and decoded by the package openreadout (extra `formats`),
+from memory. It gives each trace with the quantity and the unit of both axes; what it does not name is not
+guessed.
 """
 
+import io
+import re
 import struct
+import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
 from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -41,8 +48,25 @@ _MOST_SPECTRA = 1000
 _SPECTRAL = ("wavelength", "wavenumber", "energy")
 _OF_QUANTITY = {"transmittance": "T", "reflectance": "R", "absorbance": "absorbance", "log_1_r": "log(1/R)"}
 
+LARGEST_XML = 16 << 20
+"""Bytes of unpacked XML that are read; files have about half a megabyte."""
+MOST_RATIO = 200
+"""Highest ratio of compression; lists of numbers reach about 10."""
+_MOST_MEMBERS = 100
+_MEMBER = re.compile(r"(?:.*/)?ps_\d+\.xml")
+_ANYWHERE = re.compile(rb"ps_\d{1,9}\.xml")
+_UNPRINTABLE = re.compile(rb"[^\t\n\r\x20-\x7e]")
+_MODE_TAG = re.compile(r"unit|mode|processor|label|type", re.IGNORECASE)
+_MODES = {
+    "R": re.compile(r"reflect", re.IGNORECASE),
+    "T": re.compile(r"transmi", re.IGNORECASE),
+    "absorbance": re.compile(r"absorb", re.IGNORECASE),
+    "irradiance": re.compile(r"irradian|energy|power", re.IGNORECASE),
+}
+_PROCSPEC = "Ocean Optics ProcSpec"
 
-def layouts(content: bytes, path: str) -> list[Table] | None:
+
+def by_openreadout(content: bytes, path: str) -> list[Table] | None:
     """Return the spectra of such a file, or None for another format.
 
     Raises DataError where openreadout is absent or cannot read the file, and for other quantities.
@@ -60,12 +84,16 @@ def layouts(content: bytes, path: str) -> list[Table] | None:
         ) from None
     try:
         with openreadout.File(content, name=f"file.{kind}") as file:
-            _check(file, name, path)
+            findings = file.check()["findings"]
+            if damage := next((x["message"] for x in findings if x["severity"] == "error"), ""):
+                raise DataError(  # openreadout reads what is left
+                    f"{path}: is a damaged {name} file ({_plain(damage)}); copy or export it again"
+                )
             curves = list(_curves(file, name, len(content), path))
     except DataError:
         raise
     except Exception as error:  # a foreign reader on a damaged file may raise anything
-        reason = " ".join(str(error).partition(" (hint")[0].split()) or type(error).__name__
+        reason = _plain(str(error).partition(" (hint")[0]) or type(error).__name__
         raise DataError(
             f"{path}: is a {name} file that cannot be read ({reason}); export it as CSV"
         ) from None
@@ -97,16 +125,6 @@ def _is_spc(content: bytes) -> bool:
         first != last and all(x == 0 or _SPC_SMALLEST < x < _SPC_LARGEST for x in ends) and points >= 1
     )
     return plausible and axis_code <= 31 and (signal_code <= 32 or signal_code >= 128)
-
-
-def _check(file: Any, name: str, path: str) -> None:
-    """Refuse a file in which openreadout finds damage, of which it reads what is left. Raises DataError."""
-    findings = file.check()["findings"]
-    error = next((finding["message"] for finding in findings if finding["severity"] == "error"), None)
-    if error is not None:
-        raise DataError(
-            f"{path}: is a damaged {name} file ({' '.join(error.split())}); copy or export it again"
-        )
 
 
 def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
@@ -174,3 +192,132 @@ def _measured(x: np.ndarray, y: np.ndarray, name: str, path: str) -> tuple[Seque
     if invalid.all():
         raise DataError(f"{path}: is a {name} file without a measured point; export it again")
     return (x[~invalid], y[~invalid]), notes
+
+
+def procspec(content: bytes, path: str) -> list[Table] | None:
+    """Return the processed spectrum of an Ocean Optics ProcSpec file, or None for another format.
+
+    It is a zip of `ps_N.xml`, OOISignatures.xml and OOIVersion.txt. The XML is a `ProcessedSpectrum` of
+    SpectraSuite, with the wavelengths in nm (`channelWavelengths`) and the processed values
+    (`processedPixels`) as lists of `double`, and has characters that XML does not allow, which are left out.
+    No part is unpacked to disk; entities and document types are refused. The layout is that of the readers
+    of lightr and Veusz.
+
+    Raises DataError where defusedxml is absent, for a damaged file, and for one that is too large to unpack.
+    """
+    if not content.startswith(b"PK\x03\x04"):
+        return None
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = [info for info in archive.infolist() if _MEMBER.fullmatch(info.filename)]
+            if not members or len(archive.infolist()) > _MOST_MEMBERS:
+                return None
+            documents = [_unpacked(archive, info, path) for info in members]
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        OSError,
+        ValueError,
+    ) as e:
+        if isinstance(e, DataError):
+            raise
+        if not _ANYWHERE.search(content):
+            return None
+        raise DataError(
+            f"{path}: is an {_PROCSPEC} file that cannot be unpacked ({_plain(str(e))}); copy it again"
+        ) from None
+    return readable([_processed(_parsed(document, path), path) for document in documents], path)
+
+
+def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: str) -> bytes:
+    """The content of a member. Raises DataError for one that is too large, before it is unpacked."""
+    document = b""
+    too_large = info.file_size > LARGEST_XML or info.file_size > MOST_RATIO * max(info.compress_size, 1)
+    if not too_large:
+        with archive.open(info) as member:
+            document = member.read(LARGEST_XML + 1)  # the size that the directory states may be wrong
+    if too_large or len(document) > LARGEST_XML:
+        raise DataError(
+            f"{path}: is an {_PROCSPEC} file whose {info.filename} unpacks to {info.file_size} bytes, which "
+            "no spectrum has; export the spectrum as text"
+        )
+    return document
+
+
+def _parsed(document: bytes, path: str) -> Element:
+    try:
+        from defusedxml.ElementTree import fromstring
+    except ImportError:
+        raise DataError(
+            f"{path}: is an {_PROCSPEC} file, which needs the package defusedxml: "
+            f"{install_command('formats')}; or export the spectrum as text"
+        ) from None
+    try:
+        return fromstring(_UNPRINTABLE.sub(b"", document), forbid_dtd=True)
+    except Exception as error:  # syntax errors, and entities and document types that defusedxml refuses
+        raise DataError(
+            f"{path}: is an {_PROCSPEC} file whose XML cannot be read ({type(error).__name__}: "
+            f"{_plain(str(error))}); export the spectrum as text"
+        ) from None
+
+
+def _plain(error: str) -> str:
+    """The text of an error in one line."""
+    return " ".join(error.split())[:200]
+
+
+def _processed(root: Element, path: str) -> Curve:
+    wavelength = _doubles(root, "channelWavelengths", path)
+    processed = _doubles(root, "processedPixels", path)
+    values = processed if processed.size else _doubles(root, "pixelValues", path)
+    if not wavelength.size or wavelength.size != values.size:
+        raise DataError(
+            f"{path}: is an {_PROCSPEC} file of {wavelength.size} wavelengths and {values.size} processed "
+            "values; export the spectrum as text"
+        )
+    quantity = "counts (the file has no processed spectrum)"
+    if processed.size:
+        words = set()
+        for element in root.iter():
+            stated = [element.tag, element.get("class", "")]
+            if _MODE_TAG.search(element.tag) and len(element) == 0:
+                stated.append(element.text or "")
+            words |= {mode for mode, pattern in _MODES.items() if any(map(pattern.search, stated))}
+        quantity = words.pop() if len(words) == 1 else "intensity"  # where the file does not state one alone
+    name = signal_column(quantity) or quantity
+    model = (root.findtext(".//spectrometerClass") or "").rpartition(".")[2]
+    serial = root.findtext(".//spectrometerSerialNumber") or ""
+    facts = [("format", _PROCSPEC)]
+    if instrument := f"{model} {serial}".strip():
+        facts.append(("instrument", instrument))
+    milliseconds = root.findtext(".//milliTime") or ""
+    if milliseconds.isdigit() and len(milliseconds) < 15:
+        date = datetime.fromtimestamp(int(milliseconds) / 1000, UTC)
+        facts.append(("date", date.strftime("%Y-%m-%d %H:%M:%S UTC")))
+    # SpectraSuite shows R and T in percent, but the file does not say so
+    name = f"{name} (not stated)" if name in ("R", "T") else name
+    layout = array_columns(
+        ("wavelength (nm)", name),
+        (wavelength, values),
+        [f"read as an {_PROCSPEC} file"],
+        name=name,
+        facts=facts,
+    )
+    return Curve(layout, "wavelength (nm)", quantity)
+
+
+def _doubles(root: Element, tag: str, path: str) -> np.ndarray:
+    """The numbers of the first element of this name that has some."""
+    for element in root.iter(tag):
+        texts = [child.text or "" for child in element.iter("double")]
+        if texts:
+            try:
+                return np.array([float(text) for text in texts])
+            except ValueError as error:
+                raise DataError(
+                    f"{path}: {tag} has no number ({error}); export the spectrum as text"
+                ) from None
+    return np.empty(0)

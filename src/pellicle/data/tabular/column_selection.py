@@ -5,8 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pellicle.data.tabular.column_names import COUNTERS
-from pellicle.data.tabular.columns import SIGNALS, Column, listed, parse_columns, recognise, recognise_all
+from pellicle.data.tabular.columns import (
+    COUNTERS,
+    SIGNALS,
+    Column,
+    listed,
+    parse_columns,
+    recognise,
+    recognise_all,
+)
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 

@@ -1,8 +1,7 @@
-"""Columns of a table by their names, and what the lines above its rows declare.
+"""Columns of a table by their names, in the languages that instruments write.
 
 Names are matched without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
-after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`). Of the lines above the
-rows only those of a keyword and a value count, as `Y-axis mode: %T` or `##XUNITS=1/CM`; free text does not.
+after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`).
 """
 
 import re
@@ -10,12 +9,116 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from pellicle.data.tabular.column_names import FOREIGN, NAMES, RATIO_COLUMNS
-from pellicle.data.tabular.text import Line
 from pellicle.data.tabular.units import angle_unit, signal_unit, wavelength_unit
 from pellicle.errors import UsageError
-from pellicle.signals.registry import ONE_COLUMN
+from pellicle.signals.registry import KINDS, ONE_COLUMN
 
+NAMES: dict[str, tuple[str, ...]] = {
+    "wavelength": (
+        *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
+        *("wellenlänge", "wellenlaenge", "longueur d'onde", "longueur d’onde", "longitud de onda"),
+        *("lunghezza d'onda", "lunghezza d’onda", "comprimento de onda", "golflengte", "波長", "波长"),
+    ),
+    "energy": (
+        *("energy", "photon energy", "photon_energy", "energie", "photonenergie"),
+        *("e(ev)", "e (ev)", "e[ev]", "e [ev]", "e/ev", "e / ev", "e_ev"),
+    ),
+    "wavenumber": (
+        *("wavenumber", "wavenumbers", "wave number", "wellenzahl", "nombre d'onde", "nombre d’onde"),
+        *("número de onda", "波数"),
+    ),
+    "frequency": ("frequency", "frequenz"),
+    "R": (
+        *("r", "reflectance", "reflectivity", "reflection", "reflexion", "réflexion", "réflectance"),
+        *("reflexionsgrad", "reflektivität", "reflektanz", "reflectancia", "riflettanza", "反射率"),
+    ),
+    "Rs": ("rs", "r_s", "reflectance_s"),
+    "Rp": ("rp", "r_p", "reflectance_p"),
+    "T": (
+        *("t", "transmittance", "transmissivity", "transmission", "transmissionsgrad"),
+        *("transmitancia", "trasmittanza", "透過率", "透过率"),
+    ),
+    "Ts": ("ts", "t_s", "transmittance_s"),
+    "Tp": ("tp", "t_p", "transmittance_p"),
+    "absorbance": (
+        *("-log(t)", "-log10(t)", "log(1/t)"),
+        *("a", "abs", "abs.", "absorbance", "optical density", "optical_density", "od", "o.d."),
+        *("extinktion", "absorbanz", "absorbancia", "assorbanza", "吸光度"),
+    ),
+    "log(1/R)": ("log(1/r)", "-log(r)", "-log10(r)", "log 1/r", "log_1_r", "apparent absorbance"),
+    "intensity": ("intensity", "relative intensity", "relative_intensity"),
+    "counts": ("counts", "raw"),
+    "processed": ("processed",),
+    "sample counts": ("sample counts",),
+    "reference counts": ("reference counts",),
+    "dark counts": ("dark counts",),
+    "sigma": ("sigma", "σ"),
+    "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
+    "azimuth": ("azimuth", "sample azimuth", "sample_azimuth", "sample rotation"),
+    "psi": ("psi", "ψ"),
+    "delta": ("delta", "δ"),
+    "sigma_psi": ("sigma_psi", "psi_sigma", "psi_err", "psi_error", "err_psi"),
+    "sigma_delta": ("sigma_delta", "delta_sigma", "delta_err", "delta_error", "err_delta"),
+    "depolarisation": ("depolarisation", "depolarization", "depol"),
+    "sigma_depolarisation": (
+        "sigma_depolarisation",
+        "sigma_depolarization",
+        "sigma_depol",
+        "depolarisation_sigma",
+        "depolarization_sigma",
+        "depol_sigma",
+        "depol_err",
+        "depol_error",
+        "err_depol",
+    ),
+    "N": ("n",),
+    "C": ("c",),
+    "S": ("s",),
+    "alpha": ("alpha", "α"),
+    "beta": ("beta", "β"),
+    "tan_psi": ("tan_psi", "tan(psi)", "tan psi", "tanpsi", "tan(ψ)", "tan ψ", "tanψ"),
+    "cos_delta": ("cos_delta", "cos(delta)", "cos delta", "cosdelta", "cos(δ)", "cos δ", "cosδ"),
+    "analyser": ("analyser", "analyzer", "analyser angle", "analyzer angle"),
+    "theta_i": ("theta_i", "θ_i"),
+    "phi_i": ("phi_i", "φ_i"),
+    "theta_o": ("theta_o", "θ_o"),
+    "phi_o": ("phi_o", "φ_o"),
+    "value": ("value", "brdf"),
+    "G": ("g",),
+    "B": ("b",),
+    "sigma_R": ("sigma_r",),
+    "sigma_G": ("sigma_g",),
+    "sigma_B": ("sigma_b",),
+}
+"""Names of each role; a column of any other name is ignored, with a note."""
+_SIGMA_OF = ("sigma_{}", "{}_sigma", "{}_err", "{}_error", "err_{}")
+_PLACES = tuple(f"{i}{j}" for i in range(1, 5) for j in range(1, 5))
+MUELLER = tuple(f"m{place}" for place in _PLACES)
+"""Roles of the elements of a Mueller matrix, m11 to m44."""
+NAMES |= {f"m{place}": (f"m{place}", f"mm{place}", f"m_{place}", f"m_{{{place}}}") for place in _PLACES}
+NAMES |= {
+    f"sigma_{element}": tuple(form.format(f"{m}{element[1:]}") for m in ("m", "mm") for form in _SIGMA_OF)
+    for element in MUELLER
+}
+RATIO_COLUMNS = tuple(f"{angle}_{ratio}" for ratio in ("ane", "aps", "asp") for angle in ("psi", "delta"))
+"""Roles of generalised Ψ and Δ, those of each ratio side by side."""
+for _role in RATIO_COLUMNS:
+    NAMES[_role] = (_role, _role.replace("_", " "), "{}({})".format(*_role.split("_")))
+    NAMES[f"sigma_{_role}"] = tuple(form.format(_role) for form in _SIGMA_OF)
+NAMES |= {word: kind.names for word, kind in KINDS.items() if kind.names}
+FOREIGN = (
+    *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
+    *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),
+    *("radiance", "raman", "raman intensity", "scope", "single beam"),
+    *("absorption coefficient", "attenuation", "insertion loss", "1-r", "1-t", "1-r-t", "-ln(t)", "-ln(r)"),
+    *("absorption (%)", "absorption [%]"),  # a share, as absorptance
+    *("re(rho)", "im(rho)", "re(ρ)", "im(ρ)", "re_rho", "im_rho"),
+    *("is", "ic", "ic'"),  # of a phase-modulated ellipsometer
+)
+"""Names of quantities that are not read: neither R nor T, psi and delta, nor elements of a Mueller matrix."""
+
+COUNTERS = ("index", "no", "no.", "nr", "nr.", "number", "point", "pixel", "row", "time", "time (s)")
+"""Names of columns that count rows or give times, which are no signals."""
 SIGNALS = ONE_COLUMN
 """Roles of the signals of one column; psi-delta has two."""
 COUNTS = ("sample counts", "reference counts", "dark counts")
@@ -65,50 +168,6 @@ _PERCENT_INSIDE = re.compile(r"[(\[]\s*%\s*[)\]]")
 SKIP = "_"
 UNSTATED = "unit not stated"
 """Unit in the name of a column whose unit must be asked for."""
-
-_ENTRY = re.compile(r"[#\s\"']*(?P<key>[^=:;,\t]{1,40}?)[\"']?\s*(?:[=:]|[\t;,])\s*(?P<value>.*?)[\s\"';,]*")
-_AXIS = re.compile(
-    r"(x[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
-    r"|(wavelength|axis|abscissa|spectral)[ _-]?(unit|type|mode|scale)s?)"
-)
-_SIGNAL = re.compile(
-    r"(y[ _-]?(axis|unit|label|title)s?([ _-]?(mode|unit|label|title|type)s?)?"
-    r"|(data|measurement|measuring|photometric|ordinate|display|acquisition)[ _-]?(mode|type|unit|scale)s?"
-    r"|ordinate|quantity|technique|signal([ _-](type|unit))?|(spectrum|spectral)[ _-]type|measured quantity)"
-)
-_ANGLE = re.compile(
-    r"(angle|(angle of|incidence|incident) (incidence|angle)|aoi|einfallswinkel)"
-    r"( ?[(\[]?(deg(rees?)?|°)[)\]]?)?"
-)
-_DEGREES = re.compile(r"(\d+(?:[.,]\d+)?)\s*(?:°|deg(?:rees?)?\.?)?")
-_POLARISATION = re.compile(r"polari[sz](ation|er)( (state|mode|position))?")
-_POLARISED = {
-    "s": re.compile(r"(s|te)([ -]?(pol.*|wave|light))?"),
-    "p": re.compile(r"(p|tm)([ -]?(pol.*|wave|light))?"),
-    "unpolarised": re.compile(r"none|random|un-?polari[sz]ed|non-?polari[sz]ed"),
-}
-_FACTS = {
-    "instrument": r"instrument( (name|model|type|serial.*))?|spectrometers?( (name|model|type))?|model"
-    r"|origin|spectrometer/data system",
-    "date": r"date( (and|/) ?time)?|(acquired|measured|created)( (on|at))?|(measurement|acquisition) date"
-    r"|time ?stamp|longdate|date of measurement",
-    "delta": r"delta",  # "folded into 0 to 180 degrees"
-    "light": r"light",  # "transmitted" of psi and delta
-    "sample": r"sample( (name|id|description))?|title|spectrum name",
-}
-_FOREIGN = re.compile(
-    r"(kubelka|k/s\b|f\(r\)|irradiance|radiance|raman|fluorescence|emission|phosphorescence|power|"
-    r"counts?\b|scope|raw|single beam|interferogram|intensity)",
-    re.IGNORECASE,
-)
-"""Quantities that are neither a reflectance nor a transmittance."""
-
-
-_NO_WAVELENGTH = re.compile(
-    r"(raman|pixel|channel|points?\b|index|time|temperature|position|angle|seconds?\b)",
-    re.IGNORECASE,
-)
-"""Axes that are no wavelength, energy or wavenumber."""
 
 
 @dataclass(frozen=True)
@@ -248,63 +307,3 @@ def unknown_unit(column: Column) -> str:
 def listed(columns: Sequence[Column]) -> str:
     """Return the names of columns, for a message."""
     return ", ".join(repr(column.name) for column in columns)
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A declared axis or quantity: the column that its words describe, and the line that declares it.
-
-    For a quantity that is neither R nor T the column has the role "foreign".
-    """
-
-    column: Column
-    line: int
-
-
-@dataclass(frozen=True)
-class Declared:
-    """Axis, signal, angle of incidence (degrees), polarisation and facts (pairs of a key and a value) that a
-    file declares; None where it does not."""
-
-    axis: Statement | None = None
-    signal: Statement | None = None
-    facts: tuple[tuple[str, str], ...] = ()
-    angle: float | None = None
-    polarisation: str | None = None
-
-
-NOTHING_DECLARED = Declared()
-
-
-def declarations(lines: Sequence[Line]) -> Declared:
-    """Return what the lines above the rows of a table declare; the first line of a kind counts.
-
-    >>> declarations([Line(1, "Y-axis mode: %T", "")]).signal.column.unit
-    'percent'
-    """
-    axis = signal = angle = polarisation = None
-    facts: dict[str, str] = {}
-    for line in lines:
-        entry = _ENTRY.fullmatch(line.text)
-        if entry is None or not entry["value"]:
-            continue
-        key, value = entry["key"].strip().lower(), entry["value"]
-        column = recognise(value)
-        if _AXIS.fullmatch(key) and column.role == "wavelength" and column.unit:
-            axis = axis or Statement(column, line.number)
-        elif _AXIS.fullmatch(key) and _NO_WAVELENGTH.match(value):
-            axis = axis or Statement(Column(0, value, "wavelength", unknown_unit=value), line.number)
-        elif _SIGNAL.fullmatch(key) and column.role in ("R", "T"):
-            signal = signal or Statement(column, line.number)
-        elif _SIGNAL.fullmatch(key) and (column.role == "foreign" or _FOREIGN.match(value)):
-            signal = signal or Statement(Column(0, value, "foreign"), line.number)
-        elif _ANGLE.fullmatch(key) and (degrees := _DEGREES.fullmatch(value)):
-            angle = float(degrees[1].replace(",", ".")) if angle is None else angle
-        elif _POLARISATION.fullmatch(key):
-            stated = (name for name, words in _POLARISED.items() if words.fullmatch(value.lower()))
-            polarisation = polarisation or next(stated, None)
-        else:
-            fact = next((name for name, words in _FACTS.items() if re.fullmatch(words, key)), None)
-            if fact:
-                facts.setdefault(fact, value)
-    return Declared(axis, signal, tuple(facts.items()), angle, polarisation)

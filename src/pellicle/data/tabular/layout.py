@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pellicle.data.tabular.columns import declarations, is_header, is_unit_row, recognise_all
-from pellicle.data.tabular.table import DELIMITERS, SELECTED, ArrayCells, Table, TextCells
+from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
+from pellicle.data.tabular.table import DELIMITERS, SELECTED, ArrayCells, Table, TextCells, declarations
 from pellicle.data.tabular.text import Line, TextFile, is_number, read_bytes, split, text_file
 from pellicle.errors import DataError
 
