@@ -31,7 +31,7 @@ def test_it_leaves_a_folder_to_look_at(ran, tmp_path):
 
 def test_a_folder_that_is_there_is_not_touched(pellicle, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    module = import_module("pellicle.cli.demo")  # the name in its package is the command
+    module = import_module("pellicle.cli.simulate")  # the name in its package is the command
     monkeypatch.setattr(module, "Batch", lambda *arguments, **options: SimpleNamespace(run=lambda: 0))
     monkeypatch.setattr(import_module("pellicle.cli.chart"), "chart", lambda *arguments, **more: 0)
     (tmp_path / "pellicle-demo").mkdir()

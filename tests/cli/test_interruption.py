@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from pellicle.cli.processes import interruptible
+from pellicle.cli.session import interruptible
 
 
 class _Callback:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pellicle.cli.processes import in_order
+from pellicle.cli.session import in_order
 
 
 @pytest.fixture(autouse=True)
@@ -74,7 +74,7 @@ def test_after_ctrl_c_finished_results_are_kept_and_no_task_is_begun():
 
 _PARENT = """
 import os, sys, time
-from pellicle.cli.processes import in_order
+from pellicle.cli.session import in_order
 
 if __name__ == "__main__":
     for process in in_order(sleeper.process, range(4), 2):
@@ -141,14 +141,14 @@ def test_a_worker_that_dies_is_one_sentence(pellicle, spectrum_file, scene, monk
         raise BrokenExecutor
         yield
 
-    monkeypatch.setattr("pellicle.cli.processes.in_order", dies)
+    monkeypatch.setattr("pellicle.cli.session.in_order", dies)
     pellicle("fit", spectrum_file(), spectrum_file("b.csv"), *scene, "--jobs", "2").refused(
         3, "worker process", "0 of 2 files", "--jobs"
     )
 
 
 def test_no_worker_for_a_single_file(pellicle, tmp_path, scene, monkeypatch):
-    monkeypatch.delattr("pellicle.cli.processes.in_order")
+    monkeypatch.delattr("pellicle.cli.session.in_order")
     assert pellicle("fit", tmp_path / "gone.csv", *scene, "--jobs", "2").code == 3
 
 

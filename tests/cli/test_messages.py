@@ -6,8 +6,7 @@ import logging
 import pytest
 
 from pellicle.cli import app, main
-from pellicle.cli.progress import log_to_stderr
-from pellicle.cli.session import as_flags, flag_names, say
+from pellicle.cli.messages import as_flags, flag_names, log_to_stderr, say
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import jax
 import pytest
 
-from pellicle.cli import progress
-from pellicle.cli.progress import COMPILING, PixelProgress, Progress, TimeLeft, duration
+from pellicle.cli import messages
+from pellicle.cli.messages import COMPILING, PixelProgress, Progress, TimeLeft, duration
 
 
 class _Terminal(io.StringIO):
@@ -21,7 +21,7 @@ def terminal(monkeypatch, caplog):
     """stderr as a terminal of 200 columns, and the lines that it has shown."""
     screen = _Terminal()
     caplog.set_level(logging.WARNING, "pellicle")  # --verbose shows steps in place of the line
-    monkeypatch.setattr(progress, "sys", SimpleNamespace(stderr=screen))
+    monkeypatch.setattr(messages, "sys", SimpleNamespace(stderr=screen))
     monkeypatch.setenv("COLUMNS", "200")
 
     def lines():
@@ -34,7 +34,7 @@ def terminal(monkeypatch, caplog):
 def clock(monkeypatch):
     """The time in seconds, which a test sets."""
     now = [0.0]
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(messages.time, "monotonic", lambda: now[0])
     return now
 
 

@@ -107,7 +107,7 @@ def test_what_changed_is_fitted_again(batch, fitted, scene, tmp_path):
 @pytest.mark.slow
 def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
     # in this process: test_jobs.py starts others
-    monkeypatch.setattr("pellicle.cli.processes.in_order", lambda function, tasks, jobs: map(function, tasks))
+    monkeypatch.setattr("pellicle.cli.session.in_order", lambda function, tasks, jobs: map(function, tasks))
     fitted.stop["b"] = ValueError("b is bad")
     first = batch("--jobs", "2")
     assert (first.code, fitted()) == (3, ["a"])

@@ -189,7 +189,7 @@ def test_an_interrupted_process_ends_without_clean_up():
 def test_files_are_written_where_the_pipe_is_closed(tmp_path):
     """As in `pellicle fit ... --out results 2>&1 | head -1`: a computed result is not lost."""
     code = (
-        "from pellicle.cli.session import say, show\n"
+        "from pellicle.cli.messages import say, show\n"
         "import sys\n"
         "sys.stdin.readline()\n"  # until the reader is gone
         "say('a note'); show('a result', True); open('written', 'w').close(); show('another', False)\n"

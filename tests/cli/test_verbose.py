@@ -4,7 +4,7 @@ import re
 
 import jax
 
-from pellicle.cli.progress import log_to_stderr
+from pellicle.cli.messages import log_to_stderr
 
 
 def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):

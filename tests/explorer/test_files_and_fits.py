@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.explorer import dropped_files, fit_run
+from pellicle.explorer import background, dropped_files
 from pellicle.explorer.session import Session
 from pellicle.scene.free import Free
 
@@ -126,7 +126,7 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
         assert go_on.wait(20)
         progress("scan", 4, 10)
 
-    monkeypatch.setattr(fit_run, "fit", slow)
+    monkeypatch.setattr(background, "fit", slow)
     answers = []
     body = {"values": {"thickness": 300.0, "roughness": 2.0}, "free": ["thickness", "instrument.bandwidth"]}
     thread = threading.Thread(target=lambda: answers.append(session.answer("fit", body)))

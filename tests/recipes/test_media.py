@@ -10,6 +10,7 @@ from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
 from pellicle.errors import UsageError
 from pellicle.recipes import media
 from pellicle.recipes.dispersion_models import MODELS, TERMS, build_model
+from pellicle.recipes.schema import MediumTable
 from pellicle.scene.free import Free, free_leaves
 
 AT = np.array([450.0, 633.0, 850.0])
@@ -85,7 +86,7 @@ def test_models_by_name():
     assert free_part(build_model("cauchy", {"B": Free(0.0, 10.0)}).B) == (5, 0, 10)
     assert build_model("cauchy", {}).A == 1.5  # missing parameters keep their documented defaults, fixed
     with pytest.raises(UsageError, match=r"has no parameter 'D'.*A, B, C"):
-        build_model("cauchy", {"D": 1.0})
+        media.medium(MediumTable.model_validate({"model": "cauchy", "D": 1.0}))
 
 
 def test_freeing_a_number_replaces_it():

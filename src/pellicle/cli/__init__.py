@@ -8,22 +8,16 @@ from typing import Annotated, NoReturn
 from cyclopts import App, Parameter
 
 from pellicle.cli.chart import chart
-from pellicle.cli.compare import compare
 from pellicle.cli.cost import cost, plan
-from pellicle.cli.demo import demo
 from pellicle.cli.explore import explore
 from pellicle.cli.export import export
-from pellicle.cli.fit import fit, sample
+from pellicle.cli.fit import compare, fit, sample
 from pellicle.cli.map import map
-from pellicle.cli.materials import materials
-from pellicle.cli.processes import interruptible
-from pellicle.cli.progress import log_to_stderr
-from pellicle.cli.read import read
-from pellicle.cli.session import abandon_stdout, as_flags, say
-from pellicle.cli.simulate import simulate
+from pellicle.cli.messages import abandon_stdout, as_flags, log_to_stderr, say, show
+from pellicle.cli.read import materials, read
+from pellicle.cli.session import BAD_DATA, INTERRUPTED, WRONG_USAGE, interruptible
+from pellicle.cli.simulate import demo, simulate
 from pellicle.errors import UsageError
-
-WRONG_USAGE, BAD_DATA, INTERRUPTED = 2, 3, 130
 
 app = App(
     name="pellicle",
@@ -76,10 +70,10 @@ def main() -> int:
     with interruptible():
         code, error = _outcome(sys.argv[1:])
     if error and "--json" in sys.argv:
-        from pellicle.reporting.json_record import error_record, one_line
+        from pellicle.reporting.json_record import error_record
 
         with suppress(OSError):
-            print(one_line(error_record(error, code)), flush=True)
+            show(error_record(error, code))
     return code
 
 

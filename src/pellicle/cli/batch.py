@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, field, replace
@@ -14,9 +14,20 @@ from logging import INFO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from pellicle.cli.flags import SamplerFlags
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
-from pellicle.cli.progress import LOG, Progress, TimeLeft, duration, log_to_stderr
-from pellicle.cli.session import as_flags, check_folder, say, show, with_flags
+from pellicle.cli.messages import (
+    LOG,
+    Progress,
+    TimeLeft,
+    as_flags,
+    duration,
+    log_to_stderr,
+    say,
+    show,
+    with_flags,
+)
+from pellicle.cli.session import BAD_DATA, GOOD, INTERRUPTED, TOO_SHORT, UNCLEAR, check_folder
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,25 +38,6 @@ if TYPE_CHECKING:
     from pellicle.sampling.result import Posterior
     from pellicle.scene.film import Scene
     from pellicle.scene.surface import Surface
-
-CONVERGED, FAILED, UNCLEAR, TOO_SHORT, INTERRUPTED = 0, 3, 4, 5, 130
-"""Exit codes: one answer, an unreadable file, any other status, a chain without an interval, Ctrl-C."""
-
-
-class Sampler(NamedTuple):
-    """Settings of posterior sampling; None is the library's default."""
-
-    walkers: int | None = None
-    steps: int | None = None
-    seed: int = 0
-
-    def options(self, folder: Path | None) -> dict[str, Any]:
-        """Arguments of `pellicle.sample`, with the chain kept in `folder`."""
-        from pellicle.reporting.folders import chain_file
-
-        chosen = {} if self.steps is None else {"steps": self.steps}
-        chain = None if folder is None else chain_file(folder)
-        return {"walkers": self.walkers, "seed": self.seed, "chain": chain, **chosen}
 
 
 @dataclass
@@ -62,7 +54,7 @@ class Batch:
     """
 
     inputs: Inputs
-    sampler: Sampler | None = None
+    sampler: SamplerFlags | None = None
     out: str | None = None
     json: bool = False
     jobs: int = 1
@@ -74,7 +66,7 @@ class Batch:
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
-        from pellicle.reporting.folders import folder_per_file
+        from pellicle.reporting.folders import folder_per_file, write_index
 
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
@@ -85,10 +77,10 @@ class Batch:
             folders = [*folder_per_file(self.out, [files[0].path for files in groups])]
             self.refit |= len(groups) == 1 or self.inputs.repeats  # repeats compare fits, not records
         again = "" if self.out is None else ": the same command goes on from there"
-        worst = CONVERGED
+        worst = GOOD
         try:
             for code in self._codes(groups, folders):
-                worst = max(worst, code, self._summarise(len(groups)))
+                worst = max(worst, code, self._summary(len(groups)))
         except KeyboardInterrupt:
             say(
                 f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept"
@@ -100,7 +92,7 @@ class Batch:
                 f"pellicle: a worker process ended before its fit did, often for lack of memory:"
                 f" {len(self.records)} of {len(groups)} files are done; fit the others with fewer --jobs"
             )
-            worst = FAILED
+            worst = BAD_DATA
         if self.kept:
             say(
                 f"{self.kept} of {len(groups)} files were not fitted again: an earlier run has their results,"
@@ -108,34 +100,17 @@ class Batch:
             )
         compared = self._compare() if self.inputs.repeats and worst != INTERRUPTED else None
         if self.out is not None and len(groups) > 1 and self.records:
-            worst = max(worst, self._index(folders, compared))
+            worst = max(worst, written(partial(write_index, self.out, self.records, folders, compared)))
         return worst
 
-    def _summarise(self, files: int) -> int:
-        """Write the table of all results so far, and return FAILED where it cannot be written."""
+    def _summary(self, files: int) -> int:
+        """Write the table of all results so far, and return BAD_DATA where it cannot be written."""
         from pellicle.reporting.folders import SUMMARY, write_summary
 
         if self.out is None or files == 1:
-            return CONVERGED
-        try:
-            write_summary(Path(self.out) / SUMMARY, self.records)
-        except ValueError as error:
-            if len(self.records) == files:  # said once
-                say(f"pellicle: {error}")
-            return FAILED
-        return CONVERGED
-
-    def _index(self, folders: list[Path | None], repeats: Repeats | None) -> int:
-        """Write the page of all results so far, and return FAILED where it cannot be written."""
-        from pellicle.reporting.folders import write_index
-
-        assert self.out is not None
-        try:
-            write_index(self.out, self.records, folders, repeats)
-        except ValueError as error:
-            say(f"pellicle: {error}")
-            return FAILED
-        return CONVERGED
+            return GOOD
+        write = partial(write_summary, Path(self.out) / SUMMARY, self.records)
+        return written(write, failed="" if len(self.records) == files else None)  # stated once
 
     def _compare(self) -> Repeats | None:
         """Compare the scatter of repeated measurements with their errors, print and write the result.
@@ -143,7 +118,6 @@ class Batch:
         None where they cannot be compared.
         """
         from pellicle.fitting.repeated_measurements import repeats
-        from pellicle.reporting.json_record import one_line
         from pellicle.reporting.repeats import failure, report, to_json, write_repeats
 
         try:
@@ -151,9 +125,9 @@ class Batch:
         except UsageError as error:
             say(f"pellicle: {error}")
             if self.json:
-                print(one_line(failure([file.path for file in self.inputs.files], str(error))), flush=True)
+                show(failure([file.path for file in self.inputs.files], str(error)))
             return None
-        show(one_line(to_json(compared)) if self.json else report(compared), self.out is not None)
+        show(to_json(compared) if self.json else report(compared), self.out is not None)
         if self.out is not None:
             write_repeats(self.out, compared)
         return compared
@@ -169,7 +143,7 @@ class Batch:
                 rest = duration(seconds)
                 yield self._fit(*task, f"{position}, {rest} left" if rest else position)
             return
-        from pellicle.cli.processes import in_order
+        from pellicle.cli.session import in_order
 
         own = [
             replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[]) for files in groups
@@ -193,75 +167,60 @@ class Batch:
         `position` in the batch is a part of the progress line.
         """
         from pellicle.reporting.fit_text import report
-        from pellicle.reporting.json_record import failure, one_line, to_json
+        from pellicle.reporting.folders import write_fit
+        from pellicle.reporting.json_record import failure, to_json
 
         paths, identity = [file.path for file in files], ""
-        place = f"{', '.join(paths)} ({position})" if position else ", ".join(paths)
         try:
             data, scene = measurement(files, self.inputs.joint)
             if folder is not None:
                 settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
                 if not self.refit and (kept := earlier(folder, identity)):
-                    return self._repeat(kept, folder)
-            with Progress(place) as progress:
+                    record, text = kept
+                    self.kept += 1
+                    self.records.append(record)
+                    show(record if self.json else text, self.out is not None)
+                    say(f"{folder}: from an earlier run")
+                    return GOOD if record["status"] == "converged" else UNCLEAR
+            with Progress(", ".join(paths) + (f" ({position})" if position else "")) as progress:
                 fit, posterior = self._result(data, scene, folder, progress)
         except ValueError as error:
             message = error_message(error, paths)
             say(f"pellicle: {message}")
             self.records.append(failure(paths if self.inputs.joint else paths[0], message))
             if self.json:
-                print(one_line(self.records[-1]), flush=True)
-            return FAILED  # also where the error is one of usage: the other files go on
+                show(self.records[-1])
+            return BAD_DATA  # also where the error is one of usage: the other files go on
         record = to_json(fit, posterior)
         self.records.append(record)
         if self.inputs.repeats:
             self.fits.append(fit)
-        self._print(record, "" if self.json else report(fit, posterior))
-        code = CONVERGED if fit.status == "converged" else UNCLEAR
+        show(record if self.json else report(fit, posterior), self.out is not None)
+        code = GOOD if fit.status == "converged" else UNCLEAR
         if posterior is not None and not posterior.trusted:
             code = TOO_SHORT
-        return code if folder is None else max(code, self._write(folder, files, fit, posterior, identity))
-
-    def _repeat(self, kept: Earlier, folder: Path) -> int:
-        """Print the result of an earlier run, and return its exit code."""
-        self.kept += 1
-        self.records.append(kept.record)
-        self._print(kept.record, kept.report)
-        say(f"{folder}: from an earlier run")
-        return CONVERGED if kept.record["status"] == "converged" else UNCLEAR
-
-    def _print(self, record: dict[str, Any], report: str) -> None:
-        from pellicle.reporting.json_record import one_line
-
-        show(one_line(record) if self.json else report, self.out is not None)
+        if folder is None:
+            return code
+        recipe = partial(self.inputs.recipe, files)
+        write = partial(write_fit, folder, fit, posterior, identity, self.inputs.described, recipe)
+        failed = "; the result is printed, and the same command writes its files"
+        return max(code, written(write, f"{folder}: report, figures and tables written", failed))
 
     def _result(
         self, data: Any, scene: Any, folder: Path | None, progress: Progress
     ) -> tuple[Fit, Posterior | None]:
         from pellicle.api.fits import fit, sample
+        from pellicle.reporting.folders import chain_file
 
         options: dict[str, Any] = {"tolerance": self.inputs.tolerance, "residual": self.inputs.residual}
         if self.sampler is None:
             return with_flags(fit(data, scene, loss=self.inputs.loss, progress=progress, **options)), None
-        posterior = sample(data, scene, progress=progress, **self.sampler.options(folder), **options)
+        options |= {name: x for name, x in vars(self.sampler).items() if x is not None}
+        chain = None if folder is None else chain_file(folder)
+        posterior = sample(data, scene, chain=chain, progress=progress, **options)
         posterior = replace(posterior, fit=with_flags(posterior.fit))
         return posterior.fit, posterior
-
-    def _write(
-        self, folder: Path, files: list[Input], fit: Fit, posterior: Posterior | None, identity: str
-    ) -> int:
-        """Write the folder of a result, and return FAILED where it cannot be written."""
-        from pellicle.reporting.folders import write_fit
-
-        recipe = partial(self.inputs.recipe, files)
-        try:
-            write_fit(folder, fit, posterior, identity, self.inputs.described, recipe)
-        except ValueError as error:  # the result is printed, and the other files go on
-            say(f"pellicle: {error}; the result is printed, and the same command writes its files")
-            return FAILED
-        say(f"{folder}: report, figures and tables written")
-        return CONVERGED
 
 
 class _Captured(NamedTuple):
@@ -319,11 +278,19 @@ def error_message(error: Exception, paths: list[str]) -> str:
     return message if any(path in message for path in paths) else f"{', '.join(paths)}: {message}"
 
 
-class Earlier(NamedTuple):
-    """The JSON record of a fit that is in its folder, and its report."""
+def written(write: Callable[[], object], done: str = "", failed: str | None = "") -> int:
+    """Write files and print `done`; where they cannot be written, print the error, unless `failed` is None.
 
-    record: dict[str, Any]
-    report: str
+    Returns GOOD or BAD_DATA: the result is printed, and other files go on.
+    """
+    try:
+        write()
+    except ValueError as error:
+        if failed is not None:
+            say(f"pellicle: {error}{failed}")
+        return BAD_DATA
+    say(*filter(None, [done]))
+    return GOOD
 
 
 def fingerprint(*parts: Any) -> str:
@@ -334,8 +301,8 @@ def fingerprint(*parts: Any) -> str:
     return content_fingerprint(versions()["pellicle"], *parts)
 
 
-def earlier(folder: Path, identity: str) -> Earlier | None:
-    """The finished result of a fit with this fingerprint, None where the folder has none.
+def earlier(folder: Path, identity: str) -> tuple[dict[str, Any], str] | None:
+    """JSON record and report of the finished fit with this fingerprint; None where the folder has none.
 
     A chain that was too short goes on, so its result does not count.
     """
@@ -353,4 +320,4 @@ def earlier(folder: Path, identity: str) -> Earlier | None:
     record.pop(SCENE, None)  # printed by no fit
     if record.pop(FINGERPRINT, None) != identity or not record.get("posterior", {}).get("trusted", True):
         return None
-    return Earlier(record, report)
+    return record, report

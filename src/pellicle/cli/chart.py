@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from pellicle.cli.flags import Flags
-from pellicle.cli.session import say, start
+from pellicle.cli.messages import say
+from pellicle.cli.session import start
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:

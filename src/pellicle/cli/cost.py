@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import Flags
-from pellicle.cli.progress import Progress
+from pellicle.cli.messages import Progress, say, show
 from pellicle.cli.reading import directions, measured_scene, recipe_angles
-from pellicle.cli.session import check_folder, say, show, start
+from pellicle.cli.session import check_folder, start
 from pellicle.data.options import SPACES
 from pellicle.errors import UsageError
 
@@ -81,11 +81,10 @@ def cost(
     start(keep=False)
     from pellicle.api import plans
     from pellicle.reporting.cost import text, to_json, write_cost
-    from pellicle.reporting.json_record import one_line
 
     with Progress(recipe) as progress:
         result = plans.cost(scene, **{"tolerance": methods.tolerance, **options}, progress=progress)
-    show(one_line(to_json(result, recipe)) if json else text(result, recipe), out is not None)
+    show(to_json(result, recipe) if json else text(result, recipe), out is not None)
     if out is not None:
         say(f"{write_cost(out, result, recipe)}: report, figure and tables written")
     return 130 if result.interrupted else 0
@@ -112,7 +111,6 @@ def plan(
     start()
     from pellicle.fitting.film.messages import log_scene
     from pellicle.reporting import plans
-    from pellicle.reporting.json_record import one_line
     from pellicle.scene.film import with_wavelength
     from pellicle.scene.surface import surface_view
 
@@ -126,9 +124,9 @@ def plan(
         chosen = film_plan.plan(scene, tolerance)
         savings = film_plan.savings(scene, chosen)
     if json:
-        print(one_line(plans.to_json(chosen, savings)), flush=True)
+        show(plans.to_json(chosen, savings))
         return 0
-    print(plans.report_with_savings(chosen, savings), end="", flush=True)
+    show(plans.report_with_savings(chosen, savings), end="")
     if chosen.error_bound > tolerance:
         say(f"no plan is within {tolerance:g}: averages alone have errors up to {chosen.error_bound:.1g}")
     return 0

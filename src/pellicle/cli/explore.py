@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import OptionFlags, SceneFlags, flags_of
-from pellicle.cli.session import say, start
+from pellicle.cli.messages import say
+from pellicle.cli.session import start
 from pellicle.data.options import SPACES, FileOptions
 from pellicle.errors import DataError, UsageError
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import SceneFlags
-from pellicle.cli.session import say, start
+from pellicle.cli.messages import say, show
+from pellicle.cli.session import start
 from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
@@ -51,12 +52,11 @@ def export(
     start()
     from pellicle.api.simulations import export as export_scene
     from pellicle.reporting.export_text import text
-    from pellicle.reporting.json_record import one_line
 
     written = export_scene(
         described, to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
     )
-    print(one_line({"target": to} | written.material.record()) if json else text(written), flush=True)
+    show({"target": to} | written.material.record() if json else text(written))
     say(f"{', '.join(str(path) for path in written.files)} written")
     return 0
 

@@ -1,46 +1,31 @@
-"""`pellicle fit` and `pellicle sample`: fits of spectra, colours and BRDF samples, and their posteriors."""
+"""`pellicle fit`, `pellicle sample` and `pellicle compare`: fits, their posteriors, and their comparison."""
 
-from dataclasses import dataclass
+from functools import partial
+from logging import getLogger
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli.batch import Batch, Sampler
+from pellicle.cli.batch import Batch, error_message, measurement, written
 from pellicle.cli.flags import (
+    OUTPUT,
     SAMPLER,
     SCENE,
     BatchFlags,
     FileFlags,
     FitFlags,
-    Flags,
+    SamplerFlags,
     SceneFlags,
     flag,
     switch,
 )
-from pellicle.cli.inputs import inputs
-from pellicle.cli.session import start
-from pellicle.errors import UsageError
+from pellicle.cli.inputs import LEAST_SQUARES, Inputs, inputs
+from pellicle.cli.messages import Progress, say, show, with_flags
+from pellicle.cli.session import BAD_DATA, GOOD, UNCLEAR, check_folder, start
+from pellicle.errors import DataError, UsageError
 
-FEWEST_STEPS = 10
-
-
-@dataclass(frozen=True)
-class SamplerFlags(Flags):
-    """Flags of the sampling of a posterior."""
-
-    walkers: Annotated[
-        int | None, flag(SAMPLER, "Number of walkers, even (four per parameter, at least 32).")
-    ] = None
-    steps: Annotated[int | None, flag(SAMPLER, "Maximum number of steps (20000).")] = None
-    seed: Annotated[int, flag(SAMPLER, "Seed of the random numbers.")] = 0
-
-    def sampler(self) -> Sampler:
-        """Settings of the sampler. Raises UsageError for an impossible number."""
-        if self.steps is not None and self.steps < FEWEST_STEPS:
-            raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {self.steps}")
-        if not 0 <= self.seed < 2**32:
-            raise UsageError(f"--seed must lie in 0 to 4294967295, got {self.seed}")
-        return Sampler(self.walkers, self.steps, self.seed)
+log = getLogger(__name__)
 
 
 def fit(
@@ -63,7 +48,7 @@ def fit(
     results = (results or BatchFlags()).checked()
     files = inputs(list(data), recipe, scene, reading, fitting, joint, repeats)
     start()
-    return Batch(files, Sampler() if posterior else None, **vars(results)).run()
+    return Batch(files, SamplerFlags() if posterior else None, **vars(results)).run()
 
 
 def sample(
@@ -81,7 +66,77 @@ def sample(
     Example: pellicle sample oxide.csv --layer SiO2 --substrate Si --free n --out results/oxide
     """
     results = (results or BatchFlags()).checked()
-    sampler = (chain or SamplerFlags()).sampler()
+    sampler = (chain or SamplerFlags()).checked()
     files = inputs(list(data), recipe, scene, reading, fitting, joint, False)
     start()
     return Batch(files, sampler, **vars(results)).run()
+
+
+def compare(
+    *data: Annotated[str, Parameter(help="Files to fit, one by one.")],
+    recipe: Annotated[
+        list[str] | None, Parameter(group=SCENE, help="Recipe to compare; give two or more.", negative="")
+    ] = None,
+    out: Annotated[str | None, flag(OUTPUT, "Folder for the comparison and every fit.")] = None,
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
+) -> int:
+    """Fit data by several recipes and rank these by information criteria (AIC, BIC).
+
+    Example: pellicle compare oxide.csv --recipe smooth.toml --recipe rough.toml
+    """
+    recipes = list(recipe or [])
+    if len(recipes) < 2:
+        raise UsageError("a comparison needs two recipes or more: give --recipe A.toml --recipe B.toml")
+    if len(set(recipes)) < len(recipes):
+        raise UsageError("the same recipe is given twice: there is nothing to compare")
+    short = [Path(path).name for path in recipes]
+    names = short if len(set(short)) == len(short) else recipes
+    candidates = {name: inputs(list(data), path) for name, path in zip(names, recipes, strict=True)}
+    for candidate, path in zip(candidates.values(), recipes, strict=True):
+        if candidate.loss != LEAST_SQUARES:
+            raise DataError(f"{path}: a comparison needs least squares: leave the loss out")
+    groups = [[[file.path for file in files] for files in each.groups] for each in candidates.values()]
+    if any(other != groups[0] for other in groups[1:]):
+        raise UsageError("the recipes name different files: give the files on the command line")
+    if out is not None:
+        check_folder(out)
+    start()
+    worst, several = GOOD, len(groups[0]) > 1
+    for position, paths in enumerate(groups[0]):
+        folder = None if out is None else Path(out) / Path(paths[0]).stem if several else Path(out)
+        worst = max(worst, _compare(candidates, position, paths, folder, json))
+    return worst
+
+
+def _compare(
+    candidates: dict[str, Inputs], position: int, paths: list[str], folder: Path | None, as_json: bool
+) -> int:
+    """Compare the fits of one group of files, print and write the result, and return its exit code."""
+    from pellicle.api.fits import fit
+    from pellicle.fitting.comparison import compare as compare_fits
+    from pellicle.reporting.comparison import failure, report, to_json, write_comparison
+
+    label = ", ".join(paths)
+    fits = {}
+    try:
+        for name, candidate in candidates.items():
+            log.info("comparison: now %s", name)
+            files = candidate.groups[position]
+            data, scene = measurement(files, len(files) > 1, notes=not fits)
+            with Progress(f"{label}, {name}") as progress:
+                fits[name] = with_flags(fit(data, scene, residual=candidate.residual, progress=progress))
+        comparison = compare_fits(fits)
+    except ValueError as error:
+        message = error_message(error, [label])
+        say(f"pellicle: {message}")
+        if as_json:
+            show(failure(label, message))
+        return BAD_DATA
+    show(to_json(comparison) if as_json else report(comparison), folder is not None)
+    code = GOOD if comparison.best.fit.status == "converged" else UNCLEAR
+    if folder is not None:
+        code = max(
+            code,
+            written(partial(write_comparison, folder, comparison), f"{folder}: comparison and fits written"),
+        )
+    return code

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, make_dataclass, replace
+from dataclasses import dataclass, field, make_dataclass
 from math import inf
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
 from cyclopts import Group, Parameter
@@ -132,10 +133,8 @@ class SceneFlags(Flags):
             "Recipes can also mix and add models.",
         ),
     ] = None
-    substrate: Annotated[str | None, flag(SCENE)] = None
-    """Substrate: the same forms as --layer."""
-    ambient: Annotated[str | None, flag(SCENE)] = None
-    """Medium in front of the layer (air)."""
+    substrate: Annotated[str | None, flag(SCENE, "Substrate: the same forms as --layer.")] = None
+    ambient: Annotated[str | None, flag(SCENE, "Medium in front of the layer (air).")] = None
     thickness: Annotated[str | None, flag(SCENE)] = None
     """Bounds LO:HI in nm (1:5000), or one number to fix it."""
     free: Annotated[
@@ -148,16 +147,13 @@ class SceneFlags(Flags):
     ] = None
     back: Annotated[str | None, flag(SCENE)] = None
     """Medium behind a substrate that is a plate; or rough, or taped."""
-    plate_mm: Annotated[float | None, flag(SCENE)] = None
-    """Thickness of the plate in mm (1)."""
+    plate_mm: Annotated[float | None, flag(SCENE, "Thickness of the plate in mm (1).")] = None
     back_collected: Annotated[str | None, flag(SCENE)] = None
     """Share of the light from the back face that is collected, 0 to 1, free, or LO:HI (1)."""
     back_reflections: Annotated[int | None, flag(SCENE)] = None
     """Most reflections at the back face of light that is collected (any number)."""
-    scale: Annotated[str | None, flag(INSTRUMENT)] = None
-    """free, slow or a number (1)."""
-    offset: Annotated[str | None, flag(INSTRUMENT)] = None
-    """free, slow or a number (0)."""
+    scale: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (1).")] = None
+    offset: Annotated[str | None, flag(INSTRUMENT, "free, slow or a number (0).")] = None
     bandwidth: Annotated[str | None, flag(INSTRUMENT)] = None
     """Full width at half maximum in nm, free, or LO:HI."""
     uncertainty: Annotated[str | None, flag(INSTRUMENT)] = None
@@ -228,16 +224,36 @@ def light(reading: FileOptions, azimuth: Any = None) -> Light:
     return read.light(reading, reading.transmitted, azimuth)
 
 
+FEWEST_STEPS = 10
+
+
+@dataclass(frozen=True)
+class SamplerFlags(Flags):
+    """Flags of the sampling of a posterior."""
+
+    walkers: Annotated[
+        int | None, flag(SAMPLER, "Number of walkers, even (four per parameter, at least 32).")
+    ] = None
+    steps: Annotated[int | None, flag(SAMPLER, "Maximum number of steps (20000).")] = None
+    seed: Annotated[int, flag(SAMPLER, "Seed of the random numbers.")] = 0
+
+    def checked(self) -> SamplerFlags:
+        """These flags. Raises UsageError for an impossible number."""
+        if self.steps is not None and self.steps < FEWEST_STEPS:
+            raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {self.steps}")
+        if not 0 <= self.seed < 2**32:
+            raise UsageError(f"--seed must lie in 0 to 4294967295, got {self.seed}")
+        return self
+
+
 @dataclass(frozen=True)
 class BatchFlags(Flags):
     """Flags of the results of several files."""
 
     out: Annotated[str | None, flag(OUTPUT)] = None
     """Folder for report, figures and tables; an interrupted chain in it is continued."""
-    json: Annotated[bool, switch(OUTPUT)] = False
-    """Print one JSON object a line."""
-    jobs: Annotated[int, flag(OUTPUT)] = 1
-    """Number of processes that share several files (1)."""
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False
+    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1
     refit: Annotated[bool, switch(OUTPUT)] = False
     """Fit all files, also those whose results an earlier run left in --out."""
 
@@ -274,8 +290,7 @@ class CubeOnlyFlags(Flags):
     """Pixels to use: PNG, TIFF or .npy that is not zero there, or the name of a variable."""
     white_frame: Annotated[str | None, flag(FRAMES)] = None
     """Counts of a white reference: an image, a line or a spectrum; the cube is counts too."""
-    dark_frame: Annotated[str | None, flag(FRAMES)] = None
-    """Counts without light, in the same forms."""
+    dark_frame: Annotated[str | None, flag(FRAMES, "Counts without light, in the same forms.")] = None
     white_reflectance: Annotated[float | str | None, switch(FRAMES)] = None
     """Reflectance of the white: a number, a CSV, or a material such as Si (1)."""
     saturation: Annotated[float | None, flag(FRAMES)] = None
@@ -286,16 +301,12 @@ class CubeOnlyFlags(Flags):
 class CubeFlags(CubeOnlyFlags):
     """Flags for reading a cube, None where not given; a recipe's [data] supplies some."""
 
-    wavelength_unit: Annotated[str | None, flag(READING)] = None
-    """nm, um, A, eV, cm-1 or THz."""
-    signal: Annotated[str | None, flag(READING)] = None
-    """R, T or psi-delta, if the file does not name it."""
+    wavelength_unit: Annotated[str | None, flag(READING, "nm, um, A, eV, cm-1 or THz.")] = None
+    signal: Annotated[str | None, flag(READING, "R, T or psi-delta, if the file does not name it.")] = None
     signal_unit: Annotated[str | None, flag(READING)] = None
     """fraction, percent, absorbance, or the stored number that stands for 1."""
-    angle: Annotated[float | None, flag(READING)] = None
-    """Angle of incidence in degrees (the recipe's)."""
-    polarisation: Annotated[str | None, flag(READING)] = None
-    """s, p or unpolarised."""
+    angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
+    polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
     range: Annotated[
         str | tuple[float, float] | None, Parameter(group=READING, metavar="LO:HI", negative="", n_tokens=1)
     ] = None
@@ -311,27 +322,21 @@ class CubeFlags(CubeOnlyFlags):
         ),
     ] = None
 
-
-def merged(flags: CubeFlags, recipe: FilmRecipe) -> CubeFlags:
-    """The flags, supplemented by the recipe's [data]."""
-    absent = [name for name in OF_RECIPE if getattr(flags, name) is None]
-    return replace(flags, **{name: getattr(recipe.tables.data, name, None) for name in absent})
-
-
-def reading(flags: CubeFlags) -> dict[str, Any]:
-    """Arguments of `read_cube` that are given. Raises UsageError."""
-    options = {name: value for name, value in vars(flags).items() if value is not None}
-    if isinstance(flags.range, str):
-        options["range"] = parse_range(flags.range, "`range`")
-    if isinstance(flags.white_reflectance, str):
-        options["white_reflectance"] = _reflectance(flags.white_reflectance, flags)
-    return options
+    def arguments(self, recipe: FilmRecipe | None = None) -> dict[str, Any]:
+        """Arguments of `read_cube`, supplemented by the recipe's [data]. Raises UsageError."""
+        options = {} if recipe is None else {name: getattr(recipe.tables.data, name) for name in OF_RECIPE}
+        options |= vars(self) | {name: options[name] for name in options if getattr(self, name) is None}
+        options = {name: value for name, value in options.items() if value is not None}
+        if isinstance(self.range, str):
+            options["range"] = parse_range(self.range, "`range`")
+        if isinstance(self.white_reflectance, str):
+            angle, polarisation = options.get("angle", 0.0), options.get("polarisation", "unpolarised")
+            options["white_reflectance"] = _reflectance(self.white_reflectance, angle, polarisation)
+        return options
 
 
-def _reflectance(white: str, flags: CubeFlags) -> Any:
+def _reflectance(white: str, angle: float, polarisation: str) -> Any:
     """The reflectance of a white reference: a number, the path of a CSV, or a function of the wavelength."""
-    from pathlib import Path
-
     import numpy as np
 
     try:
@@ -344,5 +349,5 @@ def _reflectance(white: str, flags: CubeFlags) -> Any:
     from pellicle.simulation.functions import reflectance
 
     material = medium(white, name="`white_reflectance`")
-    light: dict[str, Any] = {"angle": flags.angle or 0.0, "polarisation": flags.polarisation or "unpolarised"}
+    light: dict[str, Any] = {"angle": angle, "polarisation": polarisation}
     return lambda nm: np.asarray(reflectance(nm, 0.0, 1.0, material, **light))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, light, named
+from pellicle.cli.messages import say
 from pellicle.cli.reading import (
     check_camera,
     check_words,
@@ -20,9 +21,8 @@ from pellicle.cli.reading import (
     refuse_camera,
     sigma,
 )
-from pellicle.cli.session import say
 from pellicle.data.options import BRDF, FileOptions, FitOptions
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples
@@ -123,10 +123,19 @@ def inputs(
         result = _by_flags(files, scene_flags, reading)
         described: dict[str, Any] = {"flags": {n: x for n, x in vars(scene_flags).items() if x is not None}}
     else:
-        result = _by_recipe(files, recipe, scene_flags, reading)
+        from pellicle.recipes.read import SurfaceRecipe, read_recipe
+
+        table = read_recipe(recipe)
+        if scene_flags.given():
+            flags = ", ".join(scene_flags.given())
+            raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
+        if isinstance(table, SurfaceRecipe):
+            result = _by_surface_recipe(files, table, reading)
+        else:
+            result = _by_film_recipe(files, table, reading)
         described = {"recipe": recipe}
     described |= {"reading": how} if (how := reading.given() | fitting.given()) else {}
-    options = fitting.over(result.fitting.given())
+    options = FitOptions(**result.fitting.given() | fitting.given())
     written = result.written | options.given()
     result = replace(
         result, joint=joint or result.joint, fitting=options, described=described, written=written
@@ -166,6 +175,8 @@ def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
 
 
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
+    from pellicle.scene.free import check_free_count, free_leaves
+
     _check_film(reading)
     if not files:
         raise UsageError(
@@ -174,22 +185,10 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -
         )
     scene = scene_flags.scene(reading)
     say(*scene_flags.assumed)
-    _check_free(scene)
+    check_free_count(len(free_leaves(scene)))
     check_camera(reading, [(file, reading) for file in files])
     inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
     return Inputs(inputs, False, written=_without_light(reading.given()))
-
-
-def _by_recipe(files: list[str], path: str, scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
-    from pellicle.recipes.read import SurfaceRecipe, read_recipe
-
-    recipe = read_recipe(path)
-    if scene_flags.given():
-        flags = ", ".join(scene_flags.given())
-        raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
-    if isinstance(recipe, SurfaceRecipe):
-        return _by_surface_recipe(files, recipe, reading)
-    return _by_film_recipe(files, recipe, reading)
 
 
 def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) -> Inputs:
@@ -200,19 +199,21 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
         raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
     files = _files(files, recipe)
     recipes = recipe.each or [recipe] * len(files)
-    each = [(file, reading.over(own.reading)) for file, own in zip(files, recipes, strict=True)]
+    each = [
+        (file, FileOptions.of(own.reading | reading.given()))
+        for file, own in zip(files, recipes, strict=True)
+    ]
     check_camera(reading, each)
     inputs = []
     for (file, options), own in zip(each, recipes, strict=True):
-        scene = own.scene()
+        scene = own.scene(fitted=True)
         scene = eqx.tree_at(lambda s: s.light, scene, light(options, scene.light.azimuth))
-        _check_free(scene, recipe.path)
         own_scale = any(table.rescales for table in own.tables.data.file)
         inputs += _film_inputs(file, scene, options, own_scale)
     data = recipe.tables.data
-    result = Inputs(inputs, data.joint, FitOptions().over(data.given()), repeats=data.repeats)
+    result = Inputs(inputs, data.joint, FitOptions.of(data.given()), repeats=data.repeats)
     if not recipe.each:
-        return replace(result, written=_without_light(reading.over(recipe.reading).given()))
+        return replace(result, written=_without_light(recipe.reading | reading.given()))
     tables = [
         table.model_dump(exclude_unset=True) | recipe.with_files(table) | {"path": file} | reading.given()
         for file, table in zip(files, data.file, strict=True)
@@ -236,13 +237,12 @@ def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOpt
 
         noise_level(reading.noise, "--noise")
     recipe = recipe.with_data(**{name: x for name, x in reading.given().items() if name != "signal"})
-    surface = recipe.scene()
-    _check_free(surface, recipe.path)
+    surface = recipe.scene(fitted=True)
     paths = _files(files, recipe)
     inputs = [Input(path, partial(_samples, recipe, surface, path), surface, file=path) for path in paths]
     data = recipe.tables.data
     written = data.model_dump(exclude_none=True, exclude={"signal", "files"})
-    return Inputs(inputs, False, FitOptions().over(data.given()), residual=data.residual, written=written)
+    return Inputs(inputs, False, FitOptions.of(data.given()), residual=data.residual, written=written)
 
 
 def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
@@ -290,20 +290,6 @@ def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> list[BrdfSam
     for number in surface.free_numbers():
         log.info("free: %s between %g and %g", number.name, number.free.lower, number.free.upper)
     return [samples]
-
-
-def _check_free(scene: Scene | Surface, recipe: str = "") -> None:
-    """Raise UsageError where nothing is free to fit, DataError where a recipe says so."""
-    from pellicle.scene.free import check_free_count, free_leaves
-    from pellicle.scene.surface import Surface
-
-    free = scene.free_numbers() if isinstance(scene, Surface) else free_leaves(scene)
-    try:
-        check_free_count(len(free))
-    except UsageError as error:
-        if recipe:
-            raise DataError(f"{recipe}: {error}") from None
-        raise
 
 
 def _check_film(reading: FileOptions) -> None:

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from pellicle.cli.batch import CONVERGED, INTERRUPTED, UNCLEAR
-from pellicle.cli.flags import OUTPUT, CameraFlags, CubeFlags, Flags, flag, merged, named, reading, switch
-from pellicle.cli.progress import PixelProgress
-from pellicle.cli.session import as_flags, check_folder, say, show, start
+from pellicle.cli.flags import OUTPUT, CameraFlags, CubeFlags, Flags, flag, named, switch
+from pellicle.cli.messages import PixelProgress, as_flags, say, show
+from pellicle.cli.session import GOOD, INTERRUPTED, UNCLEAR, check_folder, start
 from pellicle.data.options import SPACES
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map
@@ -51,149 +50,105 @@ class RunFlags(Flags):
     """Fit a few thousand pixels only, into the folder OUT-preview."""
     resume: Annotated[bool | None, flag(OUTPUT)] = None
     """Go on with the map that an earlier run left in --out (the default)."""
-    overwrite: Annotated[bool | None, switch(OUTPUT)] = None
-    """Replace a map that is in --out."""
+    overwrite: Annotated[bool | None, switch(OUTPUT, "Replace a map that is in --out.")] = None
 
 
 def map_cube(
     path: str, described: FilmRecipe, run: RunFlags, cube: CubeFlags, out: str | None, json: bool
 ) -> int:
     """Map a cube, print the report, write the folder, and return the exit code."""
-    _check(run, out)
-    folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
-    if folder is not None:
-        check_folder(str(folder))
-    scene = described.scene()
-    reference = None if run.lamp_reference is None else _known(run.lamp_reference)
-    start()
-    from pellicle.reporting.json_record import one_line
-    from pellicle.reporting.map_text import cube_json, cube_report
-    from pellicle.scene.free import free_leaves
-
-    if not free_leaves(scene):
-        raise DataError(
-            f"{described.path}: nothing is free to fit: give the thickness bounds, as in"
-            " thickness = { lower = 10, upper = 3000 }"
-        )
-    text = Path(described.path).read_text(encoding="utf-8")
-    options = {**reading(merged(cube, described)), "lamp_reference": reference, "recipe": text}
-    made = _fitted(path, scene, run, folder, options)
-    if made is None:
-        return INTERRUPTED
-    if made.run is not None and made.run.earlier:
-        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    show(one_line(cube_json(made)) if json else as_flags(cube_report(made)), folder is not None)
-    if folder is not None:
-        _write(folder, made)
-    return CONVERGED if made.decided >= MOST_DECIDED else UNCLEAR
-
-
-def _check(run: RunFlags, out: str | None) -> None:
-    """Refuse flags that contradict one another. Raises UsageError."""
     if run.workers is not None and run.workers < 1:
         raise UsageError(f"--workers must be at least 1, got {run.workers}")
     if run.workers is not None and run.scheduler is not None:
         raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
     if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
         raise UsageError(f"{idle[0]} needs --out, the folder of the map")
-
-
-def _fitted(
-    path: str, scene: Scene, run: RunFlags, folder: Path | None, options: dict[str, Any]
-) -> Map | None:
-    """The map of a cube in its folder; None where it was interrupted, which is stated."""
-    from pellicle.api import maps
-
-    remains = set() if folder is None or not folder.exists() else {folder, *folder.iterdir()}
+    folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
     if folder is not None:
-        _mark(folder)
+        check_folder(str(folder))
+    scene = described.scene(fitted=True)
+    options = {name: value for name, value in vars(run).items() if value is not None}
+    options["workers"] = 1 if run.preview and run.workers is None else run.workers
+    if run.lamp_reference is not None:
+        what = "--lamp-reference needs the recipe of a film, and this one is of a surface"
+        options["lamp_reference"] = film_recipe(run.lamp_reference, what).scene()
+    start()
+    from pellicle.reporting.map_text import cube_json, cube_report
+
+    options["recipe"] = Path(described.path).read_text(encoding="utf-8")
+    made = _fitted(path, scene, folder, options | cube.arguments(described))
+    if made is None:
+        return INTERRUPTED
+    if made.run is not None and made.run.earlier:
+        say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
+    show(cube_json(made) if json else as_flags(cube_report(made)), folder is not None)
+    if folder is not None:
+        _write(folder, made)
+    return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
+
+
+def film_recipe(path: str, otherwise: str) -> FilmRecipe:
+    """Read the recipe of a film. Raises UsageError, `otherwise`, for that of a surface."""
+    from pellicle.recipes.read import SurfaceRecipe, read_recipe
+
+    described = read_recipe(path)
+    if isinstance(described, SurfaceRecipe):
+        raise UsageError(f"{path}: {otherwise}")
+    return described
+
+
+def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any]) -> Map | None:
+    """The map of a cube in its folder; None where it was interrupted, which is stated."""
+    import shutil
+
+    from pellicle.api import maps
+    from pellicle.files import MARKER, new_folder, write_text
+    from pellicle.reporting.json_record import indented, versions
+    from pellicle.reporting.map_text import SCHEMA
+
+    store, marker, remains = None, None, set()
+    if folder is not None:
+        remains = {folder, *folder.iterdir()} if folder.exists() else set()
+        store, marker = folder / STORE, new_folder(folder) / MARKER
+        if not marker.exists():  # it marks the folder as ours, so that a killed run can go on in it
+            write_text(marker, indented({"schema": SCHEMA, "status": "running", "versions": versions()}))
     progress = PixelProgress(path)
     try:
         with progress:
-            return maps.map(
-                path,
-                scene,
-                out=None if folder is None else folder / STORE,
-                workers=1 if run.preview and run.workers is None else run.workers,
-                scheduler=run.scheduler,
-                resume=run.resume is not False,
-                overwrite=bool(run.overwrite),
-                preview=bool(run.preview),
-                neighbours=bool(run.neighbours),
-                lamp_curve=run.lamp_curve,
-                progress=progress,
-                **options,
-            )
+            return maps.map(path, scene, out=store, progress=progress, **options)
     except KeyboardInterrupt:
         kept = f"; they are kept in {folder}, and the same command goes on from there" if folder else ""
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
         return None
     except ValueError:  # a cube that cannot be read leaves no folder
-        if folder is not None and not progress.done:
-            _remove(folder, remains)
+        if folder is not None and store is not None and marker is not None and not progress.done:
+            if store not in remains:
+                shutil.rmtree(store, ignore_errors=True)
+            if marker not in remains:
+                marker.unlink(missing_ok=True)
+            if folder not in remains and not any(folder.iterdir()):
+                folder.rmdir()
         raise
 
 
-def _known(path: str) -> Scene:
-    """The scene of the recipe of a reference."""
-    from pellicle.recipes.read import FilmRecipe, read_recipe
-
-    described = read_recipe(path)
-    if not isinstance(described, FilmRecipe):
-        raise UsageError(f"{path}: --lamp-reference needs the recipe of a film, and this one is of a surface")
-    return described.scene()
-
-
-def _mark(folder: Path) -> None:
-    """Make the folder and mark it as ours, so that a killed run can go on in it."""
-    from pellicle.files import MARKER, new_folder, write_text
-    from pellicle.reporting.json_record import indented, versions
-    from pellicle.reporting.map_text import SCHEMA
-
-    target = new_folder(folder)
-    if not (target / MARKER).exists():
-        begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
-        write_text(target / MARKER, indented(begun))
-
-
-def _remove(folder: Path, remains: set[Path]) -> None:
-    """Remove the store and the mark of a run that has no pixel, unless they were there before it."""
-    import shutil
-
-    from pellicle.files import MARKER
-
-    if folder / STORE not in remains:
-        shutil.rmtree(folder / STORE, ignore_errors=True)
-    if folder / MARKER not in remains:
-        (folder / MARKER).unlink(missing_ok=True)
-    if folder not in remains and not any(folder.iterdir()):
-        folder.rmdir()
-
-
 def _write(folder: Path, made: Map) -> None:
+    from pellicle.files import replacing
+    from pellicle.mapping.growth import TIME
     from pellicle.reporting.map_files import write_cube_map
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
     write_cube_map(folder, made)
-    rates = _write_rates(folder, made)
-    say(f"{folder}: map.zarr, map.nc, {rates}report and figures written")
-
-
-def _write_rates(folder: Path, made: Map) -> str:
-    """Write the rates of a series, and return the name of the file with a comma, empty without one."""
-    from pellicle.files import replacing
-    from pellicle.mapping.growth import TIME
-
-    if TIME not in made.dims:
-        return ""
-    try:
-        rates = made.growth()
-    except UsageError as error:
-        say(f"no rates of change: {error}")
-        return ""
-    with replacing(folder / RATES, overwrite=True) as draft:
-        rates.to_netcdf(draft, engine="h5netcdf")
-    return f"{RATES}, "
+    names = [STORE, NETCDF]
+    if TIME in made.dims:
+        try:
+            rates = made.growth()
+        except UsageError as error:
+            say(f"no rates of change: {error}")
+        else:
+            names.append(RATES)
+            with replacing(folder / RATES, overwrite=True) as draft:
+                rates.to_netcdf(draft, engine="h5netcdf")
+    say(f"{folder}: {', '.join(names)}, report and figures written")
 
 
 PHOTOGRAPHS = Group("Photographs", sort_key=5)
@@ -235,11 +190,8 @@ def map(
     Example: pellicle map blade.png --recipe oxide.toml --strip 20,60,420,60 --out blade
     """
     from pellicle.data.cubes.detect import is_photograph
-    from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
-    described = read_recipe(recipe)
-    if isinstance(described, SurfaceRecipe):
-        raise UsageError(f"{recipe}: describes a surface, and a map needs the recipe of a film")
+    described = film_recipe(recipe, "describes a surface, and a map needs the recipe of a film")
     run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()
     photograph = {"strip": strip, "region": region, "layer": layer}
     of_photograph = [*named(n for n, value in photograph.items() if value is not None), *camera.given()]
@@ -293,13 +245,12 @@ def _map_photograph(
     import equinox as eqx
 
     from pellicle.api import maps
-    from pellicle.reporting.json_record import one_line
     from pellicle.reporting.photograph_map import report, to_json, write_map
 
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
     made: Any = maps.map(photograph, scene, space=space, noise=noise, **flags, **seen)
-    show(one_line(to_json(made)) if json else report(made), out is not None)
+    show(to_json(made) if json else report(made), out is not None)
     if out is not None:
         say(f"{write_map(out, made)}: report, figure and tables written")
-    return CONVERGED if made.converged >= MOST_CONVERGED else UNCLEAR
+    return GOOD if made.converged >= MOST_CONVERGED else UNCLEAR

@@ -1,4 +1,4 @@
-"""`pellicle read`: what a file of measurements or a photograph holds, and its conversion."""
+"""`pellicle read` and `pellicle materials`: content of files of measurements, and of n and k."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, named, switch
+from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.reading import read as read_file
-from pellicle.cli.session import as_flags, say, start
+from pellicle.cli.session import BAD_DATA, GOOD, start
 from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from pellicle.data.spectrum import Spectrum
 
 SUFFIXES = {"csv": ".csv", "netcdf": ".nc", "nexus": ".nxs"}
-GOOD, BAD_DATA = 0, 3
 
 
 def read(
@@ -102,7 +102,7 @@ def _measurements(
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
     """The cube of a file; flags of other files are refused."""
-    from pellicle.cli.flags import CubeFlags, reading
+    from pellicle.cli.flags import CubeFlags
     from pellicle.data.read_cube import read_cube
 
     shared = options.given()
@@ -111,7 +111,7 @@ def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
         raise UsageError(
             f"{path}: is a cube of spectra, which {named(wrong[:1])[0]} does not apply to: leave it out"
         )
-    return read_cube(path, **reading(CubeFlags(**{**vars(of_cube), **shared})))
+    return read_cube(path, **CubeFlags(**{**vars(of_cube), **shared}).arguments())
 
 
 def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
@@ -133,21 +133,18 @@ def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
 
 
 def _report_error(path: str, message: str, as_json: bool) -> None:
-    from pellicle.reporting.json_record import error_record, one_line
+    from pellicle.reporting.json_record import error_record
 
     message = message if path in message else f"{path}: {message}"
     say(f"pellicle: {message}")
     if as_json:
-        print(one_line(error_record(message, BAD_DATA)), flush=True)
+        show(error_record(message, BAD_DATA))
 
 
 def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
-    from pellicle.reporting.json_record import one_line
     from pellicle.reporting.measured_text import describe, to_json
 
-    notes = tuple(map(as_flags, measured.notes))
-    text = one_line(to_json(measured)) if as_json else describe(measured, notes)
-    print(text, flush=True)
+    show(to_json(measured) if as_json else describe(measured, tuple(map(as_flags, measured.notes))))
 
 
 def _write(folder: Path, measurements: list[Any], formats: list[str]) -> None:
@@ -173,3 +170,32 @@ def _write(folder: Path, measurements: list[Any], formats: list[str]) -> None:
             written = [write_spectrum(folder / f"{stem}{SUFFIXES[word]}", one) for word in formats]
             written.append(save_figure(draw(one), folder / f"{stem}.png"))
         say(f"{folder}: {', '.join(path.name for path in written)} written")
+
+
+def materials(
+    name: Annotated[str | None, Parameter(help="Name of a material, or a file of n and k.")] = None,
+    *,
+    out: Annotated[str | None, Parameter(help="File for the figure of n and k (PNG, PDF, SVG).")] = None,
+) -> int:
+    """List the catalogue, or describe one material or its file, and draw its n and k.
+
+    Of a file it says what is understood: format, columns, unit and range.
+
+    Example: pellicle materials Au --out gold.png
+    """
+    from pellicle.materials import UnknownMaterial
+    from pellicle.reporting import materials as catalogue
+
+    if name is None:
+        if out is not None:
+            raise UsageError("--out draws one material: name it, as in pellicle materials Au --out gold.png")
+        print(catalogue.table(), end="")
+        return 0
+    try:
+        print(catalogue.describe(name), end="")
+    except UnknownMaterial as error:
+        raise UsageError(str(error)) from None
+    if out is not None:
+        catalogue.figure(name, out)
+        say(f"{out}: figure written")
+    return 0

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pellicle.cli.flags import light, named
-from pellicle.cli.session import say
+from pellicle.cli.messages import say
 from pellicle.data.options import COLOURS, SPACES, CameraOptions, FileOptions, SpectrumOptions
 from pellicle.errors import DataError, UsageError
 

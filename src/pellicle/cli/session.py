@@ -1,115 +1,29 @@
-"""Setup of JAX and messages on stderr, whose Python arguments become flags, shared by the commands.
-
-The library names arguments in backticks, as a Python caller writes them: `` `scale="slow"` ``. The
-command line prints the flag: `--scale slow`. Other text in backticks is not changed.
-"""
+"""Setup of JAX, folders, exit codes, worker processes; Ctrl-C and SIGTERM, also where JAX would lose them."""
 
 from __future__ import annotations
 
-import ast
+import _thread
 import os
-import re
-import shlex
+import signal
 import sys
-from contextlib import suppress
-from dataclasses import replace
-from functools import cache
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager, redirect_stderr
+from io import StringIO
 from math import inf
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 from shutil import disk_usage
-from typing import TYPE_CHECKING
+from typing import TypeVar
 from warnings import filterwarnings
 
-from pellicle.cli.flags import Flags
+from pellicle.cli.messages import say
 from pellicle.errors import UsageError
+from pellicle.programs.threads import single_threaded
 
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit
-
-
-_OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
-"""Flags of arguments that have another name."""
-_COMMAND_ARGUMENTS = (
-    *("depth", "invert", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats"),
-    *("strip", "thickness_map", "to", "view"),
-)
-"""Flags that one command has outside the groups of `pellicle.cli.flags`."""
-_NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
-
-_QUOTED = re.compile(r"`([^`]+)`")
-
-
-@cache
-def flag_names() -> dict[str, str]:
-    """The flag of each argument that a message may name: that of a command, of the same name."""
-    groups = [Flags]
-    for group in groups:
-        groups += group.__subclasses__()
-    names = {name for group in groups for name in getattr(group, "__dataclass_fields__", ())}
-    names.update(_COMMAND_ARGUMENTS)
-    return {name: f"--{name.replace('_', '-')}" for name in names} | _OTHER_NAMES
-
-
-def as_flags(text: str) -> str:
-    """Replace arguments in backticks by flags.
-
-    `` `thickness` `` becomes `--thickness`, `` `angle=70` `` `--angle 70`, `` `range=(400, 900)` `` and
-    `` `thickness=Free(10, 3000)` `` bounds (`--range 400:900`), `` `columns=["wavelength", "R"]` `` a list
-    (`--columns wavelength,R`), and `` `folded=True` `` a flag without a value.
-    """
-    return _QUOTED.sub(lambda quoted: _flags(quoted[1]) or quoted[0], text)
-
-
-def _flags(code: str) -> str | None:
-    """The flags of the arguments in `code`, None where one of them has no flag."""
-    call = f"f({code})"
-    try:
-        parsed = ast.parse(call, mode="eval").body
-    except SyntaxError:
-        return None
-    if not isinstance(parsed, ast.Call):
-        return None
-    words = []
-    for name in parsed.args:
-        if not isinstance(name, ast.Name) or name.id not in flag_names():
-            return None
-        words.append(flag_names()[name.id])
-    for keyword in parsed.keywords:
-        negative = _NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}")
-        if negative:
-            words.append(negative)
-            continue
-        value = _word(keyword.value, call)
-        if keyword.arg not in flag_names() or value is None:
-            return None
-        words.append(f"{flag_names()[keyword.arg]} {value}".rstrip())
-    return " ".join(words)
-
-
-def _word(value: ast.expr, source: str) -> str | None:
-    """A value as it is typed after its flag: empty for True, None where no flag says it."""
-    match value:
-        case ast.Constant(value=True):
-            return ""
-        case ast.Constant(value=False | None):
-            return None
-        case ast.Constant(value=str(text)):
-            return shlex.quote(text)
-        case ast.Tuple(elts=items) | ast.Call(func=ast.Name(id="Free"), args=items, keywords=[]):
-            words = [_word(item, source) for item in items]
-            return None if None in words else ":".join(map(str, words))
-        case ast.List(elts=items):
-            words = [_word(item, source) for item in items]
-            return None if None in words else ",".join(map(str, words))
-        case ast.Call():
-            return None
-    return ast.get_source_segment(source, value)
-
-
-def with_flags(fit: Fit) -> Fit:
-    """A copy of a fit whose verdict and warnings name flags."""
-    return replace(fit, verdict=as_flags(fit.verdict), warnings=tuple(map(as_flags, fit.warnings)))
-
+GOOD, WRONG_USAGE, BAD_DATA, UNCLEAR, TOO_SHORT, INTERRUPTED = 0, 2, 3, 4, 5, 130
+"""Exit codes: one answer, wrong flags, bad file or full disk, another status, chain too short, Ctrl-C."""
 
 CACHE_VARIABLE = "PELLICLE_CACHE"
 """A folder for compiled programs, or `off`."""
@@ -178,27 +92,109 @@ def check_folder(path: str) -> None:
         new_folder(path)
 
 
-def say(*sentences: str) -> None:
-    """Print to stderr; arguments in backticks become flags. A closed pipe is no error."""
-    for sentence in sentences:
-        with suppress(BrokenPipeError):
-            print(as_flags(sentence), file=sys.stderr)
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_PAUSE = 0.05
+"""Seconds after which a lost Ctrl-C is sent again."""
 
 
-def show(text: str, files_follow: bool, end: str = "\n") -> None:
-    """Print a result to stdout.
-
-    Where the pipe is closed, as by `| head`, this ends the command, unless files are still to be written.
-    """
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """In this block SIGTERM raises KeyboardInterrupt as Ctrl-C does, and neither is lost in a callback."""
+    hook, sys.unraisablehook = sys.unraisablehook, send_again
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main_thread else None
     try:
-        print(text, end=end, flush=True)
-    except BrokenPipeError:
-        if not files_follow:
-            raise
-        abandon_stdout()
+        yield
+    finally:
+        sys.unraisablehook = hook
+        if in_main_thread:
+            signal.signal(signal.SIGTERM, before)
 
 
-def abandon_stdout() -> None:
-    """Discard what stdout cannot take, which Python would try to write once more when it ends."""
-    with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def send_again(raised: sys.UnraisableHookArgs) -> None:
+    """Report an exception that Python ignores; send Ctrl-C again.
+
+    JAX runs a callback in every garbage collection, and Python ignores what is raised in one.
+    """
+    if issubclass(raised.exc_type, KeyboardInterrupt):
+        # not at once: it would be raised in this hook, and ignored
+        timer = threading.Timer(_PAUSE, _interrupt_main_thread)
+        timer.daemon = True
+        timer.start()
+    else:
+        sys.__unraisablehook__(raised)
+
+
+def _interrupt_main_thread() -> None:
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:  # it wakes a thread that waits, too
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it has ended, even by a signal that it cannot catch."""
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+
+
+def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers: int) -> Iterator[Result]:
+    """Compute `function` of each task in worker processes and yield the results in the order of the tasks.
+
+    After Ctrl-C, or where a worker dies, no other task is begun, and the results that are finished are
+    yielded before KeyboardInterrupt or BrokenExecutor is raised. `function`, tasks and results are pickled.
+    """
+    # spawned: a forked process would inherit the locks of JAX's threads in any state
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin)
+    waiting: list[Future[Result]] = []
+    try:
+        with _quiet_and_single_threaded():
+            waiting = [pool.submit(_run, function, task) for task in tasks]
+        while waiting:
+            result = waiting[0].result()
+            del waiting[0]
+            yield result
+    except (KeyboardInterrupt, BrokenExecutor):
+        pool.shutdown(cancel_futures=True)
+        yield from (x.result() for x in waiting if not x.cancelled() and x.exception() is None)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _quiet_and_single_threaded() -> Iterator[None]:
+    """Processes started in the block ignore Ctrl-C until they have a task, and use one thread each."""
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with single_threaded():
+            yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def _begin() -> None:
+    end_with_parent()
+    sys.unraisablehook = send_again
+    with redirect_stderr(StringIO()):  # this process has printed what there is to say
+        start()
+
+
+def _run(function: Callable[[Task], Result], task: Task) -> Result:
+    """The result of one task. After Ctrl-C this process begins no other: it keeps the signal's handler."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        raise KeyboardInterrupt
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupted = False
+    try:
+        return function(task)
+    except KeyboardInterrupt:  # the process that waits may have missed it: this exception goes there, too
+        interrupted = True
+        raise
+    finally:
+        if not interrupted:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)

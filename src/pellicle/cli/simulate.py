@@ -1,4 +1,4 @@
-"""`pellicle simulate`: a synthetic spectrum, colours or BRDF samples, with the true values in the header."""
+"""`pellicle simulate` and `pellicle demo`: synthetic measurements, with the true values in the header."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import Flags
+from pellicle.cli.batch import Batch
+from pellicle.cli.flags import Flags, SamplerFlags
+from pellicle.cli.inputs import inputs
+from pellicle.cli.messages import say, show
 from pellicle.cli.reading import directions, each_setting, recipe_angles, wavelengths
-from pellicle.cli.session import check_folder, not_negative, say, start
+from pellicle.cli.session import check_folder, not_negative, start
 from pellicle.data.options import SPACES
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import DataError, UsageError, install_command
 
 if TYPE_CHECKING:
     from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
@@ -145,7 +148,6 @@ def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, at: list[
     from pellicle.api.simulations import depth_profile
     from pellicle.fitting.film.messages import log_scene
     from pellicle.reporting.depth_profile import report, to_json, write_depth_profile
-    from pellicle.reporting.json_record import one_line
 
     scene = recipe.scene()
     log_scene(scene)
@@ -159,10 +161,7 @@ def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, at: list[
         _truth(scene),
     ]
     folder = write_depth_profile(out, profile, str(recipe.path), comments)
-    print(
-        one_line(to_json(profile, str(recipe.path))) if json else report(profile, str(recipe.path)),
-        flush=True,
-    )
+    show(to_json(profile, str(recipe.path)) if json else report(profile, str(recipe.path)))
     say(f"{folder}: figure and tables written")
 
 
@@ -284,3 +283,57 @@ def _write_samples(
     truth += ", means over the bands of a sensor" if surface.sensor is not None else ""
     write_brdf_samples(out, samples, comments=[*comments, f"truth: model {surface.model}, {truth}"])
     say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
+
+
+DEMO_RECIPE = """\
+# A layer of hematite, the red of ochre, on window glass: try other numbers.
+[data]
+files = ["hematite.csv"]
+signal = "R"
+noise = 0.004
+wavelengths = { start = 400, stop = 780, step = 4 }
+
+[scene]
+ambient = "air"
+substrate = "BK7"
+
+[[scene.layer]]
+name = "hematite"
+material = "Fe2O3"
+thickness = { value = 140, lower = 10, upper = 1000 }
+"""
+DEMO_FOLDER = "pellicle-demo"
+
+
+def demo(
+    *, out: Annotated[str, Parameter(help="Folder to make; an existing folder is not changed.")] = DEMO_FOLDER
+) -> int:
+    """Simulate a measurement, fit it, sample its posterior and draw the film's colours.
+
+    Makes a folder with a recipe, a spectrum and results, and prints the commands that made them.
+    """
+    from pellicle.cli.chart import chart
+    from pellicle.files import write_text
+    from pellicle.sampling.chain import missing
+
+    folder, count = Path(out), 1
+    while folder.exists():
+        count += 1
+        folder = Path(out).with_name(f"{Path(out).name}-{count}")
+    folder.mkdir(parents=True)
+    recipe, data, image = folder / "hematite.toml", folder / "hematite.csv", folder / "colours.png"
+    write_text(recipe, DEMO_RECIPE)
+    say(f"{recipe}: a recipe to change and try again")
+    say("", f"$ pellicle simulate {recipe} --out {data} --seed 1")
+    simulate(str(recipe), out=str(data), how=SimulationFlags(seed=1))
+    sampler, command = (None, "fit") if missing() else (SamplerFlags(), "sample")
+    say("", f"$ pellicle {command} --recipe {recipe} --out {folder / 'result'}")
+    files = inputs([], str(recipe))
+    start()
+    code = Batch(files, sampler=sampler, out=str(folder / "result")).run()
+    say("", f"$ pellicle chart {recipe} --out {image} --thickness 0:600")
+    chart(str(recipe), out=str(image), thickness="0:600")
+    if sampler is None:
+        say(f"no posterior was sampled: {install_command('posterior')}")
+    say(f"see {folder}/result (report.txt, figure.png) and {image}")
+    return code

@@ -7,9 +7,9 @@ nothing heavy: `pellicle --help` loads it.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any, Self, get_type_hints
 
 from pellicle.errors import UsageError
 
@@ -18,8 +18,6 @@ SPECTRA, COLOURS, BRDF = "spectra", "colours", "BRDF samples"
 SPACES = ("srgb", "rgb", "xyz", "lab")
 SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
-
-Record = TypeVar("Record", bound="Options")
 
 
 def parse_number(text: str, name: str, expected: str = "a number") -> float:
@@ -153,11 +151,10 @@ class Options:
         values = {name: getattr(self, name) for name in self.declared()}
         return {name: value for name, value in values.items() if value is not None}
 
-    def over(self: Record, other: Mapping[str, Any]) -> Record:
-        """A copy in which options that are not given are those of another record, by name."""
-        record: Any = self
-        absent = self.declared().keys() - self.given().keys()
-        return replace(record, **{name: x for name, x in other.items() if name in absent})
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Self:
+        """The options among `values`, by name."""
+        return cls(**{name: x for name, x in values.items() if name in cls.declared()})
 
 
 @cache

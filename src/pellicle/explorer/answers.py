@@ -1,5 +1,6 @@
-"""Answers to the page: curves and colours as JSON, and a ball under a film as a PNG."""
+"""Answers to the page: curves of models, data and fits, and colours as JSON, a ball under a film as a PNG."""
 
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from io import BytesIO
 from math import isfinite
@@ -10,9 +11,15 @@ from PIL import Image
 
 from pellicle.colour import lab, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
-from pellicle.explorer.programs import COSINES, Curve, named
+from pellicle.data.spectrum import Spectrum
+from pellicle.explorer.controls import Control
+from pellicle.explorer.programs import COSINES, MOST, Curve, measured_angles, named, thinned
+from pellicle.fitting.curves import Curve as FittedCurve
+from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
+from pellicle.reporting import fit_text
 from pellicle.reporting.rendering_display import display, encode, exposure
+from pellicle.signals.base import Quantity
 from pellicle.simulation.environment import Sphere, sphere, studio
 
 WHITE_PERCENTILE = 97.0
@@ -113,3 +120,91 @@ def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str
         listed = "; ".join(at) if len(at) <= _LISTED else f"{at[0]}; to {at[-1]}"
         text = f"{light} under D65 at each angle of incidence, from left to right: {listed}"
     return {**each[0], "each": [own["hex"] for own in each], "text": text}
+
+
+def fit_to_json(fit: Fit, controls: Collection[Control]) -> dict[str, Any]:
+    """Convert a fit: values and standard errors of controls, verdict, report and fitted curves."""
+    values, errors = {}, {}
+    for control in controls:
+        estimate = fit.parameters.get(control.name)
+        if estimate is not None and estimate.free:
+            values[control.name] = min(max(estimate.value, control.lower), control.upper)
+            errors[control.name] = estimate.stderr if isfinite(estimate.stderr) else None
+    return {
+        "values": values,
+        "errors": errors,
+        "status": str(fit.status),
+        "verdict": fit.verdict.replace("`", ""),
+        "warnings": [warning.replace("`", "") for warning in fit.warnings],
+        "summary": fit_text.report(fit).replace("`", ""),
+    }
+
+
+def data_curves(spectra: Sequence[Spectrum], against_angle: bool = False) -> list[Curve]:
+    """Return the curves of spectra, one for each angle of incidence if they are measured at several.
+
+    Of more than `MOST` angles some are left out. With `against_angle` there is one curve against the angle,
+    and spectra at several wavelengths have none.
+    """
+    every = measured_angles(spectra)
+    return [
+        curve
+        for spectrum in spectra
+        for curve in _curves(
+            spectrum, {q.symbol: q.measured(spectrum) for q in _drawn(spectrum)}, every, against_angle
+        )
+    ]
+
+
+def fitted_curves(fit: Fit, against_angle: bool = False) -> list[Curve]:
+    """Return the fitted signal of each spectrum, with its scale and offset, as `data_curves` does data."""
+    every = measured_angles([part.spectrum for part in fit.parts])
+    curves = []
+    for part in fit.parts:
+        model = part.curve
+        if isinstance(model, FittedCurve) and np.ndim(model.model) == 1:
+            columns = {q.symbol: q.curve(model)[1] for q in _drawn(part.spectrum)}
+            curves += _curves(part.spectrum, columns, every, against_angle)
+    return curves
+
+
+def _drawn(spectrum: Spectrum) -> list[Quantity]:
+    return [quantity for quantity in spectrum.kind.quantities if quantity.array != "depolarisation"]
+
+
+def _curves(
+    spectrum: Spectrum, columns: Mapping[str, np.ndarray], every: np.ndarray, against_angle: bool
+) -> list[Curve]:
+    """Curves of the `columns` of a spectrum by their labels; `every` has the angles of all spectra."""
+    if against_angle:
+        if spectrum.angle is None or np.ptp(spectrum.wavelength) > 0:
+            return []
+        rows = np.argsort(spectrum.angle, kind="stable")
+        drawn = [(rows, spectrum.angle, "")]
+    elif spectrum.angle is None or len(every) < 2:  # one angle has no name
+        drawn = [(np.arange(len(spectrum)), spectrum.wavelength, "")]
+    else:
+        at = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
+        drawn = [(rows, spectrum.wavelength, setting) for rows, setting in at if rows.size]
+    return [
+        Curve(label, x[rows], np.asarray(values)[rows], setting, spectrum.name)
+        for rows, x, setting in drawn
+        for label, values in columns.items()
+    ]
+
+
+def data_text(spectra: Sequence[Spectrum]) -> list[str]:
+    """Sentences on what was read."""
+    sentences = []
+    for spectrum in spectra:
+        nm, angles = spectrum.wavelength, measured_angles([spectrum])
+        across = f"from {nm.min():g} to {nm.max():g} nm" if np.ptp(nm) > 0 else f"at {nm[0]:g} nm"
+        at = ", ".join(f"{angle:g}" for angle in angles)
+        if len(angles) > MOST:
+            at = f"{len(angles)} angles from {angles[0]:g} to {angles[-1]:g}"
+        about = f"{spectrum.signal}, {len(nm)} points {across}{f', at {at}°' if at else ''}"
+        sentences += [f"{spectrum.path}: {about}", *spectrum.notes]
+    count = len(measured_angles(spectra))
+    if count > MOST and any(np.ptp(spectrum.wavelength) > 0 for spectrum in spectra):
+        sentences.append(f"data at {MOST} of {count} angles of incidence are drawn; a fit uses all of them")
+    return list(dict.fromkeys(sentences))

@@ -281,3 +281,17 @@ def oblique_cone(name: str, angle: float, size: float, bound: float) -> tuple[fl
 def key_of(name: str) -> str:
     """Return the last part of a control's name."""
     return name.rpartition(".")[2]
+
+
+def fitted_names(controls: Collection[Control], asked: Any) -> list[str]:
+    """Names of the controls to fit: those that are `asked`, else the scene's free ones, else thicknesses.
+
+    Raises UsageError for an unknown name.
+    """
+    if asked is not None:
+        known = {control.name for control in controls}
+        if not isinstance(asked, list | tuple) or not asked or not all(name in known for name in asked):
+            raise UsageError(f"`free` must be a list of one or more of {', '.join(sorted(known))}")
+        return list(asked)
+    free = [control.name for control in controls if control.free is not None]
+    return free or [control.name for control in controls if control.path[-1].name == "thickness"]

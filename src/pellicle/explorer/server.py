@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError, install_command
-from pellicle.explorer.page.document import document, policy
+from pellicle.explorer.page import document, policy
 from pellicle.explorer.session import Session
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 LARGEST_BODY = 32_000_000
-"""Bytes of the largest request: a data file of `explorer.data.LARGEST_FILE` in base64."""
+"""Bytes of the largest request: a data file of `LARGEST_FILE` in base64."""
 _TOKEN = "X-Pellicle-Token"
 _HEADERS = {
     "Cache-Control": "no-store",

@@ -16,13 +16,20 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.errors import DataError, UsageError
-from pellicle.explorer.answers import colours_to_json, curve_to_json, plan_to_json
-from pellicle.explorer.compiler import NOW, SOON, Compiler
-from pellicle.explorer.controls import scene_with, with_value
-from pellicle.explorer.dropped_files import LARGEST_FILE, data_curves, data_text, measured_spectra
+from pellicle.errors import UsageError
+from pellicle.explorer.answers import (
+    colours_to_json,
+    curve_to_json,
+    data_curves,
+    data_text,
+    fit_to_json,
+    fitted_curves,
+    plan_to_json,
+)
+from pellicle.explorer.background import NOW, SOON, Compiler, FitRun
+from pellicle.explorer.controls import fitted_names, scene_with, with_value
+from pellicle.explorer.dropped_files import LARGEST_FILE, measured_spectra
 from pellicle.explorer.film_view import FilmView
-from pellicle.explorer.fit_run import FitRun, fitted_curves, fitted_names, to_json
 from pellicle.explorer.programs import ANGLE, asked_angles, measured_angles
 from pellicle.explorer.surface_view import SurfaceExplorerView
 from pellicle.recipes.python_text import python_program
@@ -89,13 +96,14 @@ class Session:
             return {"error": f"no request {request!r}; known: {', '.join(self._requests)}"}
         if not isinstance(body, Mapping):
             return {"error": "the body of a request must be a JSON object"}
+        serial = {"serial": body["serial"]} if "serial" in body else {}
         try:
-            return self._requests[request](body)
-        except (UsageError, DataError, ValueError, OSError) as error:
-            return {"error": _sentence(error), **_serial(body)}
+            return serial | self._requests[request](body)
+        except (ValueError, OSError) as error:
+            return {"error": _sentence(error), **serial}
         except Exception as error:  # a fault of ours must not end the session
             log.exception("request %s", request)
-            return {"error": f"{request} failed: {type(error).__name__}: {error}", **_serial(body)}
+            return {"error": f"{request} failed: {type(error).__name__}: {error}", **serial}
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self._view_of(body)
@@ -151,7 +159,7 @@ class Session:
         fit = self._fit_run.run(self.spectra, scene)
         if fit is None:
             return {"stopped": True}
-        answer = to_json(fit, view.controls)
+        answer = fit_to_json(fit, view.controls)
         stated = measured_angles(self.spectra)
         if "angle" not in names and "angle" in values and len(stated) == 1:
             answer["values"]["angle"] = float(stated[0])
@@ -179,12 +187,11 @@ class Session:
             raise UsageError(f"`want` must be a list of {', '.join(WANTED)}")
         if not isinstance(size, int) or not 16 <= size <= LARGEST:
             raise UsageError(f"`size` must be 16 to {LARGEST} pixels")
-        answer: dict[str, Any] = {**_serial(body), "compiling": [], "milliseconds": {}}
-        parts = {"curves": self._curves, "colour": self._colour, "sphere": self._sphere, "plan": self._plan}
+        answer: dict[str, Any] = {"compiling": [], "milliseconds": {}}
         for part in (part for part in wanted if part in view.parts):
             began = time.perf_counter()
             try:
-                content = parts[part](view, values, bool(body.get("wait")), size)
+                content = self._part(part, view, values, bool(body.get("wait")), size)
             except ValueError as error:
                 warnings.append(_sentence(error))
                 continue
@@ -212,12 +219,22 @@ class Session:
             values[name] = float(value)
         return values
 
-    def _computed(self, view: _View, kind: str, values: Mapping[str, float], wait: bool) -> Any:
-        """The result of the program for the effects that these values have, None while it is compiled."""
+    def _part(self, part: str, view: _View, values: Mapping[str, float], wait: bool, size: int) -> Any:
+        """A part of a view, by the program for the effects of these values; None while that is compiled."""
+        if part == "plan":
+            return plan_to_json(view.plan(values))
         structure = view.structure(values)
         get = self._compiler.wait if wait else self._compiler.get
-        program = get((view.key(kind), structure), lambda: view.compile(kind, structure))
-        return None if program is None else program(values, view.seen_at(kind))
+        program = get((view.key(part), structure), lambda: view.compile(part, structure))
+        if program is None:
+            return None
+        made = program(values, view.seen_at(part))
+        if part == "sphere":
+            return f"data:image/png;base64,{b64encode(view.rendering(made, size)).decode()}"
+        if part == "colour":
+            return colours_to_json(made, view.seen_at(part), view.light_in_words)
+        measured = {name for spectrum in self.spectra for name in spectrum.kind.parts}
+        return [curve_to_json(curve) for curve in made if not measured or curve.signal in measured]
 
     def prepare(self) -> None:
         """Compile in the background what the first views need, and then what one effect more needs."""
@@ -230,35 +247,6 @@ class Session:
             # a ValueError, of a colour without data, is raised by the view that wants it
             with suppress(ValueError):
                 self._compiler.get((view.key(kind), needed), partial(view.compile, kind, needed), urgency)
-
-    def _curves(
-        self, view: _View, values: Mapping[str, float], wait: bool, size: int
-    ) -> list[dict[str, Any]] | None:
-        curves = self._computed(view, "curves", values, wait)
-        measured = {name for spectrum in self.spectra for name in spectrum.kind.parts}
-        shown = [x for x in curves or () if not measured or x.signal in measured]
-        return None if curves is None else [curve_to_json(curve) for curve in shown]
-
-    def _colour(
-        self, view: _View, values: Mapping[str, float], wait: bool, size: int
-    ) -> dict[str, Any] | None:
-        xyz = self._computed(view, "colour", values, wait)
-        return None if xyz is None else colours_to_json(xyz, view.seen_at("colour"), view.light_in_words)
-
-    def _sphere(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> str | None:
-        sphere = self._computed(view, "sphere", values, wait)
-        return (
-            None
-            if sphere is None
-            else f"data:image/png;base64,{b64encode(view.rendering(sphere, size)).decode()}"
-        )
-
-    def _plan(self, view: _View, values: Mapping[str, float], wait: bool, size: int) -> list[dict[str, Any]]:
-        return plan_to_json(view.plan(values))
-
-
-def _serial(body: Mapping[str, Any]) -> dict[str, Any]:
-    return {"serial": body["serial"]} if "serial" in body else {}
 
 
 def _sentence(error: Exception) -> str:

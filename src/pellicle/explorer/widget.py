@@ -6,7 +6,7 @@ from threading import Thread
 from typing import Any
 
 from pellicle.errors import UsageError, install_command
-from pellicle.explorer.page.document import style, widget_module
+from pellicle.explorer.page import style, widget_module
 from pellicle.explorer.session import Session
 
 _LONG = frozenset({"fit"})

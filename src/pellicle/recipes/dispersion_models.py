@@ -18,7 +18,7 @@ from pellicle.dispersion.oscillators import (
     TaucLorentz,
 )
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
-from pellicle.errors import UsageError, did_you_mean
+from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free
 
 Parameter: TypeAlias = float | Free
@@ -159,10 +159,9 @@ def fixed_model(name: str, numbers: Sequence[float], label: str) -> AbstractDisp
 def build_model(name: str, values: Values) -> AbstractDispersion:
     """Build a model of `MODELS` from `values`; other parameters are fixed at their defaults.
 
-    Raises UsageError for an unknown parameter, with the nearest known one, and for values that the model
-    forbids.
+    Raises UsageError for values that the model forbids.
     """
-    complete = _with_defaults(name, MODELS[name], values, ("knots",) if name in SPLINES else ())
+    complete = {key: spec.value for key, spec in MODELS[name].items()} | dict(values)
     if name == "sellmeier":  # terms beyond the last one given are absent
         last = max((key[1] for key in values), default="1")
         complete = {key: value for key, value in complete.items() if key[1] <= last}
@@ -171,9 +170,8 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
 
 def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
     """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
-    check_word(kind, TERMS, "oscillator")
-    values = _with_defaults(kind, TERMS[kind], values)
-    return _checked(lambda: KINDS[kind](**values))
+    complete = {key: spec.value for key, spec in TERMS[kind].items()} | dict(values)
+    return _checked(lambda: KINDS[kind](**complete))
 
 
 def sum_of_oscillators(eps_inf: Parameter, terms: Iterable[AbstractOscillator]) -> AbstractDispersion:
@@ -251,13 +249,6 @@ def _built(name: str, values: Values) -> AbstractDispersion:
     return KINDS[name](**given)
 
 
-def _with_defaults(
-    name: str, specs: Mapping[str, ParameterSpec], values: Values, others: tuple[str, ...] = ()
-) -> Values:
-    check_keys(values, [*specs, *others], f"{name} has no parameter")
-    return {key: spec.value for key, spec in specs.items()} | dict(values)
-
-
 def _checked(build: Callable[[], _Built]) -> _Built:
     """Turn the ValueErrors of a dispersion into UsageErrors."""
     try:
@@ -277,19 +268,3 @@ def _modules(tree: object) -> list[eqx.Module]:
     if not isinstance(tree, eqx.Module):
         return []
     return [tree, *(x for part in vars(tree).values() for x in _modules(part))]
-
-
-def check_word(word: str, known: Iterable[str], what: str) -> None:
-    """Raise UsageError for a word that is not known, with the nearest known one."""
-    if word not in known:
-        raise UsageError(f"no {what} {word!r}{did_you_mean(word, known)}; known: {', '.join(known)}")
-
-
-def check_keys(
-    keys: Iterable[str], known: Sequence[str], what_lacks: str, elsewhere: Sequence[str] = ()
-) -> None:
-    """Raise UsageError for the first unknown key, with the nearest known one, which may stand `elsewhere`."""
-    for key in keys:
-        if key not in known:
-            close = did_you_mean(key, [*known, *elsewhere])
-            raise UsageError(f"{what_lacks} {key!r}{close}; it has {', '.join(known)}")

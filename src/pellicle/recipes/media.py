@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,6 @@ from pellicle.recipes.dispersion_models import (
     build_model,
     build_oscillator,
     check_dispersion,
-    check_keys,
-    check_word,
     fixed_model,
     free_by_default,
     free_model,
@@ -170,7 +168,7 @@ def _material(name: str) -> AbstractDispersion:
 def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     axis = values.pop("axis", [0.0, 0.0])
     keys = BIAXIAL if values.keys() & {*BIAXIAL} else UNIAXIAL
-    check_keys(values, [*keys, "axis"], "a birefringent material has no")
+    _check_keys(values, [*keys, "axis"], "a birefringent material has no")
     missing = [key for key in keys if key not in values]
     if missing:
         raise UsageError(f"a birefringent material lacks {' and '.join(missing)}: it has {', '.join(keys)}")
@@ -184,10 +182,10 @@ def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
 
 def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
     name = table.profile
-    check_word(name, PROFILES, "profile")
-    check_word(table.mix, MIXTURES, "mix")
+    _check_word(name, PROFILES, "profile")
+    _check_word(table.mix, MIXTURES, "mix")
     keys = [field.name for field in fields(PROFILES[name])]
-    check_keys(values, keys, f"a {name} profile has no", ("graded", "profile", "mix"))
+    _check_keys(values, keys, f"a {name} profile has no", ("graded", "profile", "mix"))
     if name == "spline" and not isinstance(values.get("values"), list):
         raise UsageError("a spline profile needs values, a list of fractions, one for each knot")
     numbers: dict[str, Any] = {}
@@ -203,35 +201,38 @@ def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> 
 def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
     if name == "oscillators":
         return _oscillators(values)
-    check_word(name, [*MODELS, "oscillators"], "dispersion model")
-    parameter = _parameters if name in SPLINES else _parameter
+    _check_word(name, [*MODELS, "oscillators"], "dispersion model")
+    parameter, more = (_parameters, ["knots"]) if name in SPLINES else (_parameter, [])
+    _check_keys(values, [*MODELS[name], *more], f"{name} has no parameter")
     return build_model(name, {key: parameter(key, value) for key, value in values.items()})
 
 
 def _oscillators(values: dict[str, Any]) -> AbstractDispersion:
     terms = values.pop("terms", None)
     eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
-    check_keys(values, ("eps_inf", "terms"), "oscillators has no parameter")
+    _check_keys(values, ("eps_inf", "terms"), "oscillators has no parameter")
     if not isinstance(terms, list) or not terms or not all(isinstance(t, dict) for t in terms):
         raise UsageError('oscillators needs terms, a list of tables like { kind = "lorentz", A = 1.0, ... }')
     built = []
     for term in terms:
         if "kind" not in term:
             raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(TERMS)}")
-        numbers = {key: _parameter(key, value) for key, value in term.items() if key != "kind"}
-        built.append(build_oscillator(str(term["kind"]), numbers))
+        kind, numbers = str(term["kind"]), {key: value for key, value in term.items() if key != "kind"}
+        _check_word(kind, TERMS, "oscillator")
+        _check_keys(numbers, [*TERMS[kind]], f"{kind} has no parameter")
+        built.append(build_oscillator(kind, {key: _parameter(key, value) for key, value in numbers.items()}))
     return sum_of_oscillators(eps_inf, built)
 
 
 def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
-    check_word(rule, MIXTURES, "mix")
+    _check_word(rule, MIXTURES, "mix")
     if "materials" in values:
         both = values.pop("materials")
         if not isinstance(both, list) or len(both) != 2 or values.keys() & {"host", "inclusion"}:
             raise UsageError(f"{rule}: materials is a list of two, the host and the inclusion")
         values |= {"host": both[0], "inclusion": both[1]}
     known = ("host", "inclusion", "fraction")
-    check_keys(values, known, f"{rule} has no")
+    _check_keys(values, known, f"{rule} has no")
     missing = [key for key in known if key not in values]
     if missing:
         raise UsageError(f"{rule}: {' and '.join(missing)} missing; it needs host, inclusion and fraction")
@@ -241,6 +242,22 @@ def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> Abstract
         return MIXTURES[rule](host, inclusion, fraction)
     except ValueError as error:
         raise UsageError(f"{rule}: {error}") from None
+
+
+def _check_word(word: str, known: Iterable[str], what: str) -> None:
+    """Raise UsageError for a word that is not known, with the nearest known one."""
+    if word not in known:
+        raise UsageError(f"no {what} {word!r}{did_you_mean(word, known)}; known: {', '.join(known)}")
+
+
+def _check_keys(
+    keys: Iterable[str], known: Sequence[str], what_lacks: str, elsewhere: Sequence[str] = ()
+) -> None:
+    """Raise UsageError for the first unknown key, with the nearest known one, which may stand `elsewhere`."""
+    for key in keys:
+        if key not in known:
+            close = did_you_mean(key, [*known, *elsewhere])
+            raise UsageError(f"{what_lacks} {key!r}{close}; it has {', '.join(known)}")
 
 
 def _component(key: str, value: Any, folder: Path | None) -> AbstractDispersion:

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -131,6 +131,18 @@ def _classes(annotation: Any) -> Iterator[type]:
         yield annotation
 
 
+Built = TypeVar("Built", Scene, Surface)
+
+
+def _with_free(scene: Built, count: int, fitted: bool, path: str) -> Built:
+    """Return a scene with few enough free parameters, and with one at least if it is to be `fitted`."""
+    try:
+        check_free_count(count, least=int(fitted))
+    except UsageError as error:
+        raise DataError(f"{path}: {error}".replace("`", "")) from None
+    return scene
+
+
 @dataclass(frozen=True)
 class FilmRecipe:
     """A recipe of a film: its path and its checked tables."""
@@ -164,7 +176,7 @@ class FilmRecipe:
     @property
     def options(self) -> dict[str, Any]:
         """The options of reading and fitting that the recipe gives."""
-        return self.reading | FitOptions().over(self.tables.data.given()).given()
+        return self.reading | FitOptions.of(self.tables.data.given()).given()
 
     def with_files(self, table: FileTable) -> dict[str, Any]:
         """The files that a table of `[[data.file]]` names, from the working folder."""
@@ -189,15 +201,16 @@ class FilmRecipe:
         except UsageError as error:
             raise DataError(f"{self.path}: camera: {error}".replace("`", "")) from None
 
-    def scene(self) -> Scene:
-        """Build the scene. Raises DataError, the recipe's path in front."""
+    def scene(self, fitted: bool = False) -> Scene:
+        """Build the scene. Raises DataError, the recipe's path in front; if `fitted`, where nothing is free."""
         try:
-            return _scene(self.tables, Path(self.path).parent)
+            scene = _scene(self.tables, Path(self.path).parent)
         except ValueError as error:
             # without backticks, which the command line would turn into flags
             raise DataError(f"{self.path}: {error}".replace("`", "")) from None
         except RecursionError:
             raise DataError(f"{self.path}: its materials are nested too deeply") from None
+        return _with_free(scene, len(free_leaves(scene)), fitted, self.path)
 
 
 def light_signal(signal: str | None, transmitted: bool | None) -> str:
@@ -222,7 +235,7 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
     scene, data = tables.scene, tables.data
     azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
     lit = light(data, tables.camera.transmitted, azimuth)
-    built = Scene(
+    return Scene(
         [parts.layer(layer, folder) for layer in scene.layer],
         parts.substrate(scene.substrate, folder, lit.signal),
         ambient=medium(scene.ambient, name="ambient", folder=folder),
@@ -231,8 +244,6 @@ def _scene(tables: RecipeTable, folder: Path) -> Scene:
         uncertainty=parts.uncertainty(scene, tables.instrument),
         reference=None if tables.reference is None else parts.reference(tables.reference, folder),
     )
-    check_free_count(len(free_leaves(built)), least=0)
-    return built
 
 
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
@@ -270,15 +281,16 @@ class SurfaceRecipe:
         """Data files, relative to the recipe."""
         return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
 
-    def scene(self) -> Surface:
-        """Build the surface. Raises DataError, the recipe's path in front."""
+    def scene(self, fitted: bool = False) -> Surface:
+        """Build the surface. Raises DataError as `FilmRecipe.scene` does."""
         try:
-            return _surface(self.tables.scene.surface, Path(self.path).parent)
+            surface = _surface(self.tables.scene.surface, Path(self.path).parent)
         except ValueError as error:
             # without backticks, which the command line would turn into flags
             raise DataError(f"{self.path}: scene.surface: {error}".replace("`", "")) from None
         except RecursionError:
             raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
+        return _with_free(surface, len(surface.free_numbers()), fitted, self.path)
 
     def read(self, file: str) -> BrdfSamples:
         """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError.
@@ -309,7 +321,7 @@ class SurfaceRecipe:
 
 
 def _surface(table: SurfaceTable, folder: Path) -> Surface:
-    surface = Surface(
+    return Surface(
         table.model,
         {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
         None if table.wavelengths is None else tuple(table.wavelengths),
@@ -317,8 +329,6 @@ def _surface(table: SurfaceTable, folder: Path) -> Surface:
         None if table.film is None else medium(table.film, name="film", folder=folder),
         None if table.base is None else medium(table.base, name="base", folder=folder),
     )
-    check_free_count(len(surface.free_numbers()), least=0)
-    return surface
 
 
 def _number(value: Any, key: str) -> Any:

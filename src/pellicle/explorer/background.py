@@ -1,11 +1,17 @@
-"""Programs compiled in the background, one at a time, the most urgent first."""
+"""Work in the background: programs compiled one at a time, the most urgent first, and one fit at a time."""
 
 import atexit
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from itertools import count
 from queue import PriorityQueue
 from typing import Any
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
+from pellicle.fitting.film.fit import fit
+from pellicle.fitting.result import Fit
+from pellicle.scene.film import Scene
 
 NOW, SOON = 0, 1
 """Order of compilation: what a view waits for, and what the next view may need."""
@@ -72,3 +78,44 @@ class Compiler:
             with self._changed:
                 self._found[key] = result
                 self._changed.notify_all()
+
+
+class _Stopped(Exception):
+    """A fit whose result is no longer wanted."""
+
+
+class FitRun:
+    """The fit that is running, and its progress."""
+
+    def __init__(self) -> None:
+        self._running, self._stop = threading.Lock(), threading.Event()
+        self._progress = ("", 0, 0)
+
+    def run(self, data: Sequence[Spectrum], scene: Scene) -> Fit | None:
+        """Fit a scene to spectra; None where it was stopped. Raises UsageError while another fit runs."""
+        if not self._running.acquire(blocking=False):
+            raise UsageError("a fit is running: stop it, or wait for its result")
+        try:
+            self._stop.clear()
+            return fit(data[0] if len(data) == 1 else list(data), scene, progress=self._report)
+        except _Stopped:
+            return None
+        finally:
+            self._progress = ("", 0, 0)
+            self._running.release()
+
+    def status(self) -> dict[str, Any]:
+        """Return the stage of the fit in numbers and words."""
+        stage, done, total = self._progress
+        text = f"{stage} {done}/{total}" if total > 1 else stage
+        return {"running": self._running.locked(), "stage": stage, "done": done, "total": total, "text": text}
+
+    def stop(self) -> dict[str, Any]:
+        """End the fit at its next step."""
+        self._stop.set()
+        return {"running": self._running.locked()}
+
+    def _report(self, stage: str, done: int, total: int) -> None:
+        self._progress = (stage, done, total)
+        if self._stop.is_set():
+            raise _Stopped

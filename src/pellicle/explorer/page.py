@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from pellicle.reporting.page.document import packed_plotly, palette
 
-_ASSETS = files("pellicle.explorer.page") / "assets"
+_ASSETS = files("pellicle.explorer") / "assets"
 _PARTS = ("slider.js", "angles.js", "plot.js", "files.js", "requests.js", "explorer.js")
 """Parts of one ES module, which exports `explore(element, call, options)`: widgets have no imports."""
 
@@ -20,7 +20,7 @@ def document(nonce: str) -> str:
     **Arguments:** `nonce`, a random text for this response, which `policy` names. The page reads the token,
     which it sends with each request, from the parameter `token` of its address.
     """
-    loader = PackageLoader("pellicle.explorer.page", "assets")
+    loader = PackageLoader("pellicle.explorer", "assets")
     template = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return template.get_template("explorer.html").render(
         nonce=nonce, style=Markup(style()), script=Markup(_module()), plotly=Markup(packed_plotly())

@@ -1,19 +1,147 @@
-"""Progress of long work on stderr: one line of stage, steps and time left, or the log of `--verbose`.
+"""Messages and progress on stderr, results on stdout; Python arguments in messages become flags.
 
-Not by rich, whose bars have no place for whether JAX compiles, and whose rate would include the compilation.
+The library names arguments in backticks, as a Python caller writes them: `` `scale="slow"` ``. The
+command line prints the flag: `--scale slow`. Other text in backticks is not changed.
+
+Progress is not by rich, whose bars have no place for whether JAX compiles, and whose rate would include the
+compilation.
 """
 
 from __future__ import annotations
 
+import ast
 import logging
+import os
+import re
+import shlex
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from functools import cache
 from shutil import get_terminal_size
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pellicle.cli.session import as_flags
+from pellicle.cli.flags import Flags
+
+if TYPE_CHECKING:
+    from pellicle.fitting.result import Fit
+
+
+_OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
+"""Flags of arguments that have another name."""
+_COMMAND_ARGUMENTS = (
+    *("depth", "invert", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats"),
+    *("strip", "thickness_map", "to", "view"),
+)
+"""Flags that one command has outside the groups of `pellicle.cli.flags`."""
+_NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
+
+_QUOTED = re.compile(r"`([^`]+)`")
+
+
+@cache
+def flag_names() -> dict[str, str]:
+    """The flag of each argument that a message may name: that of a command, of the same name."""
+    groups = [Flags]
+    for group in groups:
+        groups += group.__subclasses__()
+    names = {name for group in groups for name in getattr(group, "__dataclass_fields__", ())}
+    names.update(_COMMAND_ARGUMENTS)
+    return {name: f"--{name.replace('_', '-')}" for name in names} | _OTHER_NAMES
+
+
+def as_flags(text: str) -> str:
+    """Replace arguments in backticks by flags.
+
+    `` `thickness` `` becomes `--thickness`, `` `angle=70` `` `--angle 70`, `` `range=(400, 900)` `` and
+    `` `thickness=Free(10, 3000)` `` bounds (`--range 400:900`), `` `columns=["wavelength", "R"]` `` a list
+    (`--columns wavelength,R`), and `` `folded=True` `` a flag without a value.
+    """
+    return _QUOTED.sub(lambda quoted: _flags(quoted[1]) or quoted[0], text)
+
+
+def _flags(code: str) -> str | None:
+    """The flags of the arguments in `code`, None where one of them has no flag."""
+    call = f"f({code})"
+    try:
+        parsed = ast.parse(call, mode="eval").body
+    except SyntaxError:
+        return None
+    if not isinstance(parsed, ast.Call):
+        return None
+    words = []
+    for name in parsed.args:
+        if not isinstance(name, ast.Name) or name.id not in flag_names():
+            return None
+        words.append(flag_names()[name.id])
+    for keyword in parsed.keywords:
+        negative = _NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}")
+        if negative:
+            words.append(negative)
+            continue
+        value = _word(keyword.value, call)
+        if keyword.arg not in flag_names() or value is None:
+            return None
+        words.append(f"{flag_names()[keyword.arg]} {value}".rstrip())
+    return " ".join(words)
+
+
+def _word(value: ast.expr, source: str) -> str | None:
+    """A value as it is typed after its flag: empty for True, None where no flag says it."""
+    match value:
+        case ast.Constant(value=True):
+            return ""
+        case ast.Constant(value=False | None):
+            return None
+        case ast.Constant(value=str(text)):
+            return shlex.quote(text)
+        case ast.Tuple(elts=items) | ast.Call(func=ast.Name(id="Free"), args=items, keywords=[]):
+            words = [_word(item, source) for item in items]
+            return None if None in words else ":".join(map(str, words))
+        case ast.List(elts=items):
+            words = [_word(item, source) for item in items]
+            return None if None in words else ",".join(map(str, words))
+        case ast.Call():
+            return None
+    return ast.get_source_segment(source, value)
+
+
+def with_flags(fit: Fit) -> Fit:
+    """A copy of a fit whose verdict and warnings name flags."""
+    return replace(fit, verdict=as_flags(fit.verdict), warnings=tuple(map(as_flags, fit.warnings)))
+
+
+def say(*sentences: str) -> None:
+    """Print to stderr; arguments in backticks become flags. A closed pipe is no error."""
+    for sentence in sentences:
+        with suppress(BrokenPipeError):
+            print(as_flags(sentence), file=sys.stderr)
+
+
+def show(result: str | dict[str, Any], files_follow: bool = False, end: str = "\n") -> None:
+    """Print a result to stdout, a JSON record on one line.
+
+    Where the pipe is closed, as by `| head`, this ends the command, unless files are still to be written.
+    """
+    if not isinstance(result, str):
+        from pellicle.reporting.json_record import one_line
+
+        result = one_line(result)
+    try:
+        print(result, end=end, flush=True)
+    except BrokenPipeError:
+        if not files_follow:
+            raise
+        abandon_stdout()
+
+
+def abandon_stdout() -> None:
+    """Discard what stdout cannot take, which Python would try to write once more when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
 
 LOG = logging.getLogger("pellicle")
 _COMPILE, _COMPILED = "/jax/core/compile/", "/jax/core/compile/backend_compile_duration"

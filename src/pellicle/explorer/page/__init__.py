@@ -1,1 +1,0 @@
-"""Page of the explorer: template, style and script, which a notebook shows as a widget."""
