@@ -54,7 +54,9 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         yield temporary
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
-        temporary.chmod(0o666 & ~_umask())  # mkstemp's 0600 would keep colleagues out
+        mask = os.umask(0)  # there is no other way to read it
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)  # mkstemp's 0600 would keep colleagues out
         check_new(target, overwrite=overwrite)
         os.replace(temporary, target)
     except OSError as error:
@@ -110,7 +112,9 @@ def new_folder(path: str | os.PathLike[str]) -> Path:
         raise UsageError(f"{folder}: is a file, not a folder; choose another `folder`")
     if folder.is_dir():
         _remove_strays(folder)
-    if folder.is_dir() and any(folder.iterdir()) and not _is_ours(folder):
+    marker = folder / MARKER
+    ours = marker.is_file() and _MARK in marker.read_text(encoding="utf-8", errors="replace")
+    if folder.is_dir() and any(folder.iterdir()) and not ours:
         raise UsageError(
             f"{folder}: holds files that pellicle did not write; choose an empty or new `folder`"
         )
@@ -160,14 +164,3 @@ def _has_ended(process: int) -> bool:
 def _machine() -> str:
     """Eight digits that stand for this machine's name: a folder may be shared over a network."""
     return f"{zlib.crc32(platform.node().encode()):08x}"
-
-
-def _is_ours(folder: Path) -> bool:
-    marker = folder / MARKER
-    return marker.is_file() and _MARK in marker.read_text(encoding="utf-8", errors="replace")
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -71,7 +71,14 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
         if recipe is not None:
             raise UsageError("--recipe goes with the result.json of a fit; give the recipe alone")
         return read_recipe(film).scene()
-    record = _record(film)
+    try:
+        record = loads(Path(film).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DataError(f"{film}: cannot be read ({error.strerror}); check its path") from None
+    except ValueError:
+        raise DataError(f"{film}: is not JSON; give the result.json of a fit") from None
+    if not isinstance(record, dict) or not record.get("parameters"):
+        raise DataError(f"{film}: has no fitted parameters; give the result.json of one fit")
     from pellicle.rendering.export import with_values
 
     values = {name: each["value"] for name, each in record["parameters"].items()}
@@ -81,19 +88,6 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
         raise
     except DataError as error:
         raise DataError(f"{film}: {error}; give its recipe as --recipe") from None
-
-
-def _record(path: str) -> dict[str, Any]:
-    """The JSON record of a fit. Raises DataError."""
-    try:
-        record = loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); check its path") from None
-    except ValueError:
-        raise DataError(f"{path}: is not JSON; give the result.json of a fit") from None
-    if not isinstance(record, dict) or not record.get("parameters"):
-        raise DataError(f"{path}: has no fitted parameters; give the result.json of one fit")
-    return record
 
 
 def _scene_of(path: str, source: dict[str, Any] | None, recipe: str | None) -> Scene | Surface:

@@ -82,16 +82,12 @@ def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Sp
         raise UsageError("--reference needs a known angle of incidence: give one number")
     table: dict[str, Any] = {"columns": options.columns, "wavelength_unit": options.wavelength_unit}
     sample = read_counts(path, range=options.range, **table)
-    if options.reference is not None:
-        reference = read_counts(options.reference, **table)
-    else:
-        reference = read_counts_beside(path, "reference counts", **table)
+    reference, dark = (
+        read_counts_beside(path, f"{name} counts", **table) if file is None else read_counts(file, **table)
+        for name, file in (("reference", options.reference), ("dark", options.dark))
+    )
     if reference is None:
         raise UsageError(f"{path}: has no column of reference counts; give their file with --reference")
-    if options.dark is not None:
-        dark = read_counts(options.dark, **table)
-    else:
-        dark = read_counts_beside(path, "dark counts", **table)
     known = _reference_reflectance(sample, options, stack)
     return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise))
 

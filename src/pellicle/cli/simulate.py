@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,15 +45,6 @@ class SimulationFlags(Flags):
     tolerance: float = 0.0
     """Leave out effects that change the signal by less than this (0: none)."""
 
-    def spread(self) -> float | str | None:
-        """The noise: a number from 0, or a share of the signal as text. Raises UsageError."""
-        from pellicle.signals.limits import noise_level
-
-        if self.noise is None or self.noise == 0:
-            return self.noise
-        level = noise_level(self.noise, "--noise")
-        return str(level) if level.relative else level.value
-
 
 def simulate(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
@@ -83,7 +75,7 @@ def simulate(
     described = read_recipe(recipe)
     _check_depolarisation(described, how.depolarisation_noise)
     if depth is not None:
-        _write_depth_profile(described, out, _wavelengths_of(depth), json)
+        _write_depth_profile(described, out, depth, json)
         return 0
     start()
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
@@ -104,10 +96,15 @@ def simulate(
 
 
 def _checked_spread(how: SimulationFlags, depth: str | None, json: bool) -> float | str | None:
-    """Return the noise that is given. Raises UsageError for flags that contradict each other."""
+    """The noise: a number from 0, or a share as text. Raises UsageError, also for flags that contradict."""
+    from pellicle.signals.limits import noise_level
+
     if json and depth is None:
         raise UsageError("--json is for --depth: spectra, colours and BRDF samples are written to --out")
-    spread = how.spread()
+    spread = how.noise
+    if spread:
+        level = noise_level(spread, "--noise")
+        spread = str(level) if level.relative else level.value
     not_negative("--tolerance", how.tolerance)
     if depth is not None and (spread or how.tolerance):
         raise UsageError("--depth is exact: leave out --noise and --tolerance")
@@ -127,18 +124,14 @@ def _check_depolarisation(described: FilmRecipe | SurfaceRecipe, noise: float | 
         raise UsageError("--depolarisation-noise is for a film with the signal psi-delta")
 
 
-def _wavelengths_of(text: str) -> list[float]:
-    """The wavelengths of --depth. Raises UsageError."""
+def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, depth: str, json: bool) -> None:
+    """Write the absorption and the field at the wavelengths that --depth lists."""
     try:
-        numbers = [float(word) for word in text.split(",")]
+        at = [float(word) for word in depth.split(",")]
     except ValueError:
-        numbers = [0.0]
-    if not all(0 < nm < float("inf") for nm in numbers):
-        raise UsageError(f"--depth {text}: expected wavelengths in nm, as in --depth 450,600")
-    return numbers
-
-
-def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, at: list[float], json: bool) -> None:
+        at = [0.0]
+    if not all(0 < nm < inf for nm in at):
+        raise UsageError(f"--depth {depth}: expected wavelengths in nm, as in --depth 450,600")
     from pellicle.recipes.read import SurfaceRecipe
 
     if isinstance(recipe, SurfaceRecipe) or recipe.tables.data.signal in SPACES:
@@ -235,27 +228,22 @@ def _csv(scene: Scene, result: SimulatedSignal, kind: Signal, noise: float, comm
     about = "" if light.ellipsometric else f", {light.polarisation}"
     stated = ", ".join(f"{angle:g}" for angle in np.unique(angles))
     lines = [*comments, f"signal {light.signal}, angle {stated} degrees{about}", _truth(scene)]
-    names, before = [], []
+    known = [("wavelength_nm", result.wavelength)]
     if light.ellipsometric or angles.ndim:
-        names.append("angle_deg")
-        before.append([f"{angle:.10g}" for angle in np.broadcast_to(angles, count)])
+        known.append(("angle_deg", np.broadcast_to(angles, count)))
     if light.azimuth is not None:
-        names.append("azimuth_deg")
-        before.append([f"{own:.10g}" for own in np.broadcast_to(light.azimuth, count).tolist()])
-    table = result.values.reshape(count, -1)
-    names += [quantity.header for quantity in kind.quantities]
+        known.append(("azimuth_deg", np.broadcast_to(light.azimuth, count)))
+    measured = [*zip([q.header for q in kind.quantities], result.values.reshape(count, -1).T, strict=True)]
+    errors = [("sigma", noise)]
     if result.depolarisation is not None:
-        table = np.column_stack([table, result.depolarisation])
-        names.append("depolarisation")
-    errors = [("sigma", noise)] if noise else []
-    if result.depolarisation is not None and result.depolarisation_noise:
+        measured.append(("depolarisation", result.depolarisation))
         errors.append(("sigma_depolarisation", result.depolarisation_noise))
-    columns = ",".join(["wavelength_nm", *names, *(name for name, _ in errors)])
-    rows = [
-        ",".join([f"{nm:.10g}", *own, *(f"{value:.8f}" for value in row), *(f"{x:g}" for _, x in errors)])
-        for nm, row, *own in zip(result.wavelength, table, *before, strict=True)
-    ]
-    return "\n".join([*(f"# {line}" for line in lines), columns, *rows, ""])
+    columns = [(name, [f"{x:.10g}" for x in values.tolist()]) for name, values in known]
+    columns += [(name, [f"{x:.8f}" for x in values.tolist()]) for name, values in measured]
+    columns += [(name, [f"{error:g}"] * count) for name, error in errors if error]
+    header = ",".join(name for name, _ in columns)
+    rows = map(",".join, zip(*(texts for _, texts in columns), strict=True))
+    return "\n".join([*(f"# {line}" for line in lines), header, *rows, ""])
 
 
 def _write_samples(

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Self, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 from pellicle.errors import UsageError
 
@@ -18,6 +18,9 @@ SPECTRA, COLOURS, BRDF = "spectra", "colours", "BRDF samples"
 SPACES = ("srgb", "rgb", "xyz", "lab")
 SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
+
+
+Record = TypeVar("Record", bound="Options")
 
 
 def parse_number(text: str, name: str, expected: str = "a number") -> float:
@@ -152,7 +155,7 @@ class Options:
         return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
-    def of(cls, values: Mapping[str, Any]) -> Self:
+    def of(cls: type[Record], values: Mapping[str, Any]) -> Record:
         """The options among `values`, by name."""
         return cls(**{name: x for name, x in values.items() if name in cls.declared()})
 

@@ -35,18 +35,13 @@ def _defaults(session: Session, angles: list[float]) -> dict[str, float]:
     return {control["name"]: control["value"] for control in controls}
 
 
-def _packages() -> tuple[Any, Any]:
+@cache
+def _widget_class() -> Any:
     try:
         import anywidget
         import traitlets
     except ImportError:
         raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
-    return anywidget, traitlets
-
-
-@cache
-def _widget_class() -> Any:
-    anywidget, traitlets = _packages()
 
     class Explorer(anywidget.AnyWidget):
         """Sliders of a film beside its spectrum, colour and plan, in a cell of a notebook.

@@ -108,20 +108,13 @@ def _array(values: np.ndarray) -> str:
 
 
 def _medium(medium: Material | Constant) -> str:
-    """A name, a path or a number, which a layer takes for a medium."""
-    return repr(_name(medium)) if isinstance(medium, Material) else _constant(medium)
-
-
-def _name(material: Material) -> str:
-    """The catalogue name, or the path of the file."""
-    try:
-        known: Any = find(material.name)
-    except UnknownMaterial:
-        return material.page
-    return material.name if known.page == material.page else material.page
-
-
-def _constant(medium: Constant) -> str:
+    """The catalogue name or the path of a file, or a number, which a layer takes for a medium."""
+    if isinstance(medium, Material):
+        try:
+            known: Any = find(medium.name)
+        except UnknownMaterial:
+            return repr(medium.page)
+        return repr(medium.name if known.page == medium.page else medium.page)
     if isinstance(medium.n, Free) or isinstance(medium.k, Free):
         both = [medium.n] if medium.k is None else [medium.n, medium.k]
         return _call("pl.dispersion.Constant", both, {})

@@ -86,11 +86,6 @@ def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
         raise UsageError(_first_error(error, _tables_by_key(table))) from None
 
 
-def _is_branch(part: str) -> bool:
-    """True for the name of the branch of a union that was tried, a part of the location of its errors."""
-    return part[:1].isupper() or part in ("str", "float") or part.startswith(("list[", "constrained-"))
-
-
 def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
     """One sentence: an unknown key or an infinity goes before the errors of each branch of a union."""
     errors = error.errors(include_url=False)
@@ -99,7 +94,11 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     if isinstance(chosen["input"], list):  # a number was expected, or a list, whose errors tell more
         of_lists = (e for e in errors if any(str(part).startswith("list[") for part in e["loc"]))
         chosen = next(of_lists, chosen)
-    where = [str(part) for part in chosen["loc"] if not _is_branch(str(part))]
+    where = [  # without the branches of unions that were tried
+        part
+        for part in map(str, chosen["loc"])
+        if not (part[:1].isupper() or part in ("str", "float") or part.startswith(("list[", "constrained-")))
+    ]
     if chosen["type"] == "extra_forbidden" and where[-1:] != [str(chosen["loc"][-1])]:
         where.append(str(chosen["loc"][-1]))  # a key of the user, as `Data`, is no branch
     key = ".".join(where)
@@ -202,7 +201,7 @@ class FilmRecipe:
             raise DataError(f"{self.path}: camera: {error}".replace("`", "")) from None
 
     def scene(self, fitted: bool = False) -> Scene:
-        """Build the scene. Raises DataError, the recipe's path in front; if `fitted`, where nothing is free."""
+        """Build the scene. Raises DataError, the path in front; if `fitted`, where nothing is free."""
         try:
             scene = _scene(self.tables, Path(self.path).parent)
         except ValueError as error:
@@ -213,13 +212,6 @@ class FilmRecipe:
         return _with_free(scene, len(free_leaves(scene)), fitted, self.path)
 
 
-def light_signal(signal: str | None, transmitted: bool | None) -> str:
-    """Return the signal of the light: "R" or "T" where colours are measured."""
-    if signal in SPACES:
-        return "T" if transmitted else "R"
-    return signal or "R"
-
-
 def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
     """Light by the options `signal`, `angle`, `polarisation` and `transmission` of reading.
 
@@ -227,7 +219,9 @@ def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
     """
     several = isinstance(given.angle, list)
     angle = np.array(given.angle) if several else parts.optional(given.angle, "angle") or 0.0
-    signal, through = light_signal(given.signal, transmitted), bool(given.transmission and given.signal)
+    of_colours = "T" if transmitted else "R"
+    signal = of_colours if given.signal in SPACES else given.signal or "R"
+    through = bool(given.transmission and given.signal)
     return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
 
 

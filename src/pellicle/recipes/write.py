@@ -180,28 +180,32 @@ def _sensor(scene: Surface, folder: Path) -> dict[str, str]:
 
 def _check_film(scene: Scene, again: Scene) -> None:
     """Raise UsageError for the first part of a scene that the recipe does not give back."""
-    parts = [
-        (f"layer {i + 1}", x, y) for i, (x, y) in enumerate(zip(scene.layers, again.layers, strict=True))
-    ]
-    names = ("substrate", "ambient", "light", "instrument", "uncertainty", "reference")
-    parts += [(name, getattr(scene, name), getattr(again, name)) for name in names]
-    for name, one, other in parts:
-        if one != other if name == "uncertainty" else not same(one, other):
-            raise UsageError(f"a recipe cannot express the {name} of this scene")
+    layers = [(f"layer {i}", *pair) for i, pair in enumerate(zip(scene.layers, again.layers, strict=True), 1)]
+    names = ("substrate", "ambient", "light", "instrument", "reference")
+    _check(
+        [*layers, *((name, getattr(scene, name), getattr(again, name)) for name in names)],
+        "the {} of this scene",
+    )
+    if scene.uncertainty != again.uncertainty:
+        raise UsageError("a recipe cannot express the uncertainty of this scene")
 
 
 def _check_surface(scene: Surface, again: Surface) -> None:
     """Raise UsageError for the first part of a surface that the recipe does not give back."""
-    pairs: list[tuple[str, Any, Any]] = [
-        (key, scene.numbers[key], again.numbers[key]) for key in scene.numbers
-    ]
-    for part in ("film", "base"):
-        media = [None if x is None else medium_of(x) for x in (getattr(scene, part), getattr(again, part))]
-        pairs.append((part, media[0], media[1]))
+
+    def medium(part: Any) -> Any:
+        return None if part is None else medium_of(part)
+
+    pairs = [(key, scene.numbers[key], again.numbers[key]) for key in scene.numbers]
+    pairs += [(part, medium(getattr(scene, part)), medium(getattr(again, part))) for part in ("film", "base")]
     pairs += [(name, getattr(scene, name), getattr(again, name)) for name in ("wavelengths", "sensor")]
-    for name, one, other in pairs:
+    _check(pairs, "{} of this surface")
+
+
+def _check(parts: Iterable[tuple[str, Any, Any]], words: str) -> None:
+    for name, one, other in parts:
         if not same(one, other):
-            raise UsageError(f"a recipe cannot express {name} of this surface")
+            raise UsageError(f"a recipe cannot express {words.format(name)}")
 
 
 def _document(tables: Mapping[str, Mapping[str, Any] | Sequence[Mapping[str, Any]]]) -> str:
