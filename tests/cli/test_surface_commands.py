@@ -45,25 +45,16 @@ def test_the_command_writes_what_the_surface_sends_back(pellicle, tmp_path):
     np.testing.assert_allclose(found.values, np.tile(by_hand(found)[:, None], 3), rtol=1e-9)
 
 
-def test_noise_seed_and_the_directions_of_a_file(pellicle, tmp_path):
+def test_noise_and_the_directions_of_a_file(pellicle, tmp_path):
     rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(80))
     (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
     more = '"brdf"\nfiles = ["seen.csv"]\nnoise = 0.02\n'
     (tmp_path / "bare.toml").write_text(RECIPE.replace('"brdf"\n', more))
-
-    def made(name, *flags):
-        assert pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / name, *flags).code == 0
-        return read_brdf_samples(tmp_path / name)
-
-    one, same, other = made("a.csv"), made("b.csv"), made("c.csv", "--seed", 1)
-    np.testing.assert_array_equal(one.values, same.values)
-    np.testing.assert_array_equal(one.theta_o, np.arange(80.0))
-    assert one.sigma is not None
-    assert np.all(one.sigma == 0.02)
-    truth = by_hand(one)[:, None]
-    for found in (one, other):
-        assert 0.017 < np.std(found.values - truth) < 0.023
-    assert np.std(one.values - other.values) > 0.02
+    pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / "a.csv", code=0)
+    made = read_brdf_samples(tmp_path / "a.csv")
+    np.testing.assert_array_equal(made.theta_o, np.arange(80.0))
+    assert np.all(made.sigma == 0.02)
+    assert 0.017 < np.std(made.values - by_hand(made)[:, None]) < 0.023
 
 
 PAINT = """

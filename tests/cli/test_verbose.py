@@ -2,10 +2,6 @@
 
 import re
 
-import jax
-
-from pellicle.cli.messages import log_to_stderr
-
 
 def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
     ran = pellicle("fit", spectrum_file(), *scene, "--verbose")
@@ -23,15 +19,6 @@ def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
     quiet = pellicle("fit", spectrum_file("again.csv"), *scene)
     assert quiet.code == ran.code == 0
     assert not re.search(r"^ *\d+\.\d\d s", quiet.err, re.MULTILINE)
-
-
-def test_where_the_time_went(capsys):
-    with log_to_stderr():
-        jax.jit(lambda x: x + 11.5)(1.0)
-    said = capsys.readouterr().err
-    whole, making, programs = re.search(r"time: (\S+) s, (\S+) s of them .* (\d+) programs", said).groups()
-    assert 0 < float(making) <= float(whole)
-    assert int(programs) == 1
 
 
 def test_why_a_fit_is_no_answer(pellicle, spectrum_file):

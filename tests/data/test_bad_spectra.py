@@ -153,11 +153,6 @@ def test_negative_beyond_noise(write, header, row, refused):
     refused(path, DataError, "line 3, column 'R", "below zero by more than noise", "`range`")
 
 
-def test_names_that_differ_by_case_are_different_quantities(write):
-    spectrum = read_spectrum(write("wavelength,x,y,Y,R\n400,0.1,0.2,0.3,0.4\n500,0.1,0.2,0.3,0.5\n"))
-    assert spectrum.values.tolist() == [0.4, 0.5]
-
-
 @pytest.mark.parametrize(
     ("flag", "value", "expected"),
     [

@@ -40,18 +40,6 @@ def test_a_contradiction(write, refused, text, flags, parts):
     refused(write(text), DataError, *parts, **flags)
 
 
-@pytest.mark.parametrize(
-    ("flags", "parts"),
-    [
-        ({"wavelength_unit": "nm"}, ("in cm-1", '`wavelength_unit="nm"`')),
-        ({"signal_unit": "percent"}, ("in absorbance", '`signal_unit="percent"`')),
-        ({"signal": "R"}, ("T = 10^-A", '`signal="R"`', '`columns="wavelength,log(1/R)"`')),
-    ],
-)
-def test_a_flag_against_a_declaration(write, refused, flags, parts):
-    refused(write("XUNITS=1/CM\nYUNITS=ABSORBANCE\n25000,1\n20000,0.5\n"), UsageError, *parts, **flags)
-
-
 def test_log_of_the_inverse_reflectance(write):
     path = write("XUNITS=1/CM\nYUNITS=ABSORBANCE\n25000,1\n20000,0.5\n")
     spectrum = read_spectrum(path, columns="wavelength,log(1/R)", wavelength_unit="cm-1")

@@ -77,16 +77,6 @@ def test_a_spectrum(angle):
     assert pl.Spectrum(NM, np.full(NM.size, 0.3), "R").folded is False
 
 
-def test_a_file(write):
-    delta = 180 - np.abs(NM - 601) / 3
-    path = write("wl,psi,delta\n" + "".join(f"{nm},30,{d:.6f}\n" for nm, d in zip(NM, delta, strict=True)))
-    taken, stated, left = (read_spectrum(path, folded=folded) for folded in (None, True, False))
-    assert (taken.folded, stated.folded, left.folded) == (True, True, False)
-    np.testing.assert_array_equal(taken.delta, stated.delta)
-    assert any("taken as folded" in note for note in taken.notes)
-    assert not any("folded" in note for note in left.notes)
-
-
 def test_only_in_the_kept_range(write):
     """The kink is seen outside of it, as in a file that was cut."""
     delta = 180 - np.abs(NM - 601) / 3

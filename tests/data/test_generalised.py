@@ -8,7 +8,6 @@ from pellicle.data.repeated_sweeps import mean_spectrum, repeatability
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.generalised import RATIOS, delta_sigma
-from tests.data.tables import assert_read
 
 SIGNAL = "generalised-psi-delta"
 
@@ -22,13 +21,6 @@ COLUMNS = np.stack([PSI, DELTA], axis=2).reshape(6, 6).T
 @pytest.fixture
 def write(write_columns):
     return lambda header, *columns: write_columns(header, NM, *columns)
-
-
-def test_each_ratio_has_psi_and_delta(write):
-    spectrum = read_spectrum(write(f"wavelength_nm,{NAMES},angle", *COLUMNS, 65.0))
-    assert_read(spectrum, signal=SIGNAL, ratios=RATIOS)
-    assert_read(spectrum, rtol=1e-8, values=PSI, delta=DELTA % 360)
-    assert spectrum.sigma is spectrum.delta_sigma is None
 
 
 def test_a_file_may_have_some_of_them(write):

@@ -88,12 +88,6 @@ def test_repeated_sweeps_are_averaged(tmp_path):
     np.testing.assert_allclose(spectrum.values[:, 0], M12, atol=1e-12)
 
 
-def test_points_are_sorted_with_their_elements():
-    spectrum = Spectrum(NM[::-1], np.stack([M12, M33], axis=1), "mueller", elements=("m12", "m33"))
-    np.testing.assert_array_equal(spectrum.values, np.stack([M12, M33], axis=1)[::-1])
-    assert len(spectrum.cut(450, 850)) == 5
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -9,7 +9,6 @@ import pellicle as pl
 from pellicle.data.read_counts import read_counts, reflectance_from_counts
 from pellicle.data.repeated_sweeps import mean_spectrum, repeatability, sweep_numbers
 from pellicle.errors import DataError, UsageError
-from pellicle.signals.sphere import ncs
 from tests.data.tables import rows
 
 NM = np.arange(400.0, 500.0, 10.0)
@@ -68,24 +67,6 @@ def test_copies_are_left_out(write):
     found = pl.read_spectrum(path)
     np.testing.assert_allclose(found.values, SWEEPS[:2].mean(axis=0), atol=1e-9)
     assert len(found.sweeps) == 2
-
-
-def test_several_angles_at_one_wavelength(tmp_path):
-    """As imaging ellipsometers measure: Δ around 0 is averaged across 360 degrees."""
-    path = tmp_path / "brush.csv"
-    angle = np.arange(50.0, 70.0, 4.0)
-    nm = np.full(5, 658.0)
-    sweeps = [rows(nm, angle, angle / 2 + s, (359.0 + 2 * s) % 360 + 0 * nm) for s in (0, 1)]
-    path.write_text("wavelength_nm,angle_deg,psi_deg,delta_deg\n" + "".join(sweeps))
-    found = pl.read_spectrum(path)
-    assert found.delta is not None
-    np.testing.assert_array_equal(found.angle, angle)
-    # the direction of the mean vector, by its definition
-    vectors = np.mean([sweep.kind.coordinates(sweep) for sweep in found.sweeps], axis=0)
-    expected = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    np.testing.assert_allclose(ncs(found.values, found.delta), expected, atol=1e-12)
-    np.testing.assert_allclose(found.values, angle / 2 + 0.5, atol=0.01)
-    assert np.all(np.minimum(found.delta, 360 - found.delta) < 0.2)
 
 
 def test_repeatability_of_psi_and_delta_is_that_of_psi():

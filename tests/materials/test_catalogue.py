@@ -192,12 +192,6 @@ def test_precision_does_not_depend_on_how_a_wavelength_is_written():
         assert (gold.index(nm).re == exact).all()
 
 
-def test_a_material_passes_through_jit_as_an_argument():
-    program = jax.jit(lambda material, nm: material(nm))
-    for name in ("Au", "SiO2"):
-        assert program(material(name), 600.0) == material(name)(600.0)
-
-
 @pytest.mark.parametrize(
     ("name", "nearest"),
     [("SiO3", "SiO2"), ("hemattite", "hematite"), ("gould", "gold"), ("fused_silca", "fused-silica")],

@@ -1,6 +1,7 @@
 """The range check, and finding materials inside larger things."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,39 +20,23 @@ def test_inside_the_range_nothing_happens():
 
 
 @pytest.mark.parametrize(
-    ("name", "nm", "sentence"),
+    ("name", "nm", "where", "remedy"),
     [
-        (
-            "Si/Aspnes",
-            [900, 300, 850],
-            "Si/Aspnes (main/Si/Aspnes) is known from 206.6 to 826.6 nm, not at 850 to 900 nm: "
-            "cut the data with `range=(300, 826.6)` or use a page that covers them all "
-            "(Si/Franta-25C, Si/Green-2008, Si/Schinke)",
-        ),
+        ("Si/Aspnes", [900, 300, 850], "206.6 to 826.6 nm, not at 850 to 900 nm", "range=(300, 826.6)"),
+        ("Si", [200, 500], "250 to 1450 nm, not at 200 nm", "range=(250, 500)"),
+        ("Si", [300, 2000], "250 to 1450 nm, not at 2000 nm", "range=(300, 1450)"),
         (
             "Si",
             [200, 500],
-            "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 200 nm: cut the data with "
-            "`range=(250, 500)` or use a page that covers them all (Si/Franta-25C)",
+            "250 to 1450 nm, not at 200 nm",
+            "use a page that covers them all (Si/Franta-25C)",
         ),
-        (
-            "Si",
-            [300, 2000],
-            "Si (main/Si/Green-2008) is known from 250 to 1450 nm, not at 2000 nm: cut the data with "
-            "`range=(300, 1450)` or use a page that covers them all (Si/Franta-25C)",
-        ),
-        (
-            "Au",
-            [50],
-            "Au (main/Au/Johnson) is known from 187.9 to 1937 nm, not at 50 nm: use a file of n and k that "
-            "covers them all, or a model such as cauchy",
-        ),
+        ("Au", [50], "187.9 to 1937 nm, not at 50 nm", "use a file of n and k that covers them all, or"),
     ],
 )
-def test_outside_it_says_what_where_and_what_to_do(name, nm, sentence):
-    with pytest.raises(ValueError, match="is known from") as caught:
+def test_outside_it_says_what_where_and_what_to_do(name, nm, where, remedy):
+    with pytest.raises(ValueError, match=f"^{name} .* is known from {where}: .*{re.escape(remedy)}"):
         material(name).check_range(nm)
-    assert str(caught.value) == sentence
 
 
 def test_both_parts_are_nan_outside_whatever_the_dispersion():

@@ -76,6 +76,7 @@ def test_yaml():
     assert load_yaml("DATA:\n  - type: x\n") == page({"type": "x"})
 
 
+TITLE = "P. B. Johnson and R. W. Christy. Optical constants of the noble metals."
 REFERENCE = (
     'P. B. Johnson and R. W. Christy.\nOptical constants of the noble metals.\n<a href="https://doi.org/10.1/x">'
     "<i>Phys. Rev. B</i> <b>6</b>, 4370&ndash;4379 (1972)</a><br>\n"
@@ -86,11 +87,7 @@ REFERENCE = (
 @pytest.mark.parametrize(
     ("markup", "text"),
     [
-        (
-            REFERENCE,
-            "P. B. Johnson and R. W. Christy. Optical constants of the noble metals. "
-            "Phys. Rev. B 6, 4370–4379 (1972) https://doi.org/10.1/x",
-        ),
+        (REFERENCE, f"{TITLE} Phys. Rev. B 6, 4370–4379 (1972) https://doi.org/10.1/x"),
         ('<a href="https://a.b/c">data sheet</a>, 2017', "data sheet, 2017"),
         ("Orientation: <111>; H<sub>2</sub>O", "Orientation: <111>; H2O"),
         (None, ""),

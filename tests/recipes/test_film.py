@@ -143,36 +143,6 @@ def test_missing_keys(refused):
     refused(BASE.replace('material = "SiO2"\n', ""), "scene.layer.0: a layer has a material, or between")
 
 
-def test_what_a_real_sample_adds(scene):
-    found = scene(
-        """
-        [scene]
-        substrate = { material = "Si", roughness = 1.5 }
-        [[scene.layer]]
-        between = "linear"
-        steps = 10
-        thickness = { lower = 0, upper = 20 }
-        [[scene.layer]]
-        name = "oxide"
-        material = "SiO2"
-        thickness = 300
-        thickness_spread = { lower = 0, upper = 9 }
-        roughness = 2
-        [[scene.layer]]
-        material = 1.52
-        plate_mm = 2
-        [instrument]
-        numerical_aperture = 0.3
-        """
-    )
-    top, oxide, plate = found.layers
-    assert (top.mix, top.steps, top.thickness.upper) == ("linear", 10, 20)
-    assert (oxide.name, oxide.thickness_spread.upper, oxide.roughness) == ("oxide", 9, 2)
-    assert plate.plate_mm == 2
-    assert found.substrate.roughness == 1.5
-    assert found.instrument.numerical_aperture == 0.3
-
-
 @pytest.mark.parametrize(
     ("layer", "said"),
     [

@@ -71,38 +71,39 @@ def test_a_share_is_never_rounded_to_none_or_all(count, text):
     assert share(count, 10**6) == text
 
 
-def test_a_patch_has_its_size_and_its_middle():
-    found = blank()
-    found[10:20, 30:43] = True
-    assert where(found) == "in one patch of 130 pixels around x = 36, y = 14 pixels"
-    millimetres = {"x": ("x", np.arange(WIDTH) * 0.05, {"units": "mm"}), "y": ("y", np.arange(HEIGHT) * 0.05)}
-    millimetres["y"] += ({"units": "mm"},)
-    assert where(found, coords=millimetres) == "in one patch of 130 pixels around x = 1.80, y = 0.70 mm"
-    found[40:50, 60:70] = True
-    assert where(found) == (
-        "in 2 patches, of 130 pixels around x = 36, y = 14 pixels"
-        " and of 100 pixels around x = 64, y = 44 pixels"
-    )
+PATCH, FEW = np.s_[10:20, 30:43], ([40, 45, 50, 55, 59], [3, 60, 20, 70, 5])
 
 
-def test_a_scratch_has_its_ends():
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ([PATCH], "in one patch of 130 pixels around x = 36, y = 14 pixels"),
+        ([PATCH, np.s_[40:50, 60:70]], "in 2 patches, of 130 pixels around x = 36, y = 14 pixels and of 100"),
+        ([PATCH, FEW], "in one patch of 130"),  # 96 % of all
+        ([PATCH, FEW, np.s_[35:38, 70:74]], "mostly in one patch of 130"),  # 88 %
+        ([np.s_[range(10, 50), range(20, 60)]], "in one patch of 40 pixels at x = 20 to 59 pixels, y = 10"),
+        ([np.s_[12:15]], "in 3 rows, y = 12 to 14 pixels"),
+        ([np.s_[:3]], "along the top edge, y = 0 to 2 pixels"),
+        ([np.s_[:, [7, 30, 31]]], "in 3 columns, x = 7 pixels and x = 30 to 31 pixels"),
+        ([np.s_[:, [7, 30, 31]], np.s_[:, ::4]], "in 23 columns"),  # 20 and the 3 above
+        ([(3, 5), (40, 70)], "at x = 5, y = 3 pixels and at x = 70, y = 40 pixels"),
+    ],
+)
+def test_a_place_in_words(parts, text):
     found = blank()
-    found[np.arange(10, 50), np.arange(20, 60)] = True
-    assert where(found) == "in one patch of 40 pixels at x = 20 to 59 pixels, y = 10 to 49 pixels"
+    for part in parts:
+        found[part] = True
+    assert where(found).startswith(text)
 
 
-def test_rows_and_columns():
-    found = blank()
-    found[12:15] = True
-    assert where(found) == "in 3 rows, y = 12 to 14 pixels"
-    assert where(np.roll(found, -12, axis=0)) == "along the top edge, y = 0 to 2 pixels"
-    lengths = {"y": ("y", np.arange(HEIGHT) * 1.0, {"units": "mm"})}  # y increases upward: row 0 is below
-    assert where(np.roll(found, -12, axis=0), coords=lengths) == "along the bottom edge, y = 0 to 2 mm"
-    found = blank()
-    found[:, [7, 30, 31]] = True
-    assert where(found) == "in 3 columns, x = 7 pixels and x = 30 to 31 pixels"
-    found[:, ::4] = True
-    assert where(found) == "in 23 columns"  # 20 and the 3 above
+def test_places_in_millimetres():
+    """Lengths increase upward: row 0 is below."""
+    sizes = {"x": WIDTH, "y": HEIGHT}
+    lengths = {axis: (axis, np.arange(size) * 0.05, {"units": "mm"}) for axis, size in sizes.items()}
+    patch, rows = blank(), blank()
+    patch[PATCH] = rows[:3] = True
+    assert where(patch, coords=lengths) == "in one patch of 130 pixels around x = 1.80, y = 0.70 mm"
+    assert where(rows, coords=lengths).startswith("along the bottom edge, y = 0.0")
 
 
 @pytest.mark.parametrize("density", [0.01, 0.1, 0.3, 0.45])
@@ -127,12 +128,6 @@ def test_pixels_outside_a_mask_are_around_it():
         expected = f"all around x = {40 - radius} to {40 + radius} pixels, y = {30 - radius} to"
         assert where(np.hypot(y - 30, x - 40) > radius).startswith(expected)
     assert where((y < 2) | (y >= HEIGHT - 2) | (x < 2) | (x >= WIDTH - 2)) == "along the edge"
-
-
-def test_few_pixels_are_listed():
-    found = blank()
-    found[3, 5] = found[40, 70] = True
-    assert where(found) == "at x = 5, y = 3 pixels and at x = 70, y = 40 pixels"
 
 
 def test_frames_of_a_series():
@@ -249,15 +244,6 @@ def test_every_status_has_advice():
     text = cube_report(made(status))
     advice = text.split("[[Status: what to do]]\n")[1].split("[[")[0].splitlines()
     assert [line.split()[0] for line in advice if line[4] != " "] == list(STATUSES[1:])
-
-
-def test_a_place_of_most_pixels_says_so():
-    found = blank()
-    found[10:20, 30:43] = True  # 130
-    found[[40, 45, 50, 55, 59], [3, 60, 20, 70, 5]] = True
-    assert where(found).startswith("in one patch of 130")  # 96 %
-    found[35:38, 70:74] = True  # 12 more: 88 %
-    assert where(found).startswith("mostly in one patch of 130")
 
 
 def test_rates_of_a_series():

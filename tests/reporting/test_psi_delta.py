@@ -7,7 +7,6 @@ import numpy as np
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.fit_tables import fit_csv
-from pellicle.reporting.fit_text import report
 from pellicle.reporting.matplotlib_figure import save_figure
 from pellicle.reporting.page.figures import of_part
 
@@ -58,14 +57,6 @@ def test_one_wavelength_is_drawn_against_the_angle(angular, tmp_path):
     np.testing.assert_array_equal(drawn.axes[0].lines[1].get_xdata(), angular.spectrum.angle)
     save_figure(draw(angular), tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 20_000
-
-
-def test_the_report_says_degrees(spectroscopic, angular):
-    text = " ".join(report(spectroscopic).split())
-    assert "psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12" in text
-    assert "rms residual 0.123 degrees" in text
-    assert "of psi and of delta 0.1 and 2 degrees" in text
-    assert "11 points at 658 nm, from 50 to 70 degrees" in " ".join(report(angular).split())
 
 
 def test_the_table_is_read_again_as_it_is(spectroscopic, with_part, tmp_path):

@@ -34,10 +34,6 @@ def test_the_verdict_comes_first_with_status_advice_file_and_points(fit):
     assert "data    R, 41 points from 400 to 800 nm, worth 12 independent ones" in lines
 
 
-def test_independent_points_are_not_counted_twice(fit, with_part):
-    assert "independent" not in report(with_part(fit, effective_points=41.0))
-
-
 def test_every_status_has_one_sentence_of_advice():
     assert set(ADVICE) == set(Status)
     assert all(text.endswith(".") and len(text) < 90 for text in ADVICE.values())

@@ -83,12 +83,6 @@ def test_arguments_broadcast(function):
     assert float(found[2, 1, 3]) == pytest.approx(float(alone), rel=1e-13)
 
 
-@BOTH
-def test_an_integer_is_a_number_too(function):
-    found = function(550, 100, 2, 4, ambient=1, angle=30)
-    assert float(found) == pytest.approx(float(function(550.0, 100.0, 2.0, 4.0, angle=30.0)), rel=1e-13)
-
-
 @pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -7,7 +7,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.formats.rgl import load_rgl, read_rgl, write_tensors
-from pellicle.data.half_angles import angles, vectors
+from pellicle.data.half_angles import vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.write_rgl import TableSize, tabulate, write_rgl
@@ -289,16 +289,3 @@ def test_tables_of_a_brdf_are_near_it(tmp_path, alpha, diffuse, across, size, me
     assert np.quantile(missed, 0.95) < 10 * median
     theirs = measured(path, i[:, :50], o[:, :50], "scalar_rgb") / o[2, :50, None]
     assert np.median(np.abs(theirs - exact[:50]) / exact[:50].max(axis=1, keepdims=True)) < median
-
-
-def test_half_vectors_of_a_table_are_sorted_by_the_warp(tmp_path):
-    """Sampling and inversion undo each other, also between two angles of the light."""
-    from pellicle.data.formats.bilinear_warp import corners
-
-    brdf = load_rgl(write(tmp_path / "made.bsdf"))
-    u, v, theta = np.random.default_rng(2).uniform(0.01, 0.99, (3, 400))
-    around = corners((brdf.phi_i, brdf.theta_i), (np.zeros(400), theta * 1.5))
-    back = brdf.warp.invert(around, *brdf.warp.sample(around, u, v))
-    np.testing.assert_allclose(back, [u, v], atol=1e-9)
-    theta_m, _ = angles(vectors(theta, 0.3))
-    np.testing.assert_allclose(theta_m, theta, atol=1e-12)

@@ -249,13 +249,6 @@ def test_a_lone_unit_alone_makes_no_woollam_file(write):
     assert read_spectrum(write("nm\n400 0.1 0.01\n500 0.2 0.01\n"), signal="R").signal == "R"
 
 
-def test_repeated_sweeps_are_averaged(write):
-    rows = "".join(f"{w}\t65\t{20 + 0.01 * k}\t170\n" for k in range(2) for w in range(400, 420, 2))
-    spectrum = read_spectrum(write(HEADING + rows))
-    assert len(spectrum.sweeps) == 2
-    np.testing.assert_allclose(spectrum.values, 20.005)
-
-
 def test_refused(refused):
     refused(WVASE + "420\t65\t20\n", "looks like a Woollam file, but line 8 is not")
     refused(WVASE.replace("21.5", "91.5"), "line 6, column 'psi_deg': 91.5", "0 to 90")
