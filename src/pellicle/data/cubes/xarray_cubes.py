@@ -50,61 +50,11 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         n: v.attrs.get("units") for n, v in measured.items() if v.ndim > 1 or n.lower() != "wavelength"
     }
     chosen, stated = choose_variables(written, asked.variable, asked.signal, path)
-    main = measured[chosen["values"]]
-    dataset, lengths, notes = _without_single(dataset, main, roles)
-    dims = _pixel_dims(dataset, chosen["values"], lengths, roles, path)
-    renamed = {dim: role for dim, role in roles.items() if role is not None}
-    stored = {
-        str(name): Stored(variable.variable, tuple(renamed.get(str(d), str(d)) for d in variable.dims))
-        for name, variable in dataset.data_vars.items()
-    }
-    wavelength, unit = _band_axis(dataset, band, asked, path)
-    angle, polarisation = _light(dataset, main, roles, path)
-    coords, units, told = _coordinates(dataset, renamed, dims)
-    delta = f", {chosen['delta']!r}" if "delta" in chosen else ""
-    errors = [name for role, name in chosen.items() if role in ("sigma", "delta_sigma")]
-    stated["polarisation"] = stated.get("polarisation") or polarisation
-    return RawCube(
-        path,
-        {role: stored[name] for role, name in chosen.items()},
-        dims,
-        wavelength,
-        unit,
-        files=files,
-        angle=angle,
-        coords=coords,
-        units=units,
-        others={name: one for name, one in stored.items() if name not in chosen.values()},
-        notes=(
-            f"variable {chosen['values']!r} ({_listed(lengths)}){delta}",
-            *(f"standard deviations: {name!r}" for name in errors),
-            *notes,
-            *told,
-        ),
-        **stated,
-    )
-
-
-def _without_single(
-    dataset: Any, main: Any, roles: Mapping[str, str | None]
-) -> tuple[Any, dict[str, int], list[str]]:
-    """The dataset without axes of length one and of no role, the lengths of the others, and notes."""
-    lengths = {str(dim): int(n) for dim, n in main.sizes.items()}
-    single = [dim for dim, role in roles.items() if role is None and lengths.get(dim) == 1]
-    kept = {dim: n for dim, n in lengths.items() if dim not in single}
-    return (
-        dataset.isel(dict.fromkeys(single, 0)),
-        kept,
-        [f"axis {dim!r} of length one left out" for dim in single],
-    )
-
-
-def _pixel_dims(
-    dataset: Any, name: str, lengths: Mapping[str, int], roles: Mapping[str, str | None], path: str
-) -> tuple[str, ...]:
-    """Axes of pixels of a variable, in the order of the result. Raises DataError for an unknown axis."""
-    unknown = [dim for dim in lengths if roles[dim] is None]
-    if unknown:
+    name, main = chosen["values"], measured[chosen["values"]]
+    single = [str(dim) for dim, n in main.sizes.items() if roles[str(dim)] is None and n == 1]
+    dataset = dataset.isel(dict.fromkeys(single, 0))
+    lengths = {str(dim): int(n) for dim, n in main.sizes.items() if str(dim) not in single}
+    if unknown := [dim for dim in lengths if roles[dim] is None]:
         raise DataError(
             f"{path}: the axis {unknown[0]!r} of {name!r} ({_listed(lengths)}) is none of y, x, wavelength, "
             "angle, time and site: rename or select it in xarray"
@@ -112,25 +62,53 @@ def _pixel_dims(
     dims = tuple(axis for axis in _PIXELS if axis in {roles[dim] for dim in lengths})
     if not dims:
         raise _no_axis(dataset, "pixels (y and x, or site)", path)
-    return dims
+    renamed = {dim: role for dim, role in roles.items() if role is not None}
+    stored = {
+        str(name): Stored(variable.variable, tuple(renamed.get(str(d), str(d)) for d in variable.dims))
+        for name, variable in dataset.data_vars.items()
+    }
+    wavelength, unit = _band_axis(dataset, band, asked, path)
+    coords, units, dates = _coordinates(dataset, renamed, dims)
+    light = dataset.attrs | main.attrs
+    light = str(light.get("polarisation", light.get("polarization", ""))).lower().replace("zed", "sed")
+    stated["polarisation"] = stated.get("polarisation") or (light if light in POLARISATIONS else None)
+    delta = f", {chosen['delta']!r}" if "delta" in chosen else ""
+    return RawCube(
+        path,
+        {role: stored[name] for role, name in chosen.items()},
+        dims,
+        wavelength,
+        unit,
+        files=files,
+        angle=_angles(dataset, roles, path),
+        coords=coords,
+        units=units,
+        others={name: one for name, one in stored.items() if name not in chosen.values()},
+        notes=(
+            f"variable {name!r} ({_listed(lengths)}){delta}",
+            *(f"standard deviations: {chosen[role]!r}" for role in chosen if role.endswith("sigma")),
+            *(f"axis {dim!r} of length one left out" for dim in single),
+            *dates,
+        ),
+        **stated,
+    )
 
 
 def _without_signal_axis(dataset: Any) -> Any:
     """The dataset with one variable for each entry of an axis `signal`, whose coordinate names them."""
-    for dim in dataset.dims:
-        if str(dim).lower() in _SIGNALS and dim in dataset.coords:
-            names = [str(name) for name in dataset[dim].values]
-            parts = {}
-            for name, variable in dataset.data_vars.items():
-                if dim not in variable.dims:
-                    parts[name] = variable
-                    continue
-                many = sum(dim in v.dims for v in dataset.data_vars.values()) > 1
-                for i, entry in enumerate(names):
-                    one = variable.isel({dim: i}, drop=True)
-                    parts[f"{entry}_{name}" if many and name not in ("values", "R", "T") else entry] = one
-            return type(dataset)(parts, attrs=dataset.attrs)
-    return dataset
+    dim = next((d for d in dataset.dims if str(d).lower() in _SIGNALS and d in dataset.coords), None)
+    if dim is None:
+        return dataset
+    parts = {}
+    several = sum(dim in variable.dims for variable in dataset.data_vars.values()) > 1
+    for name, variable in dataset.data_vars.items():
+        if dim not in variable.dims:
+            parts[name] = variable
+            continue
+        for i, entry in enumerate(map(str, dataset[dim].values)):
+            prefixed = several and name not in ("values", "R", "T")
+            parts[f"{entry}_{name}" if prefixed else entry] = variable.isel({dim: i}, drop=True)
+    return type(dataset)(parts, attrs=dataset.attrs)
 
 
 def _roles(dataset: Any) -> dict[str, str | None]:
@@ -174,27 +152,19 @@ def _band_axis(dataset: Any, band: str, asked: Asked, path: str) -> tuple[np.nda
     )
 
 
-def _light(
-    dataset: Any, main: Any, roles: Mapping[str, str | None], path: str
-) -> tuple[np.ndarray | None, str | None]:
-    """Angles of incidence in degrees, along an axis or one for all, and the polarisation.
-
-    The polarisation is an attribute of the `main` variable or of the dataset.
-    """
+def _angles(dataset: Any, roles: Mapping[str, str | None], path: str) -> np.ndarray | None:
+    """Angles of incidence in degrees, along an axis or one for all. Raises DataError for an axis without."""
     angle = None
     for name, coordinate in dataset.coords.items():
         if recognise(str(name)).role == "angle" and coordinate.ndim <= 1 and coordinate.dtype.kind in "iuf":
             angle = np.atleast_1d(np.asarray(coordinate.values, dtype=float))
-            if _units(coordinate).lower().startswith("rad"):
-                angle = np.degrees(angle)
+            angle = np.degrees(angle) if _units(coordinate).lower().startswith("rad") else angle
     if angle is None and ANGLE in roles.values():
         dim = next(dim for dim, role in roles.items() if role == ANGLE)
         raise DataError(
             f"{path}: its axis {dim!r} has no angles as a coordinate: assign them in degrees in xarray"
         )
-    stated = dataset.attrs | main.attrs
-    stated = str(stated.get("polarisation", stated.get("polarization", ""))).lower().replace("zed", "sed")
-    return angle, stated if stated in POLARISATIONS else None
+    return angle
 
 
 def _coordinates(
@@ -232,15 +202,17 @@ def _no_axis(dataset: Any, wanted: str, path: str) -> DataError:
 
 def is_netcdf(path: Path) -> bool:
     """True for a NetCDF or HDF5 file, by its first bytes."""
-    with open_binary(path) as file:
-        head = file.read(8)
-    return head == SIGNATURE or head.startswith(_CLASSIC)
+    return is_classic(path) or _head(path) == SIGNATURE
 
 
 def is_classic(path: Path) -> bool:
     """True for NetCDF 3, which has its own format."""
+    return _head(path).startswith(_CLASSIC)
+
+
+def _head(path: Path) -> bytes:
     with open_binary(path) as file:
-        return file.read(3) == _CLASSIC
+        return file.read(len(SIGNATURE))
 
 
 def is_zarr(path: Path) -> bool:
@@ -256,24 +228,34 @@ def read_netcdf(path: Path, asked: Asked) -> RawCube:
 
 
 def read_zarr(path: Path, asked: Asked) -> RawCube:
-    """Read a zarr store: a group as xarray writes it, or one array. Raises DataError or UsageError."""
+    """Read a zarr store: a group as xarray writes it, or one array, whose axes may have names (zarr 3).
+
+    Raises DataError or UsageError.
+    """
 
     def group(xarray: Any) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # metadata that are not consolidated take longer to read
             return xarray.open_zarr(path, chunks=None, decode_timedelta=True)
 
-    if (path / ".zarray").exists() or _node_type(path / "zarr.json") == "array":
-        return _zarr_array(path, asked)
-    return xarray_to_raw(_opened(path, group), str(path), asked, (path,))
+    def alone(xarray: Any) -> Any:
+        import zarr
 
+        array = zarr.open_array(path, mode="r")
+        names = getattr(array.metadata, "dimension_names", None)
+        return xarray.DataArray(xarray.Variable(tuple(names), array)) if names and all(names) else array
 
-def _node_type(path: Path) -> str:
-    """Type of a store of zarr 3, array or group; its text may also contain the types of its arrays."""
-    try:
-        return str(json.loads(path.read_bytes())["node_type"]) if path.is_file() else ""
-    except (ValueError, KeyError, TypeError):
-        raise DataError(f"{path}: is damaged: it states no node_type; write the store again") from None
+    kind = "array" if (path / ".zarray").exists() else "group"
+    if (path / "zarr.json").is_file():
+        # its text may also contain the types of its arrays
+        try:
+            kind = json.loads((path / "zarr.json").read_bytes())["node_type"]
+        except (ValueError, KeyError, TypeError):
+            raise DataError(f"{path}: is damaged: it states no node_type; write the store again") from None
+    content = _opened(path, alone if kind == "array" else group)
+    if not is_xarray(content):
+        return arrays_to_raw({"": content}, str(path), asked, (path,))
+    return xarray_to_raw(content, str(path), asked, (path,))
 
 
 def _opened(path: Path, opening: Any) -> Any:
@@ -288,21 +270,3 @@ def _opened(path: Path, opening: Any) -> Any:
     except Exception as error:  # xarray and its engines raise errors of every kind on damaged files
         reason = " ".join(str(error).split())[:200].rstrip(".")
         raise DataError(f"{path}: cannot be opened as a cube ({reason}); write it again") from None
-
-
-def _zarr_array(path: Path, asked: Asked) -> RawCube:
-    """The only array of a store, whose axes may have names (zarr 3)."""
-
-    def opening(_: Any) -> Any:
-        import zarr
-
-        return zarr.open_array(path, mode="r")
-
-    array = _opened(path, opening)
-    names = getattr(array.metadata, "dimension_names", None)
-    if names and all(names):
-        import xarray
-
-        variable = _opened(path, lambda _: xarray.Variable(tuple(names), array))
-        return xarray_to_raw(xarray.DataArray(variable), str(path), asked, (path,))
-    return arrays_to_raw({"": array}, str(path), asked, (path,))
