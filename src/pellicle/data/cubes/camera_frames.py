@@ -64,28 +64,44 @@ def camera_frames(
         raise UsageError(
             f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
         )
-    bright, note = _frame(read_frame(white, raw), raw, "white")
+    bright, note = _frame(white, raw, "white")
     notes, black = [note], None
     if dark is None:
         notes.append("no dark frame: the counts without light are taken as zero")
     else:
-        black, note = _frame(read_frame(dark, raw), raw, "dark")
+        black, note = _frame(dark, raw, "dark")
         notes.append(note)
-    level, note = _saturation(raw, bright, saturation)
-    known = _white_reflectance(reflectance, nm, raw.path)
-    return CameraFrames(bright, black, known, level), [*notes, *([note] if note else [])]
+    kind = raw.arrays["values"].data.dtype
+    if saturation is not None:
+        notes.append(f"counts from {saturation:g} are saturated, as given")
+    elif kind.kind in "ui":  # the limit of another camera is not known
+        saturation = float(np.iinfo(kind).max)
+        largest = _largest(bright)
+        if largest < saturation and largest in (2.0**bits - 1 for bits in _DEPTHS):
+            saturation = largest
+        notes.append(f"counts from {saturation:g} are saturated")
+    return CameraFrames(bright, black, _white_reflectance(reflectance, nm, raw.path), saturation), notes
 
 
-def read_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
-    """Read a frame for a cube. Raises DataError, or UsageError of a reader.
+def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
+    """The content of a frame for a cube. Raises DataError, or UsageError of a reader.
 
     An array has the axes (bands), (x, bands) or (y, x, bands).
     """
-    if isinstance(frame, np.ndarray):
-        return _of_array(frame, "the frame", cube)
-    path = Path(frame)
-    if path.is_file() and is_numpy(path) and path.suffix.lower() != ".npz":
-        return _of_array(mapped_array(path), str(path), cube)
+    path = Path("the frame" if isinstance(frame, np.ndarray) else frame)
+    stored = path.is_file() and is_numpy(path) and path.suffix.lower() != ".npz"
+    if isinstance(frame, np.ndarray) or stored:
+        values: Any = frame if isinstance(frame, np.ndarray) else mapped_array(path)
+        rank, bands = len(values.shape), cube.wavelength.size
+        if rank not in _AXES:
+            raise DataError(
+                f"{path}: a frame has the axes bands, x and bands, or y, x and bands, not {rank} axes"
+            )
+        axes = _AXES[rank]
+        if rank == 3 and values.shape[0] == bands != values.shape[-1]:
+            axes = (WAVELENGTH, "y", "x")
+        dims = tuple(axis for axis in axes if axis != WAVELENGTH)
+        return RawCube(str(path), {"values": Stored(values, axes)}, dims, cube.wavelength)
     try:
         raw = read_raw(path, Asked())
     except UsageError:  # it has no wavelengths of its own, or several variables
@@ -99,21 +115,9 @@ def read_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> Raw
     return raw
 
 
-def _of_array(values: Any, path: str, cube: RawCube) -> RawCube:
-    rank = len(values.shape)
-    if rank not in _AXES:
-        raise DataError(
-            f"{path}: a frame has the axes bands, x and bands, or y, x and bands, not {rank} axes"
-        )
-    axes, bands = _AXES[rank], cube.wavelength.size
-    if rank == 3 and values.shape[0] == bands != values.shape[-1]:
-        axes = (WAVELENGTH, "y", "x")
-    dims = tuple(axis for axis in axes if axis != WAVELENGTH)
-    return RawCube(path, {"values": Stored(values, axes)}, dims, cube.wavelength)
-
-
-def _frame(raw: RawCube, cube: RawCube, name: str) -> tuple[Stored, str]:
+def _frame(given: Any, cube: RawCube, name: str) -> tuple[Stored, str]:
     """A frame for the pixels of a cube, and a note on its form. Raises DataError for another size."""
+    raw = _raw_frame(given, cube)
     frame, whole = raw.arrays["values"], cube.arrays["values"].sizes
     sizes, bands = frame.sizes, whole.pop(WAVELENGTH)
     if sizes[WAVELENGTH] != bands:
@@ -130,37 +134,19 @@ def _frame(raw: RawCube, cube: RawCube, name: str) -> tuple[Stored, str]:
         form = {0: "one spectrum", 1: "a line of pixels"}.get(len(long), "an image")
         return frame, f"{name} frame {raw.path}: {form}"
     if "x" in whole and sizes.get("x") == whole["x"]:
-        count = int(np.prod([sizes[axis] for axis in others]))
-        return _mean_line(frame, others, count), f"{name} frame {raw.path}: mean of {count} lines"
+        # the mean over all axes but x and wavelength, some lines at a time
+        count, first = int(np.prod([sizes[axis] for axis in others])), max(others, key=sizes.__getitem__)
+        summed = tuple(frame.axes.index(axis) for axis in others)
+        blocks = (slice(start, start + _BLOCK) for start in range(0, sizes[first], _BLOCK))
+        total = sum(frame.read({first: block}).astype(float).sum(axis=summed) for block in blocks)
+        line = Stored(np.asarray(total) / count, tuple(axis for axis in frame.axes if axis not in others))
+        return line, f"{name} frame {raw.path}: mean of {count} lines"
     shown = " x ".join(str(sizes[axis]) for axis in raw.dims)
     raise DataError(
         f"{raw.path}: the {name} frame has {shown} pixels and {cube.path} has "
         f"{' x '.join(map(str, cube.shape))}: it must be an image of the same size, a line of as many x, or "
         "one spectrum"
     )
-
-
-def _mean_line(frame: Stored, others: list[str], count: int) -> Stored:
-    """The mean over the `others`, all axes but x and wavelength, some lines at a time."""
-    first = max(others, key=lambda axis: frame.sizes[axis])
-    summed = tuple(frame.axes.index(axis) for axis in others)
-    blocks = (slice(start, start + _BLOCK) for start in range(0, frame.sizes[first], _BLOCK))
-    total = sum(frame.read({first: block}).astype(float).sum(axis=summed) for block in blocks)
-    return Stored(np.asarray(total) / count, tuple(axis for axis in frame.axes if axis not in others))
-
-
-def _saturation(raw: RawCube, white: Stored, given: float | None) -> tuple[float | None, str]:
-    """Counts from which a pixel is saturated, and a note; None for a camera whose limit is not known."""
-    if given is not None:
-        return given, f"counts from {given:g} are saturated, as given"
-    kind = raw.arrays["values"].data.dtype
-    if kind.kind not in "ui":
-        return None, ""
-    top = float(np.iinfo(kind).max)
-    largest = _largest(white)
-    if largest < top and largest in (2.0**bits - 1 for bits in _DEPTHS):
-        top = largest
-    return top, f"counts from {top:g} are saturated"
 
 
 def _largest(frame: Stored) -> float:

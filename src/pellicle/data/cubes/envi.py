@@ -62,13 +62,19 @@ def read_envi(path: Path, asked: Asked) -> RawCube:
         )
     scaled = "reflectance scale factor" in fields
     divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
-    notes = [
-        f"ENVI, {fields.get('interleave', 'bsq').lower()}, {mapped.dtype.name}, {Path(mapped.path).name}"
-    ]
+    form = fields.get("interleave", "bsq").lower()
+    notes = [f"ENVI, {form}, {mapped.dtype.name}, {Path(mapped.path).name}"]
     if "fwhm" in fields:
         notes.append(_width_note(_numbers(fields, "fwhm", header), unit))
     if divisor != 1.0:
         notes.append(f"values divided by {divisor:g}, the reflectance scale factor")
+    good = None
+    if "bbl" in fields:
+        good = _numbers(fields, "bbl", header) != 0
+        if good.size != bands:
+            raise DataError(
+                f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it"
+            )
     return RawCube(
         str(path),
         {"values": stored},
@@ -80,7 +86,7 @@ def read_envi(path: Path, asked: Asked) -> RawCube:
         signal_unit="fraction" if scaled else COUNTS if mapped.dtype.kind in "iu" else None,
         divisor=divisor,
         missing=_number(fields, "data ignore value", header, None),
-        good=_good_bands(fields, header, bands),
+        good=good,
         notes=tuple(notes),
     )
 
@@ -112,15 +118,6 @@ def _stored(fields: dict[str, str], header: Path, data: Path) -> Stored:
     return Stored(MappedFile(str(data), dtype, shape, offset), _AXES[interleave])
 
 
-def _good_bands(fields: dict[str, str], header: Path, bands: int) -> np.ndarray | None:
-    if "bbl" not in fields:
-        return None
-    good = _numbers(fields, "bbl", header) != 0
-    if good.size != bands:
-        raise DataError(f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it")
-    return good
-
-
 def _width_note(widths: np.ndarray, unit: str | None) -> str:
     width, shown = float(np.median(widths)), wavelength_unit(unit or "nm")
     if shown in ("um", "A"):
@@ -134,22 +131,18 @@ def _width_note(widths: np.ndarray, unit: str | None) -> str:
 def _fields(header: Path) -> dict[str, str]:
     """Fields of a header by name in lower case with single blanks, values without braces."""
     with open_binary(header) as file:
-        text = (
-            file.read(_MOST_HEADER).decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\r", "\n")
-        )
-    fields = {}
-    for name, value in _FIELD.findall(text):
-        plain = " ".join(name.lower().replace("_", " ").split())
-        fields[plain] = " ".join(value.strip("{} \t\n").split())
-    return fields
+        text = file.read(_MOST_HEADER).decode("utf-8-sig", "replace")
+    return {
+        " ".join(name.lower().replace("_", " ").split()): " ".join(value.strip("{} \t\n").split())
+        for name, value in _FIELD.findall(text.replace("\r\n", "\n").replace("\r", "\n"))
+    }
 
 
 def _data_file(header: Path) -> Path:
     """The file of numbers beside a header: `cube`, `cube.img` or the like beside `cube.hdr`."""
     stem = header.name[: -len(header.suffix)]
-    beside = {
-        file.name.lower(): file for file in header.parent.iterdir() if file.is_file() and file != header
-    }
+    files = (file for file in header.parent.iterdir() if file.is_file() and file != header)
+    beside = {file.name.lower(): file for file in files}
     for suffix in _SUFFIXES:
         if data := beside.get((stem + suffix).lower()):
             return data

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
+from pellicle.data.photographs import image_format
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.text import decoded, open_binary
@@ -21,6 +22,11 @@ _TABLES = ("*.csv", "*.txt", "*.tsv")
 _MOST_HEADER = 2**16
 _TOLERANCE = 1e-6
 """Relative difference of wavelengths that are taken as equal: rounding of exported numbers."""
+
+
+def is_table(path: Path) -> bool:
+    """True for a table of positions of spectra."""
+    return image_format(path) is None and table_of(path) is not None
 
 
 def table_of(path: Path) -> Path | None:
@@ -52,29 +58,28 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
         )
     if absent:
         notes.append(f"{len(absent)} sites without data, whose files do not exist: {_shortened(absent)}")
-    present = [names[i] for i in there]
+    files = [table.parent / names[i] for i in there]
     read = partial(read_spectrum, signal=asked.signal, spectrum=asked.variable, wavelength_unit=asked.unit)
-    spectra = [read(table.parent / name) for name in present]
+    spectra = [read(file) for file in files]
     first = spectra[0]
-    for name, one in zip(present, spectra, strict=True):
-        _compare(one, first, present[0], table.parent / name)
+    for file, one in zip(files, spectra, strict=True):
+        _compare(one, first, names[there[0]], file)
     arrays, angle = _arrays(spectra, table, np.array(there), len(names))
-    coords = {key: np.array(values) for key, values in where.items()}
     return RawCube(
         str(path),
         arrays,
         ("site",),
         np.unique(first.wavelength),
         "nm",
-        files=(table, *(table.parent / name for name in present)),
+        files=(table, *files),
         signal=first.signal,
         polarisation=first.polarisation,
         signal_unit=None if first.signal == "psi-delta" else "fraction",
         calibrated=first.calibrated,
         angle=angle,
-        coords={"file": np.array(names), **coords},
+        coords={"file": np.array(names), **{key: np.array(values) for key, values in where.items()}},
         units=units,
-        notes=(f"{len(present)} spectra at the positions of {table.name}", *notes, *first.notes),
+        notes=(f"{len(files)} spectra at the positions of {table.name}", *notes, *first.notes),
     )
 
 
@@ -84,18 +89,19 @@ def _no_table(path: Path) -> DataError:
     headers = [name for name in files if name.lower().endswith(".hdr")]
     images = [name for name in files if name.lower().endswith((".tif", ".tiff"))]
     if headers:
-        return DataError(f"{path}: is a folder of ENVI files: name one of them, {_shortened(headers)}")
-    if len(images) > 1:
-        return DataError(
-            f"{path}: is a folder of {len(images)} images: write them into one TIFF stack, a page for each "
-            "wavelength"
+        told = f"is a folder of ENVI files: name one of them, {_shortened(headers)}"
+    elif len(images) > 1:
+        told = (
+            f"is a folder of {len(images)} images: write them into one TIFF stack, a page for each wavelength"
         )
-    if not files:
-        return DataError(f"{path}: is an empty folder: name that of a zarr store or of spectra, or a file")
-    return DataError(
-        f"{path}: is a folder without a table of positions: name a file in it, or put a CSV with the columns "
-        "file, x and y beside spectra"
-    )
+    elif not files:
+        told = "is an empty folder: name that of a zarr store or of spectra, or a file"
+    else:
+        told = (
+            "is a folder without a table of positions: name a file in it, or put a CSV with the columns file,"
+            " x and y beside spectra"
+        )
+    return DataError(f"{path}: {told}")
 
 
 def _shortened(names: Sequence[str]) -> str:
@@ -177,9 +183,9 @@ def _arrays(
     angle = None if first.angle is None else np.unique(first.angle)
     axes: tuple[str, ...] = ("site", WAVELENGTH)
     shape: tuple[int, ...] = (len(first),)
-    if first.angle is not None and angle is not None and angle.size > 1:
+    if angle is not None and angle.size > 1:
         axes, shape = (*axes, ANGLE), (len(first) // angle.size, angle.size)
-        if not np.array_equal(first.angle, np.tile(angle, shape[0])):
+        if not np.array_equal(np.asarray(first.angle), np.tile(angle, shape[0])):
             raise DataError(f"{table}: its spectra have other wavelengths at each angle: export one grid")
     arrays = {}
     for name in ("values", "delta", "sigma", "delta_sigma"):

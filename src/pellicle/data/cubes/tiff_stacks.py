@@ -111,13 +111,11 @@ def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
 
 def _axes(shape: tuple[int, ...], letters: str, bands: int, path: str) -> tuple[tuple[str, ...], list[str]]:
     """Names of the axes: rows, columns and time as the file states them, that of the bands by its length."""
-    if not {"Y", "X"} <= set(letters) or (letters[0] in "QI" and len(shape) == 3 and bands != shape[0]):
+    rest = [n for n, letter in zip(shape, letters, strict=True) if letter not in _NAMES]
+    pages = letters[0] in "QI" and len(shape) == 3 and bands != shape[0]
+    if not {"Y", "X"} <= set(letters) or pages or rest != [bands]:
         return array_axes(shape, bands, path)
-    rest = [i for i, letter in enumerate(letters) if letter not in _NAMES]
-    if len(rest) == 1 and shape[rest[0]] == bands:
-        names = [_NAMES.get(letter, "wavelength") for letter in letters]
-        return tuple(names), []
-    return array_axes(shape, bands, path)
+    return tuple(_NAMES.get(letter, "wavelength") for letter in letters), []
 
 
 def _channel_wavelengths(file: Any) -> tuple[np.ndarray | None, str]:
