@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pellicle.data.tabular.columns import DIRECTIONS
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.files import write_text
 from pellicle.signals.limits import Where, noise_level, refuse_first
 
@@ -75,29 +75,22 @@ class BrdfSamples:
                 raise ValueError(f"`{name}`: expected the shape {shape}, got {np.shape(value)}")
             array = np.array(value, dtype=np.int64 if name == "lines" else np.float64)
             if name in ("theta_i", "theta_o"):
-                array = self._above_horizon(name, array)
+                remedy = "write theta from 0 to 90 degrees, the far side with phi + 180"
+                inside = (array >= -ROUNDING) & (array <= 90 + ROUNDING)
+                reason = f"degrees is below the horizon; {remedy}"
+                refuse_first(array, ~inside, self._place(name), reason)
+                array = np.clip(array, 0, 90)
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        self._check_values()
-
-    def _above_horizon(self, name: str, theta: np.ndarray) -> np.ndarray:
-        reason = "degrees is below the horizon; write theta from 0 to 90 degrees, the far side with phi + 180"
-        inside = (theta >= -ROUNDING) & (theta <= 90 + ROUNDING)
-        refuse_first(theta, ~inside, self._place(f"{name}"), reason)
-        return np.clip(theta, 0, 90)
-
-    def _check_values(self) -> None:
-        columns = {"phi_i": self.phi_i, "phi_o": self.phi_o}
-        columns |= dict(zip(self.channels, self.values.T, strict=True))
-        sigma = np.zeros((0, len(self))) if self.sigma is None else self.sigma.T
+        values = dict(zip(self.channels, self.values.T, strict=True))
+        sigma = () if self.sigma is None else self.sigma.T
         errors = {f"the standard deviation of {x}": y for x, y in zip(self.channels, sigma, strict=False)}
-        for name, values in (columns | errors).items():
-            refuse_first(values, ~np.isfinite(values), self._place(name), f"is not finite; {_REMEDY}")
-        for name in self.channels:
-            wrong = columns[name] < 0
-            refuse_first(columns[name], wrong, self._place(name), f"is a BRDF below zero; {_REMEDY}")
-        for name, values in errors.items():
-            refuse_first(values, values <= 0, self._place(name), f"is not above zero; {_REMEDY}")
+        for name, column in ({"phi_i": self.phi_i, "phi_o": self.phi_o} | values | errors).items():
+            refuse_first(column, ~np.isfinite(column), self._place(name), f"is not finite; {_REMEDY}")
+        for name, column in values.items():
+            refuse_first(column, column < 0, self._place(name), f"is a BRDF below zero; {_REMEDY}")
+        for name, column in errors.items():
+            refuse_first(column, column <= 0, self._place(name), f"is not above zero; {_REMEDY}")
 
     def _place(self, name: str) -> Where:
         path = f"{self.path}: " if self.path else ""
@@ -116,6 +109,16 @@ class BrdfSamples:
         if kept.size == len(self):
             return self
         note = f"{kept.size} of {len(self)} samples kept, spread over the file"
+        return dataclasses.replace(self.at(kept), notes=(*self.notes, note))
+
+    def within(self, max_theta: float) -> BrdfSamples:
+        """Leave out samples beyond an angle from the normal. Raises DataError where none is left."""
+        kept = np.flatnonzero(np.maximum(self.theta_i, self.theta_o) <= max_theta)
+        if not kept.size:
+            raise DataError(
+                f"{self.path}: has no sample within {max_theta:g} degrees of the normal; raise `max_theta`"
+            )
+        note = f"left out: {len(self) - kept.size} samples more than {max_theta:g} degrees from the normal"
         return dataclasses.replace(self.at(kept), notes=(*self.notes, note))
 
     def with_noise(self, noise: float | str | Sequence[float | str]) -> BrdfSamples:
@@ -176,17 +179,15 @@ def write_brdf_samples(
     `comments` are lines of the header. Raises UsageError where `path` exists without `overwrite`, or cannot
     be written.
     """
-    names = [*DIRECTIONS, *samples.channels]
-    names += [] if samples.sigma is None else sigma_names(samples.channels)
-    source = " ".join(samples.path.split()) or "samples"
+    sigma = [] if samples.sigma is None else [samples.sigma]
+    names = [*DIRECTIONS, *samples.channels, *(sigma_names(samples.channels) if sigma else ())]
     header = [
         "# BRDF in 1/sr; directions in degrees, from the normal and around it",
         *(f"# {line}" for line in comments),
-        f"# from {source}, sha256 {samples.sha256 or 'unknown'}",
+        f"# from {' '.join(samples.path.split()) or 'samples'}, sha256 {samples.sha256 or 'unknown'}",
         f"# written by pellicle {version('pellicle')}",
         ",".join(names),
     ]
-    sigma = [] if samples.sigma is None else [samples.sigma]
     columns = [*(getattr(samples, name) for name in DIRECTIONS), samples.values, *sigma]
     # each number with the digits that reproduce it exactly
     rows = (",".join(map(repr, row)) for row in np.column_stack(columns).tolist())

@@ -1,6 +1,5 @@
 """Reading of BRDF samples: CSV, ALTA text, MERL and RGL binary files."""
 
-import dataclasses
 import os
 from collections.abc import Sequence
 
@@ -63,19 +62,8 @@ def read_brdf_samples(
     header = alta.find_header(file.comments, file.path)
     table = alta.table_of(file, header) if header else find_layout(file)
     every = alta.from_table(table, header) if header else _from_csv(table, columns)
-    every = every if max_theta is None else _within(every, max_theta)
+    every = every if max_theta is None else every.within(max_theta)
     return every if samples is None else every.thinned(samples)
-
-
-def _within(samples: BrdfSamples, max_theta: float) -> BrdfSamples:
-    """Leave out samples beyond an angle from the normal. Raises DataError where none is left."""
-    kept = np.flatnonzero(np.maximum(samples.theta_i, samples.theta_o) <= max_theta)
-    if not kept.size:
-        raise DataError(
-            f"{samples.path}: has no sample within {max_theta:g} degrees of the normal; raise `max_theta`"
-        )
-    note = f"left out: {len(samples) - kept.size} samples more than {max_theta:g} degrees from the normal"
-    return dataclasses.replace(samples.at(kept), notes=(*samples.notes, note))
 
 
 def _from_csv(table: Table, requested: str | Sequence[str] | None) -> BrdfSamples:
@@ -83,11 +71,26 @@ def _from_csv(table: Table, requested: str | Sequence[str] | None) -> BrdfSample
     if columns is None:
         raise UsageError(f"{table.path}: has no header, so name its columns, as in {_EXAMPLE}")
     directions = _required(table, columns, DIRECTIONS)
-    channels = _channels(table, columns)
+    single, triple = CHANNELS
+    roles = {column.role for column in columns}
+    # value where the file has neither, for the message
+    channels = single if roles.isdisjoint(triple) else triple
+    if channels == triple and "value" in roles:
+        raise UsageError(
+            f"{table.path}: has value as well as R, G, B; choose with `columns`, _ for the others"
+        )
     values = _required(table, columns, channels)
-    errors = _errors(table, columns, channels)
+    # a standard deviation for each channel, or one for all
+    each = [name for name in sigma_names(channels) if only(table, columns, name)]
+    one = only(table, columns, "sigma")
+    errors = _required(table, columns, sigma_names(channels)) if each else [one] if one else []
     read = [*directions, *values, *errors]
-    _check_units(table, directions, [*values, *errors])
+    for column in read:
+        unit = "percent" if column.unit == "percent" else column.unknown_unit
+        wanted = "directions in degrees" if column in directions else "the BRDF in 1/sr"
+        if unit and (column in directions or not brdf_unit(unit)):
+            label = table.label(column.position)
+            raise DataError(f"{table.path}: {label} is in {unit!r}; write {wanted}")
     numbers = table.numbers([column.position for column in read])
     start, end = len(directions), len(directions) + len(values)
     if not any(column.unit for column in directions):
@@ -124,45 +127,8 @@ def _required(table: Table, columns: Sequence[Column], roles: Sequence[str]) -> 
     return [column for column in matching.values() if column is not None]
 
 
-def _channels(table: Table, columns: Sequence[Column]) -> tuple[str, ...]:
-    """R, G, B or value, whichever the file has; value where it has neither, for the message."""
-    single, triple = CHANNELS
-    roles = {column.role for column in columns}
-    if roles.isdisjoint(triple):
-        return single
-    if "value" in roles:
-        raise UsageError(
-            f"{table.path}: has value as well as R, G, B; choose with `columns`, _ for the others"
-        )
-    return triple
-
-
-def _errors(table: Table, columns: Sequence[Column], channels: tuple[str, ...]) -> list[Column]:
-    """A standard deviation for each channel, or one for all; none if the file has none."""
-    each = [name for name in sigma_names(channels) if only(table, columns, name)]
-    if each:
-        return _required(table, columns, sigma_names(channels))
-    one = only(table, columns, "sigma")
-    return [one] if one else []
-
-
-def _check_units(table: Table, directions: Sequence[Column], others: Sequence[Column]) -> None:
-    for column in directions:
-        if column.unknown_unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; "
-                "write directions in degrees"
-            )
-    for column in others:
-        unit = "percent" if column.unit == "percent" else column.unknown_unit
-        if unit and not brdf_unit(unit):
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {unit!r}; write the BRDF in 1/sr"
-            )
-
-
 def _refuse_radians(table: Table, angles: Sequence[np.ndarray]) -> None:
-    theta, phi = (max(np.abs(values).max() for values in angles[at::2]) for at in (0, 1))
+    theta, phi = (max(np.abs(values).max() for values in angles[first::2]) for first in (0, 1))
     if 0 < theta <= np.pi / 2 + ROUNDING and phi <= 2 * np.pi + ROUNDING:
         raise DataError(
             f"{table.path}: theta is at most {theta:g} and phi {phi:g}, which look like radians; write "

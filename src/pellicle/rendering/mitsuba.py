@@ -20,8 +20,9 @@ from jinja2 import Template
 from pellicle.brdf.lobes import microfacets
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.data.formats.rgl import write_tensors
 from pellicle.data.half_angles import angles, vectors
-from pellicle.data.write_rgl import ISOTROPIC, Brdf, TableSize, tabulate, write_rgl
+from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
 from pellicle.rendering.appearance import Appearance
@@ -67,7 +68,7 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
             raise UsageError(f"{file}: exists and is not overwritten; choose another `path` or remove it")
     if "rgb" in chosen:
         for key, fields in zip(("rgb", "spectral"), film_tables(look, alpha), strict=True):
-            write_rgl(chosen[key], fields)
+            write_tensors(chosen[key], fields)
     if "lookup" in chosen:
         arrays: dict[str, Any] = dict(lookup(look).arrays())
         with replacing(chosen["lookup"]) as temporary:
@@ -193,7 +194,7 @@ def write_surface(path: str | os.PathLike[str], surface: Surface, *, overwrite: 
         return simulate_samples(surface, Directions(*ends)).samples.values
 
     size = ISOTROPIC if _isotropic(brdf) else ANISOTROPIC
-    write_rgl(path, tabulate(brdf, size, description=f"surface {surface.model}"), overwrite=overwrite)
+    write_tensors(path, tabulate(brdf, size, description=f"surface {surface.model}"), overwrite=overwrite)
 
 
 def _isotropic(brdf: Brdf) -> bool:

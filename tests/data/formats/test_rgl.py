@@ -10,7 +10,7 @@ from pellicle.data.formats.rgl import load_rgl, read_rgl, write_tensors
 from pellicle.data.half_angles import vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.write_rgl import TableSize, tabulate, write_rgl
+from pellicle.data.rgl_tables import TableSize, tabulate
 from pellicle.errors import DataError
 
 THETA = [0.05, 0.4, 0.9, 1.4]
@@ -276,7 +276,7 @@ def lobe(alpha, count, seed=0):
 def test_tables_of_a_brdf_are_near_it(tmp_path, alpha, diffuse, across, size, median):
     """Exact at its nodes, near it between them, in Mitsuba too."""
     brdf, path = facets(alpha, diffuse, across), tmp_path / "made.bsdf"
-    write_rgl(path, tabulate(brdf, size, description="a test"))
+    write_tensors(path, tabulate(brdf, size, description="a test"))
     samples = read_brdf_samples(path, samples=500)
     light, viewer = directions_of(samples)
     exact = brdf(light, viewer)

@@ -4,15 +4,14 @@ The density of half vectors that shapes the grid is the BRDF's own: its mean ove
 against the angle from the normal, so that a table serves any lobe, with or without a diffuse part.
 """
 
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.data.formats.bilinear_warp import BilinearWarp, Corners
-from pellicle.data.formats.rgl import RglBrdf, unit_to_phi, unit_to_theta, write_tensors
+from pellicle.data.formats.rgl import RglBrdf, unit_to_phi, unit_to_theta
 from pellicle.data.half_angles import vectors
 
 Brdf = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -54,18 +53,15 @@ def tabulate(
     - `wavelengths` of the channels in nm, or None for the three of linear sRGB.
     - `description`: a line of text in the file.
 
-    **Returns:** arrays by name, for `write_rgl` and `brdf_of`.
+    **Returns:** arrays by name, for `write_tensors` of `pellicle.data.formats.rgl`.
     """
     table, density = _empty_table(brdf, size, wavelengths)
     values = _values(brdf, table, size.side)
     luminance = np.abs(values).mean(axis=2)
     floor = _DARKEST * luminance.max(axis=(2, 3), keepdims=True)
     text = f"{description or 'BRDF'}, written by pellicle {version('pellicle')}".encode()
-    single: dict[str, np.ndarray | None] = {
-        "phi_i": table.phi_i,
-        "theta_i": table.theta_i,
-        "ndf": table.ndf,
-        "sigma": table.sigma,
+    fields = {
+        **{name: getattr(table, name) for name in ("phi_i", "theta_i", "ndf", "sigma")},
         "vndf": density,
         "luminance": np.maximum(luminance, np.maximum(floor, 1e-30)),
         "rgb" if wavelengths is None else "spectra": values,
@@ -74,7 +70,7 @@ def tabulate(
     return {
         "description": np.frombuffer(text, np.uint8),
         "jacobian": np.array([1], np.uint8),
-        **{name: np.asarray(array, np.float32) for name, array in single.items()},
+        **{name: np.asarray(array, np.float32) for name, array in fields.items()},
     }
 
 
@@ -105,16 +101,6 @@ def _empty_table(brdf: Brdf, size: TableSize, wavelengths: np.ndarray | None) ->
         warp=BilinearWarp(density.reshape(-1, rows, columns)),
     )
     return table, density.reshape(*shape, rows, columns)
-
-
-def write_rgl(
-    path: str | os.PathLike[str], fields: Mapping[str, np.ndarray], *, overwrite: bool = False
-) -> None:
-    """Write the fields of `tabulate` as a `.bsdf` file.
-
-    Raises UsageError where `path` exists without `overwrite`, or cannot be written.
-    """
-    write_tensors(path, fields, overwrite=overwrite)
 
 
 def _profile(brdf: Brdf, x: np.ndarray) -> np.ndarray:
