@@ -7,21 +7,12 @@ import numpy as np
 import pytest
 
 from pellicle.cli import main
+from tests.film_recipes import film_recipe
 
 ROOT = Path(__file__).parents[2]
-RECIPE = """
-[data]
-files = ["film.csv"]
-signal = "T"
-range = [450, 700]
-
-[scene]
-substrate = "BK7"
-
-[[scene.layer]]
-material = "SiO2"
-thickness = { lower = 10, upper = 3000, value = 500 }
-"""
+DATA = 'files = ["film.csv"]\nsignal = "T"\nrange = [450, 700]'
+LAYER = 'material = "SiO2"\nthickness = { lower = 10, upper = 3000, value = 500 }'
+RECIPE = film_recipe(DATA, LAYER, substrate='"BK7"')
 
 
 @pytest.fixture

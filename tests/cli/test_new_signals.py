@@ -4,34 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-
-CONTRAST = """
-[data]
-signal = "contrast"
-wavelengths = { start = 450, stop = 750, step = 4 }
-
-[scene]
-substrate = "3.9+0.02j"
-layer = [
-    { name = "flake", material = "2.6+1.3j", thickness = { lower = 0.1, upper = 20, value = 3.35 } },
-    { name = "oxide", material = 1.46, thickness = 285 },
-]
-
-[reference]
-substrate = "3.9+0.02j"
-layer = [{ material = 1.46, thickness = 285 }]
-"""
-TRANSMISSION = """
-[data]
-signal = "psi-delta"
-transmission = true
-angle = 60
-wavelengths = { start = 450, stop = 750, step = 4 }
-
-[scene]
-substrate = 1.52
-layer = [{ material = "2.1+0.01j", thickness = { lower = 10, upper = 400, value = 180 } }]
-"""
+from tests.film_recipes import CONTRAST, TRANSMISSION
 
 
 @pytest.mark.slow

@@ -2,19 +2,12 @@
 
 import pytest
 
-RECIPE = """
-[data]
-signal = "R"
-angle = 0.2
-wavelengths = { start = 400, stop = 790, step = 65 }
+from tests.film_recipes import film_recipe
 
-[scene]
-substrate = "3.9+0.02j"
-
-[[scene.layer]]
-material = "1.46+1e-7j"
-thickness = { lower = 10, upper = 800 }
-"""
+RECIPE = film_recipe(
+    'signal = "R"\nangle = 0.2\nwavelengths = { start = 400, stop = 790, step = 65 }',
+    'material = "1.46+1e-7j"\nthickness = { lower = 10, upper = 800 }',
+)
 
 
 @pytest.fixture

@@ -4,21 +4,12 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from tests.film_recipes import film_recipe
 
-RECIPE = """
-[data]
-signal = "R"
-noise = 0.002
-wavelengths = { start = 400, stop = 796, step = 4 }
-
-[scene]
-substrate = "3.9+0.02j"
-
-[[scene.layer]]
-name = "oxide"
-material = 1.46
-thickness = { value = 321.5, lower = 10, upper = 800 }
-"""
+RECIPE = film_recipe(
+    'signal = "R"\nnoise = 0.002\nwavelengths = { start = 400, stop = 796, step = 4 }',
+    'name = "oxide"\nmaterial = 1.46\nthickness = { value = 321.5, lower = 10, upper = 800 }',
+)
 
 
 @pytest.fixture

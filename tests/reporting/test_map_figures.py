@@ -8,23 +8,15 @@ from pellicle.reporting import map_panels
 from pellicle.reporting.map_axes import Axis, MapAxes
 from pellicle.reporting.map_figures import figures
 from pellicle.reporting.map_panels import COLOURS, HATCHES, overlay
+from tests.reporting.test_map_text import made as described
 
-xr = pytest.importorskip("xarray")
+pytest.importorskip("xarray")
 
 
 def made(status, dims=("y", "x"), coords=None, values=None, **attrs):
     """A map of a thickness that grows by 2 nm in each column, with a standard error of 0.4 nm."""
-    status = np.asarray(status, np.uint8)
-    values = 300 + 2.0 * np.arange(status.shape[-1]) + np.zeros(status.shape) if values is None else values
-    return xr.Dataset(
-        {
-            "thickness": (dims, values, {"units": "nm"}),
-            "thickness_stderr": (dims, np.full(status.shape, 0.4), {"units": "nm"}),
-            "status": (dims, status),
-        },
-        coords=coords,
-        attrs={"path": "wafer.nc", **attrs},
-    )
+    values = 300 + 2.0 * np.arange(np.shape(status)[-1]) if values is None else values
+    return described(status, np.broadcast_to(values, np.shape(status)), dims, coords, **attrs)
 
 
 def image(height=30, width=40):

@@ -18,27 +18,12 @@ from pellicle.recipes.write import recipe_text
 from pellicle.reporting.figures import draw_spectrum
 from pellicle.scene.film import with_wavelength
 from pellicle.signals.registry import SIMULATED
+from tests.film_recipes import CONTRAST
 
 ROOT = Path(__file__).resolve().parents[2]
 
 NM = np.linspace(450.0, 750.0, 64)
 FILM, OXIDE, SILICON = 2.6 + 1.3j, 1.46, 3.9 + 0.02j
-RECIPE = """
-[data]
-signal = "contrast"
-wavelengths = {{ start = 450, stop = 750, step = 4 }}
-
-[scene]
-substrate = "3.9+0.02j"
-layer = [
-    {{ name = "flake", material = "2.6+1.3j", thickness = {{ lower = 0.1, upper = 20, value = 3.35 }} }},
-    {{ name = "oxide", material = 1.46, thickness = 285 }},
-]
-
-[reference]
-substrate = "3.9+0.02j"
-{form}layer = [{{ material = 1.46, thickness = 285 }}]
-"""
 
 
 def scene(form: str = "relative", **more) -> pl.Scene:
@@ -110,7 +95,7 @@ def test_files(tmp_path):
 def test_a_recipe_both_ways(tmp_path, write):
     path = tmp_path / "flake.toml"
     for form in ("", 'form = "normalised"\n'):
-        path.write_text(RECIPE.format(form=form), encoding="utf-8")
+        path.write_text(CONTRAST + form, encoding="utf-8")
         read = read_recipe(path).scene()
         assert read.reference == scene("normalised" if form else "relative").reference
         again = write(recipe_text(read, tmp_path), "again.toml")

@@ -10,21 +10,11 @@ from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import UsageError
 from pellicle.recipes.read import read_recipe
 from pellicle.recipes.write import recipe_text
+from tests.film_recipes import TRANSMISSION
 
 NM = np.linspace(450.0, 750.0, 64)
 ANGLE, INDEX, GLASS = 60.0, 2.1 + 0.01j, 1.52
 LIGHT = pl.Light(angle=ANGLE, signal="psi-delta", transmission=True)
-RECIPE = """
-[data]
-signal = "psi-delta"
-transmission = true
-angle = 60
-wavelengths = { start = 450, stop = 750, step = 4 }
-
-[scene]
-substrate = 1.52
-layer = [{ material = "2.1+0.01j", thickness = { lower = 10, upper = 400, value = 180 } }]
-"""
 WOOLLAM = """VASEmethod[EllipsometerType=4, TransmissionMeas=1 , CompleteEASE=5.19]
 nm
 {rows}
@@ -121,7 +111,7 @@ def test_files(tmp_path, write):
 
 def test_a_recipe_both_ways(tmp_path):
     path, again = tmp_path / "t.toml", tmp_path / "again.toml"
-    path.write_text(RECIPE, encoding="utf-8")
+    path.write_text(TRANSMISSION, encoding="utf-8")
     read = read_recipe(path).scene()
     assert read.light.transmission
     again.write_text(recipe_text(read, tmp_path), encoding="utf-8")

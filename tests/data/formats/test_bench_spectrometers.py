@@ -1,17 +1,13 @@
 """Text files of PerkinElmer, JASCO and Bruker, and exports that are plain tables, as Hitachi's."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
-from tests.data.tables import assert_read
+from tests.data.tables import assert_read, sample
 
-SAMPLES = Path(__file__).with_name("samples")
-
-PEDS = (SAMPLES / "perkin_elmer/peds.txt").read_text(encoding="utf-8")
+PEDS = sample("perkin_elmer/peds.txt")
 
 
 def test_transmittance_in_percent(write):
@@ -64,7 +60,7 @@ def test_fewer_points_than_stated(write):
     assert "states 3 points but has 2: it may have been cut off" in spectrum.notes
 
 
-JASCO = (SAMPLES / "jasco/absorbance.txt").read_text(encoding="utf-8")
+JASCO = sample("jasco/absorbance.txt")
 
 
 def test_absorbance(write):
@@ -106,7 +102,7 @@ def test_jasco_what_cannot_be_read(refused):
     refused(JASCO.replace("XYDATA", "XYDATA1\t25\t30"), "several temperatures")
 
 
-DPT = (SAMPLES / "bruker_dpt/energies.dpt").read_text(encoding="utf-8")
+DPT = sample("bruker_dpt/energies.dpt")
 
 
 def test_a_dpt_states_nothing(write):

@@ -3,17 +3,13 @@
 Expected Ψ and Δ of Film Sense are those of N, C and S by hand: N = cos 2Ψ, tan Δ = S/C.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
-from tests.data.tables import assert_read
+from tests.data.tables import assert_read, sample
 
-SAMPLES = Path(__file__).with_name("samples")
-
-HORIBA = (SAMPLES / "horiba/psi_delta.txt").read_text(encoding="utf-8")
+HORIBA = sample("horiba/psi_delta.txt")
 
 
 @pytest.mark.parametrize("text", [HORIBA, HORIBA.replace("# COMMENT:\n", "").replace("\n\n", "\n")])
@@ -33,7 +29,7 @@ def test_horiba_refused(refused):
     refused(HORIBA.replace("20.5", "95.5"), "line 14", "0 to 90")
 
 
-SPECTRARAY = (SAMPLES / "spectraray/two_angles.txt").read_text(encoding="utf-8")
+SPECTRARAY = sample("spectraray/two_angles.txt")
 
 
 def test_spectraray(write):
@@ -91,13 +87,9 @@ def test_a_mueller_matrix(write, refused):
 
 # tan²Ψ = 1/3 and 1, cos Δ = 1/2 and -1/2, fixed polariser at 45 and at 30 degrees:
 # α = (tan²Ψ - tan²A)/(tan²Ψ + tan²A), β = 2 tan Ψ cos Δ tan A/(tan²Ψ + tan²A)
-AT_45 = (SAMPLES / "regress_pro/at_45.txt").read_text(encoding="utf-8")
-
-
-AT_MINUS_30 = (SAMPLES / "regress_pro/at_minus_30.txt").read_text(encoding="utf-8")
-
-
-TAN_COS = (SAMPLES / "regress_pro/tan_cos.txt").read_text(encoding="utf-8")
+AT_45, AT_MINUS_30, TAN_COS = (
+    sample(f"regress_pro/{name}.txt") for name in ("at_45", "at_minus_30", "tan_cos")
+)
 
 
 @pytest.mark.parametrize("text", [AT_45, AT_MINUS_30, TAN_COS])
@@ -128,10 +120,7 @@ def test_a_text_that_only_begins_so_is_another_format(write):
     assert read_spectra(write("SE ALPHA\nwavelength_nm,R\n500,0.2\n600,0.3\n"))[0].signal == "R"
 
 
-FILM_SENSE = (SAMPLES / "film_sense/static.txt").read_text(encoding="utf-8")
-
-
-TIMES = (SAMPLES / "film_sense/dynamic.txt").read_text(encoding="utf-8")
+FILM_SENSE, TIMES = sample("film_sense/static.txt"), sample("film_sense/dynamic.txt")
 
 
 def test_static(write):

@@ -1,23 +1,14 @@
 """Text files of Avantes, Ocean Optics and StellarNet."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from pellicle.data.read_counts import read_counts, read_counts_beside
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
-from tests.data.tables import assert_read
+from tests.data.tables import assert_read, sample
 
-SAMPLES = Path(__file__).with_name("samples")
-
-AVASOFT_7 = (SAMPLES / "avantes/avasoft_7.txt").read_text(encoding="utf-8")
-
-
-AVASOFT_6 = (SAMPLES / "avantes/avasoft_6.txt").read_text(encoding="utf-8")
-
-
+AVASOFT_7, AVASOFT_6 = sample("avantes/avasoft_7.txt"), sample("avantes/avasoft_6.txt")
 COUNTS = AVASOFT_7.replace(";Reflectance", "").replace(" ;[%]", "")
 
 
@@ -85,15 +76,9 @@ def test_avantes_what_cannot_be_read(refused):
     refused(AVASOFT_7, "contradicts", wavelength_unit="um", error=UsageError)
 
 
-OCEANVIEW = (SAMPLES / "ocean_optics/oceanview.txt").read_text(encoding="utf-8")
-
-
-SPECTRASUITE = (SAMPLES / "ocean_optics/spectrasuite.txt").read_text(encoding="utf-8")
-
-
-JAZ = (SAMPLES / "ocean_optics/jaz.txt").read_text(encoding="utf-8")
-
-
+OCEANVIEW, SPECTRASUITE, JAZ = (
+    sample(f"ocean_optics/{name}.txt") for name in ("oceanview", "spectrasuite", "jaz")
+)
 R = {"signal": "R", "signal_unit": "percent"}
 
 
@@ -164,7 +149,7 @@ def test_no_rows(refused):
     refused(JAZ.partition("400.1")[0], "no rows", **R)
 
 
-SPECTRAWIZ = (SAMPLES / "stellarnet/spectrawiz.txt").read_text(encoding="utf-8")
+SPECTRAWIZ = sample("stellarnet/spectrawiz.txt")
 
 
 def test_spectrawiz(write, refused):

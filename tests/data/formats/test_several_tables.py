@@ -1,18 +1,14 @@
 """Cary, UVProbe and other tables with several scans side by side, and tables below each other."""
 
-from pathlib import Path
-
 import numpy as np
 
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
+from tests.data.tables import sample
 
-SAMPLES = Path(__file__).with_name("samples")
-
-CARY = (SAMPLES / "scans_side_by_side/cary.txt").read_text(encoding="utf-8")
-ONE_SCAN = (SAMPLES / "scans_side_by_side/one_scan.txt").read_text(encoding="utf-8")
-UVPROBE = (SAMPLES / "scans_side_by_side/uvprobe.txt").read_text(encoding="utf-8")
-UVPROBE_ONE = (SAMPLES / "scans_side_by_side/uvprobe_one.txt").read_text(encoding="utf-8")
-STACKED = (SAMPLES / "stacked_tables/two.txt").read_text(encoding="utf-8")
+CARY, ONE_SCAN, UVPROBE, UVPROBE_ONE = (
+    sample(f"scans_side_by_side/{name}.txt") for name in ("cary", "one_scan", "uvprobe", "uvprobe_one")
+)
+STACKED = sample("stacked_tables/two.txt")
 
 
 def by_name(path, **reading):
