@@ -70,10 +70,9 @@ def test_an_index_with_one_open_side(film, measured):
     assert f"n is at least {fit['n'].lower_limit:.2g} (95 %)" in fit.warnings
 
 
-def test_an_interval_by_profile_is_that_of_a_scan(film, measured, monkeypatch):
+def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best; and the
-    misfit beside the best, for which nothing but the search's programs is compiled."""
-    monkeypatch.setattr("pellicle.fitting.neighbourhood.total_deviance", None)
+    misfit beside the best."""
     scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7), 0.0))
     data = measured(scene, 1.46, 430.0, sigma=True)
     fit, ranked = fitted(data, scene, 0.0, quiet)

@@ -38,9 +38,11 @@ def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Numbe
     It is not finite where the formula of a model is not.
     """
     # NumPy's numbers keep the formulas in NumPy where they combine parameters alone
-    numbers = jax.tree_util.tree_map(lambda number: np.asarray(number)[()], dispersion)
+    leaves, structure = jax.tree_util.tree_flatten(dispersion)
+    if not all(isinstance(leaf, np.ndarray | np.generic) for leaf in leaves):
+        dispersion = jax.tree_util.tree_unflatten(structure, [np.asarray(leaf)[()] for leaf in leaves])
     with np.errstate(all="ignore"):
-        return jax.tree_util.tree_map(np.asarray, numbers.index(np.asarray(wavelength, dtype=float)))
+        return jax.tree_util.tree_map(np.asarray, dispersion.index(np.asarray(wavelength, dtype=float)))
 
 
 def bounds_of(number: Any) -> tuple[float, float] | None:

@@ -279,18 +279,15 @@ class _System:
         self.lower[:, self.known :][:, [effect.not_negative for effect in self.effects]] = 0.0
 
     def _flat(self, view: Evidence) -> Evidence:
-        """The evidence with one leading axis."""
+        """The evidence with one leading axis; `rows` flattens the changes of effects."""
         if len(self.lead) == 1:
             return view
 
         def flat(x: Any, kept: int) -> np.ndarray:
             return np.reshape(x, (self.fits, *np.shape(x)[len(self.lead) :][:kept]))
 
-        effects = [replace(effect, change=flat(effect.change, 2)) for effect in view.effects]
         arrays = {name: flat(getattr(view, name), 2) for name in ("residual", "sigma", "weights")}
-        return view._replace(
-            **arrays, effects=effects, jacobian=flat(view.jacobian, 3), noise=flat(view.noise, 0)
-        )
+        return view._replace(**arrays, jacobian=flat(view.jacobian, 3), noise=flat(view.noise, 0))
 
     def prior_rows(self, fit: int) -> tuple[np.ndarray, np.ndarray]:
         """Rows (columns, columns) and data (columns,) of the priors of one fit."""

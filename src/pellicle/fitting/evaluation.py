@@ -8,10 +8,15 @@ import numpy as np
 
 from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.problem import Explained, Form, Problem
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.programs.cache import kept
 
 Static = tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]
 """The static part of a program: coordinates, and of each view its form and the parameters that it takes."""
+
+
+CHUNK = 128
+"""Candidates that one call of the compiled program takes."""
 
 
 class Deviances(NamedTuple):
@@ -100,10 +105,27 @@ def polished(
 polish = kept(polished)
 
 
+def scanned(problem: Problem, units: np.ndarray, progress: Progress = quiet) -> np.ndarray:
+    """Deviance in each view (candidates, views), priors in the first, of points (candidates, parameters).
+
+    Points are those of the unit cube. A deviance that is not finite is infinite.
+
+    Candidates go in chunks of one size: they share a program, and Ctrl-C is heard between chunks.
+    """
+    table = np.empty((len(units), len(problem.views)))
+    values = np.asarray(problem.values(units))
+    progress("scan", 0, len(units))
+    for first in range(0, len(units), CHUNK):
+        chunk = values[first : first + CHUNK]
+        padded = np.concatenate([chunk, np.repeat(chunk[-1:], CHUNK - len(chunk), axis=0)])
+        for column, view in zip(table.T, problem.views, strict=True):
+            deviance = deviances(view.form, view.arrays, problem.seen_by(view, padded)).value
+            column[first : first + CHUNK] = deviance[: len(chunk)]
+        progress("scan", min(first + CHUNK, len(units)), len(units))
+    table[:, 0] += np.sum(problem.box.prior_rows(values) ** 2, axis=1)
+    return np.where(np.isfinite(table), table, np.inf)
+
+
 def total_deviance(problem: Problem, units: np.ndarray) -> np.ndarray:
     """Deviance of all views and priors at points (points, parameters) of the unit cube."""
-    values = np.asarray(problem.values(units))
-    total = np.sum(problem.box.prior_rows(values) ** 2, axis=-1)
-    for view in problem.views:
-        total = total + np.asarray(deviances(view.form, view.arrays, problem.seen_by(view, values)).value)
-    return total
+    return scanned(problem, units).sum(axis=1)

@@ -75,6 +75,8 @@ def correlated(jacobian: Scaled, parameters: Mapping[str, Estimate]) -> list[str
 
     Scale and offset are eliminated first, and named where they enlarge the errors of the others.
     """
+    if len(jacobian.names) < 2:
+        return []
     steps = np.array([step(name, parameters[name]) for name in jacobian.names])
     matrix = jacobian.by_range(steps)
     nuisance = np.array([bool(_NUISANCE.match(name)) for name in jacobian.names])

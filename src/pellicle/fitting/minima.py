@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from logging import getLogger
 
-import jax
 import numpy as np
 
 from pellicle.effects.averaging import rays_of_axes
@@ -17,7 +16,7 @@ SLOTS = 64
 """Starts that one call of the solver takes."""
 STEPS = 100
 """Most steps of one polish."""
-_WORK = 4096
+_WORK = 2048
 """Data values that are evaluated in one step of the solver, about: lanes of many points are few."""
 MOST = 16
 """Most minima that are kept."""
@@ -79,7 +78,7 @@ def solve(
         count = min(SLOTS, len(starts) - first)
         until = Until(np.int64(count), np.int64(steps), np.float64(atol), np.float64(coarse))
         own = box._replace(lower=low, upper=high)
-        polished = jax.device_get(polish((problem.static, lanes), problem.arrays, own, units, until))
+        polished = polish((problem.static, lanes), problem.arrays, own, units, until)
         log.debug("polish: %d starts in %d lanes, %d evaluations", count, lanes, polished.steps[:count].sum())
         pieces.append([np.asarray(column)[:count] for column in polished[:3]])
         progress("polish", min(first + SLOTS, len(starts)), len(starts))
@@ -90,8 +89,7 @@ def solve(
 def deviance_at(problem: Problem, units: np.ndarray) -> np.ndarray:
     """Deviance of all views and priors at points (points, parameters) of the unit cube.
 
-    By the program of `solve`, whose first step evaluates its starts: where a fit has polished already,
-    `total_deviance` would compile another one for each number of points.
+    By the program of `solve`, whose first step evaluates its starts: a fit has compiled it already.
     """
     return solve(problem, units, steps=1).deviance
 

@@ -22,13 +22,15 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
     counted = ranked.problem._replace(views=tuple(view.counting(1 / fit.variance) for view, fit in pairs))
     own = counted.in_own_units(values)
     thinned, box = own.thinned(), own.box
-    searched_in_own_units = own.coordinates == ranked.problem.coordinates
+    # a program that the fit has compiled: that of its scan, or that of its polish
+    as_scanned = ranked.minima.scan is not None and thinned.views == own.views
+    as_polished = not as_scanned and own.coordinates == ranked.problem.coordinates
     lower, span = np.asarray(box.lower), np.asarray(box.upper) - np.asarray(box.lower)
     every = np.clip(np.vstack([values, *others]), lower, box.upper)
 
     def misfit(which: np.ndarray, at: np.ndarray) -> np.ndarray:
         units = (at[0] - lower) / span
-        return (deviance_at(own, units) if searched_in_own_units else total_deviance(thinned, units))[None]
+        return (deviance_at(own, units) if as_polished else total_deviance(thinned, units))[None]
 
     def profile(
         which: np.ndarray, axis: np.ndarray, values: np.ndarray, starts: np.ndarray

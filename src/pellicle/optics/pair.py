@@ -21,6 +21,8 @@ import numpy as np
 
 def namespace(*arrays: Any) -> Any:
     """Return `numpy` where an array is NumPy's and none is JAX's, else `jax.numpy`. Accepts pytrees."""
+    if len(arrays) == 1 and type(arrays[0]) is np.ndarray:
+        return np
     leaves = jax.tree_util.tree_leaves(arrays)
     if any(isinstance(leaf, jax.Array) for leaf in leaves):
         return jnp

@@ -219,8 +219,8 @@ def kept(function: Program, *, many_calls: bool = False) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
-    its `repr` says all that the program depends on. With `many_calls` it is compiled to run fast, not in
-    a short time.
+    its `repr` says all that the program depends on. The arrays are NumPy's. With `many_calls` it is compiled
+    to run fast, not in a short time.
     """
 
     @lru_cache(maxsize=1)
@@ -231,12 +231,13 @@ def kept(function: Program, *, many_calls: bool = False) -> Program:
     def call(plan: Hashable, *arguments: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
         if not folder or "://" in folder:  # JAX can cache in a cloud, too
-            return jitted()(plan, *arguments)
+            return jax.device_get(jitted()(plan, *arguments))
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
         shapes = tuple((a.shape, a.dtype.str) for a in arrays)
         run, output = _load(function, many_calls, plan, structure, shapes, folder)
-        return jax.tree_util.tree_unflatten(output, run(*arrays))
+        # NumPy's arrays are views of the program's own, and cheaper to work on
+        return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
 
     return call
 
@@ -328,6 +329,6 @@ def in_chunks(program: Callable[[Any], Any], rows: Any, size: int, few: int = 0)
         ) -> np.ndarray:
             return np.concatenate([x[here], np.repeat(x[here][-1:], padding, axis=0)])
 
-        results = jax.device_get(program(jax.tree_util.tree_map(chunk, rows)))
+        results = program(jax.tree_util.tree_map(chunk, rows))
         pieces.append(jax.tree_util.tree_map(lambda x, left=left: np.asarray(x)[:left], results))
     return jax.tree_util.tree_map(lambda *each: np.concatenate(each), *pieces)

@@ -1,6 +1,7 @@
 """Free parameters, which stand in a pytree in place of numbers, and pytrees as keys by their content."""
 
 import math
+from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps
 from typing import Any, TypeGuard, TypeVar, final
@@ -80,7 +81,7 @@ def check_free_count(count: int, least: int = 1) -> None:
 
 def is_free(leaf: Any) -> TypeGuard[Free]:
     """Return True for a `Free`, which a traversal of a pytree must take as one leaf."""
-    return isinstance(leaf, Free)
+    return type(leaf) is Free  # final; isinstance asks an abstract class
 
 
 def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
@@ -105,6 +106,17 @@ KEPT = 32
 """Results that a function keeps: a scene at some hundred wavelengths takes some ten kB."""
 
 Result = TypeVar("Result")
+
+
+_CONTENTS: OrderedDict[int, "Content"] = OrderedDict()
+
+
+def constant(tree: Result) -> Result:
+    """Mark a pytree as one that nobody changes, so that its content is read once."""
+    _CONTENTS[id(tree)] = Content(tree)  # it keeps the tree, and with it the number
+    if len(_CONTENTS) > 8 * KEPT:
+        _CONTENTS.popitem(last=False)
+    return tree
 
 
 class Content:
@@ -133,16 +145,17 @@ def _content(leaf: Any) -> Any:
 def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
     """Keep the last results of a function of pytrees, by the content of its arguments.
 
-    Equal scenes and grids are then prepared once. An argument may be its `Content`. The function must be
-    pure, and nobody may change what it returns.
+    Equal scenes and grids are then prepared once. The function must be pure, and nobody may change what it
+    returns. The content of a `constant` argument is not read again.
     """
 
     @lru_cache(maxsize=KEPT)
     def computed(*arguments: Content) -> Result:
-        return function(*(own.tree for own in arguments))
+        result = function(*(own.tree for own in arguments))
+        return constant(result) if isinstance(result, eqx.Module) else result
 
     @wraps(function)
     def call(*arguments: Any) -> Result:
-        return computed(*(own if isinstance(own, Content) else Content(own) for own in arguments))
+        return computed(*(_CONTENTS.get(id(own)) or Content(own) for own in arguments))
 
     return call

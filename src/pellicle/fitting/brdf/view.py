@@ -151,7 +151,7 @@ class SamplesView:
 
     def local(self, values: Any) -> Local:
         """The model around `values` (free numbers,)."""
-        return jax.device_get(local(self.form, self.samples, self.fixed, values))
+        return local(self.form, self.samples, self.fixed, values)
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""

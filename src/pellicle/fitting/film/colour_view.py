@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -152,7 +151,7 @@ class ColoursView:
 
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
-        return jax.device_get(local(self.form, self.scene, self.data, values))
+        return local(self.form, self.scene, self.data, values)
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (colours, 3); those of limits only where the model is on the wrong side."""

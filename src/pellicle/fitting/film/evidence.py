@@ -42,7 +42,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
         residual = residual[: view.points].reshape(view.rows, view.channels)[:, :keep]
         sigma = (1 / weight).reshape(view.rows, view.channels)[:, :keep]
         counted = np.sqrt(view.data.independent_fraction) / sigma
-        noises, sweeps, least = np.empty(keep), view.sweeps(), LEAST_NOISE * float(view.data.level)
+        noises, sweeps, least = np.empty(keep), view.sweeps, LEAST_NOISE * float(view.data.level)
         for group in view.noise_groups:
             own = [channel for channel in group.channels if channel < keep]
             noise = float(short_range_noise(residual[:, own], sweeps, least))
@@ -63,7 +63,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
                 sigma * unit,
                 float(noises[0]),
                 counted / unit,
-                [replace(effect, change=effect.change * unit) for effect in effects],
+                [replace(e, change=e.change * unit) for e in effects] if np.any(unit != 1) else effects,
                 view.correlation_length,
                 DRIFT_CORRELATION if view.noise.drifting else 1.0,
                 0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),

@@ -16,12 +16,13 @@ from pellicle.effects.film_plan import exact
 from pellicle.effects.presence import computes_roughness, scene_media
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.form import SpectrumForm
+from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene, thickness_spread
-from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, remembered
+from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
 
@@ -107,21 +108,18 @@ def extended(view: SpectrumView | ColoursView, values: np.ndarray) -> ExtendedSc
     whether these values make them gases; where fringes are averaged or media birefringent, its plan depends
     on the values themselves.
     """
-    scene, given = Content(view.scene), tuple(map(float, values))
-    of_media, of_plan = _depends(scene)
-    judged = _judged(scene, given if of_media else None)
-    return _extended(Content(view.form), scene, judged, given if of_plan else None)
+    scene, given = view.scene, tuple(map(float, values))
+    judged = _judged(scene, given if free_media(scene) else None)
+    return _extended(view.form, scene, judged, given if _planned_by_values(scene) else None)
 
 
 @remembered
-def _depends(scene: Scene) -> tuple[bool, bool]:
-    """Test if the free numbers of a scene change what its media are, and if they change its plan."""
+def _planned_by_values(scene: Scene) -> bool:
+    """Test if the free numbers of a scene change its plan."""
     blurred = scene.instrument.bandwidth is not None or any(
         isinstance(layer, Layer) and thickness_spread(scene, layer) is not None for layer in scene.layers
     )
-    anisotropic = any(isinstance(medium, Anisotropic) for medium in scene_media(scene))
-    of_media = [getattr(layer, "material", None) for layer in scene.layers], scene.substrate, scene.ambient
-    return bool(free_leaves(of_media)), blurred or anisotropic
+    return blurred or any(isinstance(medium, Anisotropic) for medium in scene_media(scene))
 
 
 @remembered

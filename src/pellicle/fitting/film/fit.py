@@ -119,7 +119,7 @@ def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
         raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
     if isinstance(scene, Scene) and len(spectra) > 1:
         scenes = [without_scale(scene, s) for s in spectra]
-    about = [(s.layers, s.ambient, s.substrate) for s in scenes]
+    about = [(s.layers, s.ambient, s.substrate) for s in scenes] if len(scenes) > 1 else []
     samples = [(*rest, x.material, x.plate_mm, x.roughness) for *rest, x in about]
     if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
         raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")

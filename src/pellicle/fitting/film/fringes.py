@@ -12,18 +12,16 @@ others, Thin Solid Films 138, 117 (1986) (Fourier transform).
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.dispersion.anisotropic import ordinary_index
-from pellicle.dispersion.base import known_index
 from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import local_noise
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import ViewFit
-from pellicle.optics.pair import real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, remembered
 from pellicle.scene.layers import Layer
@@ -63,32 +61,24 @@ def phase_per_thickness(
 
     None where another layer is not thin, where points are of several angles, and for Ψ and Δ and colours.
     """
+    if isinstance(view, ColoursView) or view.signal.ellipsometric or view.rows < 16:
+        return None
     scene: Scene = insert(view.scene, list(values))
+    index: Any = indices(view.scene, values)
     wavelength, rows = np.asarray(scene.light.wavelength), slice(view.rows)
     angle = np.broadcast_to(np.asarray(scene.light.angle, dtype=float), wavelength.shape)
-    layers = [x for x in scene.layers if isinstance(x, Layer)]
+    layers = [(n, x.thickness) for n, x in zip(index.n, scene.layers, strict=True) if isinstance(x, Layer)]
+    own = [n for n, depth in layers if depth == thickness]
+    others = [float(np.max(n)) * np.asarray(depth).item() for n, depth in layers if depth != thickness]
     if (
-        isinstance(view, ColoursView)
-        or view.signal.ellipsometric
-        or len(layers) < len(scene.layers)
+        len(layers) < len(scene.layers)
         or np.ptp(angle[rows]) > 0
-        or view.rows < 16
+        or len(own) != 1
+        or max(others, default=0.0) >= _THIN * wavelength.min()
     ):
         return None
-    indices = [
-        np.broadcast_to(real(ordinary_index(x.material, wavelength)), wavelength.shape) for x in layers
-    ]
-    own = [i for i, layer in enumerate(layers) if layer.thickness == thickness]
-    thin = all(
-        float(np.max(n)) * np.asarray(layer.thickness).item() < _THIN * wavelength.min()
-        for i, (n, layer) in enumerate(zip(indices, layers, strict=True))
-        if i not in own
-    )
-    if len(own) != 1 or not thin:
-        return None
-    ambient = np.broadcast_to(real(known_index(scene.ambient, wavelength)), wavelength.shape)
-    n, sine = indices[own[0]], ambient * np.sin(np.deg2rad(angle))
-    return (2 * np.sqrt(np.maximum(n**2 - sine**2, 1e-6)) / wavelength)[rows]
+    sine = index.ambient * np.sin(np.deg2rad(angle))
+    return (2 * np.sqrt(np.maximum(own[0] ** 2 - sine**2, 1e-6)) / wavelength)[rows]
 
 
 @remembered  # the best fit asks again with the same index, where that is known

@@ -52,13 +52,11 @@ _FEW = 3
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
     """Every free parameter, in the order of the scene's pytree."""
-    return shared([scene], [""])[0]
+    return shared(("",), scene)[0]
 
 
 @remembered
-def shared(
-    scenes: Sequence[Scene], names: Sequence[str]
-) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
+def shared(names: tuple[str, ...], *scenes: Scene) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
     """Free parameters of one sample measured in several ways, and the positions of those in each scene.
 
     Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
@@ -166,6 +164,7 @@ def anonymous(scene: Scene) -> Scene:
     return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty())
 
 
+@remembered
 def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
     """(name, value, unit) of the layer's numbers and the instrument's that are not free.
 

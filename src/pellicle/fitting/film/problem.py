@@ -10,13 +10,14 @@ from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_targets import MeasuredColours, colours_view
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.parameters import anonymous, bounds, shared
+from pellicle.fitting.film.sweeps import sweeps_of
 from pellicle.fitting.film.targets import Measured, Target
 from pellicle.fitting.film.view import ROUND, SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene, coherent_layers, with_wavelength
-from pellicle.scene.free import remembered
+from pellicle.scene.free import constant, remembered
 
 _KEPT_EFFECTS = ("precision", "dispersion")
 """Effects that a tolerance does not remove: a fit stops by differences below single precision, and its media
@@ -38,12 +39,14 @@ class Structure(NamedTuple):
     plan: Plan
     scene: Scene
     largest_index: float
+    sweeps: list[np.ndarray]
 
 
 @remembered
 def structure(scene: Scene, tolerance: float) -> Structure:
     """The structure of a spectrum that `scene` explains, at the wavelengths of its light."""
     light = scene.light
+    parts = sweeps_of(light, len(light.wavelength))
     extra = -len(light.wavelength) % ROUND
     wavelength = _pad(light.wavelength, extra)
     turns = (_pad(x, extra) if np.ndim(x) else x for x in (light.angle, light.azimuth))
@@ -51,7 +54,7 @@ def structure(scene: Scene, tolerance: float) -> Structure:
     chosen = plan(scene, tolerance, _KEPT_EFFECTS)
     scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
     steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
-    return Structure(chosen, anonymous(scene), steepest)
+    return Structure(chosen, constant(anonymous(scene)), steepest, parts)
 
 
 def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
@@ -60,7 +63,7 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
     The models may be off by up to `tolerance`. Raises ValueError where a material has no data at a
     wavelength.
     """
-    free, positions = shared([m.scene for m in spectra], [m.name for m in spectra])
+    free, positions = shared(tuple(m.name for m in spectra), *(m.scene for m in spectra))
     views = tuple(
         colours_view(spectrum, takes, tolerance, _KEPT_EFFECTS)
         if isinstance(spectrum, MeasuredColours)
@@ -71,7 +74,7 @@ def make(*spectra: Target, tolerance: float = 0.0) -> Problem:
 
 
 def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> SpectrumView:
-    chosen, scene, steepest = structure(spectrum.scene, tolerance)
+    chosen, scene, steepest, parts = structure(spectrum.scene, tolerance)
     points, wavelength = len(spectrum.wavelength), scene.light.wavelength
     channels, extra = spectrum.values.size // points, len(wavelength) - points
     values = _pad(spectrum.values, extra)
@@ -97,6 +100,7 @@ def _view(spectrum: Measured, takes: tuple[int, ...], tolerance: float) -> Spect
         channels,
         steepest,
         spectrum.signal,
+        parts,
     )
 
 

@@ -92,7 +92,7 @@ def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
     residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
     nm = np.asarray(view.scene.light.wavelength)[: view.rows]
     stretches, covered = [], 0
-    parts = [part for part in view.sweeps() if len(part) >= 2 * _NARROWEST]
+    parts = [part for part in view.sweeps if len(part) >= 2 * _NARROWEST]
     for part in parts:
         for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
             known = view.noise.given or view.noise.drifting

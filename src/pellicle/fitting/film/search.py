@@ -15,18 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.fitting.evaluation import deviances
+from pellicle.fitting.evaluation import scanned
 from pellicle.fitting.film.fringes import proposed
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.progress import Progress
 
 log = getLogger(__name__)
 
-_CHUNKS = (64, 256)
-"""Candidates that one call of the compiled program takes: of a scan of few, and of many."""
 _MOST_STEPS, _MOST_CANDIDATES = 4000, 400_000
 """Values of the thickness that are scanned at most: so many, or more while all candidates are not as many."""
 _MOST_DESIGNS = 1200
@@ -53,8 +51,7 @@ def search(problem: Problem, progress: Progress) -> Minima:
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
-    chunk = _CHUNKS[len(units) > _CHUNKS[0]]
-    table = scanned(thinned, units, chunk, progress).reshape(len(design), max(len(grid), 1), -1)
+    table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     total = table.sum(-1)
     batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
     lowest = np.flatnonzero(_lowest_within(total, 1).ravel())
@@ -73,7 +70,7 @@ def search(problem: Problem, progress: Progress) -> Minima:
     if depth is None:
         return result
     p = problem.parameters[depth]
-    every = np.concatenate([scanned(thinned, result.units[:1], chunk, quiet), table.reshape(len(units), -1)])
+    every = np.concatenate([scanned(thinned, result.units[:1]), table.reshape(len(units), -1)])
     best_of_scan = every[np.argmin(every.sum(-1))]
     return replace(result, scan=Scan(p.lower + grid * (p.upper - p.lower), table - best_of_scan))
 
@@ -199,22 +196,3 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
         step = shortest_wavelength(problem) / 4
         return _even(int(np.clip(np.ceil((p.upper - p.lower) / step), 3, 24)))
     return _even(int(np.clip(count, 3, 8)))
-
-
-def scanned(problem: Problem, units: np.ndarray, size: int, progress: Progress) -> np.ndarray:
-    """Deviance of every candidate in each view, (candidates, views), priors in the first.
-
-    Candidates go in chunks of one `size`: they share a program, and Ctrl-C is heard between chunks.
-    """
-    table = np.empty((len(units), len(problem.views)))
-    values = np.asarray(problem.values(units))
-    progress("scan", 0, len(units))
-    for first in range(0, len(units), size):
-        chunk = values[first : first + size]
-        padded = np.concatenate([chunk, np.repeat(chunk[-1:], size - len(chunk), axis=0)])
-        for column, view in zip(table.T, problem.views, strict=True):
-            deviance = deviances(view.form, view.arrays, problem.seen_by(view, padded)).value
-            column[first : first + size] = np.asarray(deviance)[: len(chunk)]
-        progress("scan", min(first + size, len(units)), len(units))
-    table[:, 0] += np.sum(problem.box.prior_rows(values) ** 2, axis=1)
-    return np.where(np.isfinite(table), table, np.inf)

@@ -10,12 +10,12 @@ import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.dispersion.anisotropic import ordinary_index
 from pellicle.dispersion.empirical import Shifted
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fringes, parts, residual_structure
 from pellicle.fitting.film.evidence import evidence
+from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.film.targets import Target, drifts
@@ -26,9 +26,8 @@ from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
-from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
-from pellicle.scene.free import insert, is_free
+from pellicle.scene.free import is_free, remembered
 from pellicle.scene.layers import Layer
 
 _RULED_OUT = 1e8
@@ -121,19 +120,18 @@ def thinnest(view: SpectrumView, fit: ViewFit) -> float:
 def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
     view = ranked.problem.views[0]
-    scene = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
-    wavelength = np.asarray(scene.light.wavelength)
+    index = indices(view.scene, ranked.problem.seen_by(view, ranked.values))
     return frozenset(
         thickness_name(spectra[0].scene, i)
-        for i, layer in enumerate(scene.layers)
-        if isinstance(layer, Layer) and np.median(imag(ordinary_index(layer.material, wavelength))) > _ABSORBS
+        for i, k in enumerate(index.k)
+        if k is not None and np.median(k) > _ABSORBS
     )
 
 
 def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]:
     """Warnings that a reader needs before using the numbers; `unclear` is what the data do not determine."""
     spectra, ranked = films.targets, films.ranked
-    messages = [w for m in spectra for material in materials_in(m.scene) for w in material.warnings()]
+    messages = [sentence for m in spectra for sentence in _cautions(m.scene)]
     scan, finest = ranked.minima.scan, shortest_wavelength(ranked.problem) / 8
     if scan is not None and scan.thickness[1] - scan.thickness[0] > 1.01 * finest:
         messages.append(
@@ -170,18 +168,23 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
     return tuple(dict.fromkeys([*messages, *unclear]))
 
 
+@remembered
+def _cautions(scene: Scene) -> list[str]:
+    """Sentences that results with the materials of a scene must carry."""
+    return [sentence for material in materials_in(scene) for sentence in material.warnings()]
+
+
 def _added_to_an_index(scene: Scene, ranked: RankedMinima) -> list[str]:
     """A sentence for each free n that is added to a given index, with the sum at the middle wavelength."""
-    view = ranked.problem.views[0]
-    fitted = insert(view.scene, ranked.problem.seen_by(view, ranked.values))
-    nm = np.asarray(fitted.light.wavelength)
-    middle = int(np.argmin(np.abs(nm - np.median(np.unique(nm)))))  # rows may be repeated
-    result = []
-    for i, (layer, own) in enumerate(zip(scene.layers, fitted.layers, strict=True)):
+    result, view = [], ranked.problem.views[0]
+    for i, layer in enumerate(scene.layers):
         if isinstance(layer, Layer) and isinstance(given := layer.material, Shifted) and is_free(given.n):
+            nm = np.asarray(view.scene.light.wavelength)
+            middle = int(np.argmin(np.abs(nm - np.median(np.unique(nm)))))  # rows may be repeated
             name = thickness_name(scene, i).removesuffix("thickness") + "n"
             of = given.base.name if isinstance(given.base, Material) else "the model"
-            total = float(np.asarray(real(own.material.index(nm)))[middle])
+            n: Any = indices(view.scene, ranked.problem.seen_by(view, ranked.values)).n[i]
+            total = float(n[middle])
             result.append(
                 f"{name} is added to the index of {of}; the sum is {total:.4g} at {nm[middle]:.4g} nm"
             )
@@ -200,7 +203,7 @@ def unexplained_depolarisation(
             continue
         values, sigma = share.measured(spectrum), share.error(spectrum)
         if sigma is None:
-            sigma = np.concatenate([local_noise(values[rows]) for rows in view.sweeps()])
+            sigma = np.concatenate([local_noise(values[rows]) for rows in view.sweeps])
         noise = math.sqrt(np.mean(sigma**2))
         mean_square = float(np.mean(values**2))
         by_chance = 1 + _CHANCE * math.sqrt(2 / len(spectrum))

@@ -23,13 +23,13 @@ from pellicle.fitting.normal_equations import by_singular_values
 from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
 from pellicle.fitting.result import Estimate
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.scene.free import remembered
+from pellicle.scene.film import Light
+from pellicle.scene.free import is_free
 
 _SHORT = 5
 """Fewest points of a sweep, on average; rows that turn back more often are in no order."""
 
 
-@remembered
 def sweeps(
     wavelength: Float[np.ndarray, " rows"],
     angle: Float[np.ndarray, " rows"],
@@ -62,6 +62,14 @@ def sweeps(
         else:
             result.extend(np.split(rows, turns))
     return result
+
+
+def sweeps_of(light: Light, rows: int) -> list[Int[np.ndarray, " points"]]:
+    """Positions of the rows of each sweep, of a light whose first `rows` are measured."""
+    angle: Any = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
+    turns = (angle, 0.0 if light.azimuth is None else light.azimuth)
+    shape = np.shape(light.wavelength)
+    return sweeps(np.asarray(light.wavelength)[:rows], *(np.broadcast_to(x, shape)[:rows] for x in turns))
 
 
 def correlation_in_sweeps(

@@ -89,8 +89,13 @@ def seen_as(scene: Scene, data: Spectrum) -> Scene:
     stated = data.polarisation != "unpolarised"
     polarisation = data.polarisation if stated else scene.light.polarisation
     transmission = data.transmission or (data.signal == scene.light.signal and scene.light.transmission)
-    light = Light(data.wavelength, angle, data.signal, polarisation, _azimuth(scene, data), transmission)
-    return eqx.tree_at(lambda s: s.light, scene, light)
+    return _lit(scene, data.wavelength, angle, data.signal, polarisation, _azimuth(scene, data), transmission)
+
+
+@remembered
+def _lit(scene: Scene, *light: Any) -> Scene:
+    """The scene in the light of these fields."""
+    return eqx.tree_at(lambda s: s.light, scene, Light(*light))
 
 
 def _azimuth(scene: Scene, data: Spectrum) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,13 +14,12 @@ from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm, local
 from pellicle.fitting.film.nuisance import Coefficient, Data
-from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
+from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION
 from pellicle.fitting.problem import Noise, NoiseGroup
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
-from pellicle.scene.free import is_free
 from pellicle.signals.base import Signal
 
 ROUND = 64
@@ -47,6 +47,7 @@ class SpectrumView:
     channels: int
     largest_index: float
     signal: Signal
+    sweeps: Sequence[np.ndarray]  # positions of the rows of each
 
     @property
     def form(self) -> SpectrumForm:
@@ -90,7 +91,7 @@ class SpectrumView:
 
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
-        return jax.device_get(local(self.form, self.scene, self.data, values))
+        return local(self.form, self.scene, self.data, values)
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
@@ -119,21 +120,10 @@ class SpectrumView:
         flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in self.nuisances(at)]
         return weight * np.column_stack([steep, *flat])
 
-    def sweeps(self) -> list[np.ndarray]:
-        """Positions of the rows of each sweep."""
-        light, rows = self.scene.light, slice(self.rows)
-        angle: Any = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
-        azimuth: Any = 0.0 if light.azimuth is None else light.azimuth
-        shape = np.shape(light.wavelength)
-        return sweeps(
-            np.asarray(light.wavelength)[rows],
-            *(np.broadcast_to(x, shape)[rows] for x in (angle, azimuth)),
-        )
-
     def correlation_length(self, residuals: np.ndarray) -> Any:
         """Number of points (...) of one channel whose residuals (..., rows, channels) count as one: see
         `correlation_in_sweeps`."""
-        return correlation_in_sweeps(residuals[..., : self.measured_channels], self.sweeps())
+        return correlation_in_sweeps(residuals[..., : self.measured_channels], self.sweeps)
 
     def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
         """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
@@ -163,7 +153,13 @@ class SpectrumView:
         data = data._replace(
             weight=data.weight * real, independent_fraction=data.independent_fraction * stride
         )
-        return replace(self, scene=scene, data=data, points=len(chosen) * channels)
+        return replace(
+            self,
+            scene=scene,
+            data=data,
+            points=len(chosen) * channels,
+            sweeps=sweeps_of(scene.light, len(chosen)),
+        )
 
     def unpadded(self) -> SpectrumView:
         """The view without the points that make its length round."""
