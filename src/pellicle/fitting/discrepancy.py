@@ -301,11 +301,14 @@ class _System:
 
     def by_noise(self, noises: Sequence[np.ndarray]) -> _System:
         """The system with the noise of neighbouring points (fits,) of each view for the σ of its points: that
-        of a drifting lamp would hide what an effect explains."""
+        of a drifting lamp would hide what an effect explains. Itself where they are the same."""
+        pairs = list(zip(self.views, noises, strict=True))
+        if all(view.least == 1.0 and np.all(view.sigma == noise[:, None, None]) for view, noise in pairs):
+            return self
         result = copy.copy(self)
         result.views = [
             view._replace(sigma=np.broadcast_to(noise[:, None, None], view.sigma.shape), least=1.0)
-            for view, noise in zip(self.views, noises, strict=True)
+            for view, noise in pairs
         ]
         return result
 
@@ -473,7 +476,8 @@ def _contributions(
     known, normal, stretch = system.known, balance.normal(), system.stretch
     _, covariance = normal.of(np.arange(known)).solved()
     changes = -covariance @ normal.matrix[:, :known, known:]
-    explains, alone, shift = _Balance(system.by_noise(noises)).one_by_one()
+    by_noise = system.by_noise(noises)
+    explains, alone, shift = (balance if by_noise is system else _Balance(by_noise)).one_by_one()
     for i, effect in enumerate(system.effects):
         yield Contribution(
             effect,

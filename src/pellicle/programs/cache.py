@@ -234,7 +234,7 @@ def kept(function: Program, *, many_calls: bool = False) -> Program:
             return jax.device_get(jitted()(plan, *arguments))
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
-        shapes = tuple((a.shape, a.dtype.str) for a in arrays)
+        shapes = tuple((a.shape, a.dtype) for a in arrays)
         run, output = _load(function, many_calls, plan, structure, shapes, folder)
         # NumPy's arrays are views of the program's own, and cheaper to work on
         return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
@@ -252,7 +252,7 @@ def _load(
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
     cache = Path(folder)
-    about = function.__module__, function.__qualname__, many_calls, repr(plan), str(structure), shapes
+    about = function.__module__, function.__qualname__, many_calls, repr(plan), str(structure), str(shapes)
     key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
     path = cache / "programs" / key.hex()
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]

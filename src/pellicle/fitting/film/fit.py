@@ -41,7 +41,7 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
-from pellicle.scene.free import free_leaves
+from pellicle.scene.free import free_leaves, remembered
 
 Film: TypeAlias = Spectrum | Colours | Sequence[Spectrum | Colours]
 """Measurements of one film."""
@@ -123,15 +123,17 @@ def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
     samples = [(*rest, x.material, x.plate_mm, x.roughness) for *rest, x in about]
     if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
         raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
-    for each in scenes:
-        check_free(each)
     names = [""] if isinstance(data, Spectrum | Colours) else labels(spectra)
-    return [
-        measured_colours(own, at, name) if isinstance(own, Colours) else measured(own, at, name)
-        for own, at, name in zip(spectra, scenes, names, strict=True)
+    targets = [
+        measured_colours(own, seen, name) if isinstance(own, Colours) else measured(own, seen, name)
+        for own, seen, name in zip(spectra, scenes, names, strict=True)
     ]
+    for target in targets:
+        check_free(target.scene)
+    return targets
 
 
+@remembered
 def check_free(scene: Scene) -> None:
     """Raise UsageError where a scene has nothing to fit."""
     if not free_leaves(scene):
