@@ -29,10 +29,9 @@ jax.config.update("jax_enable_x64", True)
 
 
 import pellicle as pl  # noqa: E402
-from pellicle.fitting.conclusion import linearised  # noqa: E402
+from pellicle.fitting.conclusion import linearised, neighbourhood  # noqa: E402
 from pellicle.fitting.film.fit import fitted  # noqa: E402
 from pellicle.fitting.film.parameters import parameters  # noqa: E402
-from pellicle.fitting.neighbourhood import neighbourhood  # noqa: E402
 from pellicle.fitting.profile_likelihood import interval  # noqa: E402
 from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.scene.free import insert  # noqa: E402

@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import pellicle as pl
-from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.conclusion import linearised, neighbourhood
 from pellicle.fitting.film.fit import fitted
-from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.progress import quiet
 

@@ -28,10 +28,9 @@ from pellicle.accuracy.registry import (
     measure_on_data,
     residual,
 )
-from pellicle.fitting.conclusion import linearised
+from pellicle.fitting.conclusion import linearised, neighbourhood
 from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import solve
-from pellicle.fitting.neighbourhood import neighbourhood
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Form
 from pellicle.fitting.profile_likelihood import interval
