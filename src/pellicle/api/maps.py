@@ -8,8 +8,7 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from pellicle.data.cubes.detect import is_photograph
-from pellicle.data.read_cube import read_cube
+from pellicle.data.read_cube import is_photograph, read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.photograph import ThicknessMap, map_photograph

@@ -189,7 +189,7 @@ def map(
 
     Example: pellicle map blade.png --recipe oxide.toml --strip 20,60,420,60 --out blade
     """
-    from pellicle.data.cubes.detect import is_photograph
+    from pellicle.data.read_cube import is_photograph
 
     described = film_recipe(recipe, "describes a surface, and a map needs the recipe of a film")
     run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()

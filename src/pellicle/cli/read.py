@@ -78,8 +78,8 @@ def _measurements(
     path: str, options: FileOptions, of_cube: CubeOnlyFlags
 ) -> list[Spectrum] | list[Colours] | list[Cube]:
     """Every spectrum of a file, the colours of every film in it, or its cube."""
-    from pellicle.data.cubes.detect import is_cube
     from pellicle.data.cubes.xarray_cubes import is_netcdf
+    from pellicle.data.read_cube import is_cube
 
     if of_cube.given() or is_cube(Path(path)) or Path(path).is_dir():
         return [_cube(path, options, of_cube)]

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.cubes import detect, xarray_cubes
-from pellicle.data.cubes.camera_frames import camera_frames
+from pellicle.data.cubes import envi, numpy_files, spectra_folder, tiff_stacks, xarray_cubes
 from pellicle.data.cubes.checks import (
     check_angles,
     check_level,
@@ -23,26 +22,42 @@ from pellicle.data.cubes.checks import (
     sample,
     sample_blocks,
 )
-from pellicle.data.cubes.numpy_files import arrays_to_raw
+from pellicle.data.cubes.frames import camera_frames, read_mask
 from pellicle.data.cubes.raw_cube import (
     ANGLE,
+    WAVELENGTH,
     Asked,
     PixelArray,
     RawCube,
     Scale,
     Share,
     Step,
+    Stored,
     value_scale,
 )
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
 from pellicle.data.photographs import image_format
 from pellicle.data.spectrum import POLARISATIONS
-from pellicle.errors import DataError, UsageError, install_command
+from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import noise_level
 
 log = getLogger(__name__)
 SIGNALS = ("R", "T", "psi-delta")
+LARGEST_SPECTRUM = 2**27
+"""Bytes of a larger HDF5 file are no spectrum's."""
+READ = "zarr, NetCDF, ENVI (.hdr), TIFF stacks, .npy, .npz, and folders of spectra with a table of file, x, y"
+READERS: dict[Callable[[Path], bool], Callable[[Path, Asked], RawCube]] = {
+    xarray_cubes.is_zarr: xarray_cubes.read_zarr,
+    Path.is_dir: spectra_folder.read_folder,
+    xarray_cubes.is_netcdf: xarray_cubes.read_netcdf,
+    numpy_files.is_numpy: numpy_files.read_numpy,
+    tiff_stacks.is_tiff: tiff_stacks.read_tiff,
+    envi.is_envi: envi.read_envi,
+    spectra_folder.is_table: spectra_folder.read_folder,
+}
+"""Readers of cubes by the test of a file or folder that they read; the first that holds is taken."""
 PathLike = str | os.PathLike[str]
+_FRAME_AXES = {1: (WAVELENGTH,), 2: ("x", WAVELENGTH), 3: ("y", "x", WAVELENGTH)}
 
 
 def read_cube(
@@ -118,7 +133,13 @@ def read_cube(
         raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
     frames = None
     if white_frame is not None:
-        frames, told = camera_frames(raw, nm, white_frame, dark_frame, white_reflectance, saturation)
+        if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
+            raise UsageError(
+                f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
+            )
+        white, dark = _raw_frame(white_frame, raw), dark_frame
+        dark = None if dark is None else _raw_frame(dark, raw)
+        frames, told = camera_frames(raw, nm, white, dark, white_reflectance, saturation)
         notes += told
     calibrated = raw.calibrated if calibrated is None else calibrated
     scale, told = value_scale(raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None)
@@ -156,9 +177,9 @@ def _raw(source: Any, asked: Asked) -> RawCube:
         path = str(source.encoding.get("source", "")) or f"the {type(source).__name__}"
         raw = xarray_cubes.xarray_to_raw(source, path, asked)
     elif isinstance(source, np.ndarray):
-        raw = arrays_to_raw({"": source}, "the array", asked, ())
+        raw = numpy_files.arrays_to_raw({"": source}, "the array", asked, ())
     elif isinstance(source, str | os.PathLike):
-        raw = detect.read_raw(Path(source), asked)
+        raw = read_raw(Path(source), asked)
     else:
         raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
     for stored in raw.arrays.values():
@@ -259,56 +280,61 @@ def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:
     return np.array([angle])
 
 
-def read_mask(mask: PathLike | np.ndarray, raw: RawCube) -> np.ndarray:
-    """Return True for the pixels to use (*pixels), where the mask is not zero and not NaN.
+def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
+    """The content of a frame for a cube. Raises DataError, or UsageError of a reader.
 
-    A mask of the last axes, as y and x of a series in time, applies to all of the first. Raises DataError for
-    another size, UsageError for what is no mask.
+    An array has the axes (bands), (x, bands) or (y, x, bands).
     """
-    if isinstance(mask, np.ndarray):
-        values, name = mask, "the mask"
-    else:
-        name = os.fspath(mask)
-        if name in raw.others:
-            stored = raw.others[name]
-            order = [stored.axes.index(axis) for axis in raw.dims if axis in stored.axes]
-            values = np.transpose(stored.read(), order)
-        else:
-            values = _mask_file(Path(name), raw)
-    used = values != 0
-    if values.dtype.kind == "f":
-        used &= ~np.isnan(values)
-    if used.shape != raw.shape[-used.ndim :]:
-        raise DataError(
-            f"{name}: has {' x '.join(map(str, used.shape))} pixels and {raw.path} has "
-            f"{' x '.join(map(str, raw.shape))}: the mask must have the same"
-        )
-    if not used.any():
-        raise DataError(f"{name}: masks every pixel: what is not zero is used")
-    return np.broadcast_to(used, raw.shape)
-
-
-def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
-    if not path.is_file():
-        known = f" or one of its variables {', '.join(map(repr, raw.others))}" if raw.others else ""
-        raise UsageError(f"`mask` {str(path)!r} is no file{known}: name a PNG, a TIFF or a .npy file")
-    if path.suffix.lower() == ".npy":
-        return np.load(path)
-    kind = image_format(path)
-    if kind is None:
-        raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
+    path = Path("the frame" if isinstance(frame, np.ndarray) else frame)
+    stored = path.is_file() and numpy_files.is_numpy(path) and path.suffix.lower() != ".npz"
+    if isinstance(frame, np.ndarray) or stored:
+        values: Any = frame if isinstance(frame, np.ndarray) else numpy_files.mapped_array(path)
+        rank, bands = len(values.shape), cube.wavelength.size
+        if rank not in _FRAME_AXES:
+            raise DataError(
+                f"{path}: a frame has the axes bands, x and bands, or y, x and bands, not {rank} axes"
+            )
+        axes = _FRAME_AXES[rank]
+        if rank == 3 and values.shape[0] == bands != values.shape[-1]:
+            axes = (WAVELENGTH, "y", "x")
+        dims = tuple(axis for axis in axes if axis != WAVELENGTH)
+        return RawCube(str(path), {"values": Stored(values, axes)}, dims, cube.wavelength)
     try:
-        if kind == "TIFF":
-            import tifffile
+        raw = read_raw(path, Asked())
+    except UsageError:  # it has no wavelengths of its own, or several variables
+        raw = read_raw(path, Asked(cube.wavelength, cube.unit))
+    comparable = raw.unit == cube.unit and raw.wavelength.shape == cube.wavelength.shape
+    if comparable and not np.allclose(raw.wavelength, cube.wavelength, 1e-4):
+        raise DataError(
+            f"{path}: the wavelengths of the frame differ from those of {cube.path}: record both with the "
+            "same settings of the camera"
+        )
+    return raw
 
-            values = tifffile.imread(path)
-        else:
-            from PIL import Image
 
-            with Image.open(path) as image:
-                values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
-    except ImportError as error:
-        raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
-    except Exception as error:  # decoders raise errors of every kind on damaged files
-        raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
-    return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)
+def read_raw(path: Path, asked: Asked) -> RawCube:
+    """Read the cube of a file or folder. Raises DataError or UsageError, one sentence."""
+    if not path.exists():
+        raise DataError(f"{path}: no such file or folder; check its name")
+    for recognises, read in READERS.items():
+        if recognises(path):
+            return read(path, asked)
+    raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+
+
+def is_cube(path: Path) -> bool:
+    """True for a file or folder that only a reader of cubes understands; HDF5 may also be a spectrum."""
+    read = next((read for recognises, read in READERS.items() if path.exists() and recognises(path)), None)
+    if read is spectra_folder.read_folder:
+        return spectra_folder.table_of(path) is not None
+    if read is tiff_stacks.read_tiff:
+        return not tiff_stacks.is_colour_image(path)
+    if read is xarray_cubes.read_netcdf:
+        return xarray_cubes.is_classic(path) or path.stat().st_size > LARGEST_SPECTRUM
+    return read is not None
+
+
+def is_photograph(path: Path) -> bool:
+    """True for a photograph in colours: PNG, JPEG, or a TIFF of one page in R, G, B or with a palette."""
+    kind = image_format(path) if path.is_file() else None
+    return tiff_stacks.is_colour_image(path) if kind == "TIFF" else kind is not None

@@ -5,8 +5,7 @@ import sys
 import numpy as np
 import tifffile
 
-from pellicle.data.cubes.detect import is_photograph
-from pellicle.data.read_cube import read_cube
+from pellicle.data.read_cube import is_photograph, read_cube
 from pellicle.errors import DataError, UsageError
 
 NM = np.linspace(400.0, 800.0, 9)

@@ -1,4 +1,4 @@
-"""Reflectance from the counts of a camera, with frames of a white reference and of the dark.
+"""Images beside a cube: frames of a camera, which make reflectance of its counts, and masks of pixels.
 
 R = (raw − dark) / (white − dark) · R_white, block by block. A frame is an image of every pixel (y, x, bands),
 a line of a pushbroom camera (x, bands), the mean of several such lines, or one spectrum (bands).
@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.detect import read_raw
-from pellicle.data.cubes.numpy_files import is_numpy, mapped_array
-from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
+from pellicle.data.cubes.raw_cube import WAVELENGTH, RawCube, Stored
+from pellicle.data.photographs import image_format
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import DataError, UsageError, install_command
 from pellicle.signals.limits import HIGHEST
 
-_AXES = {1: (WAVELENGTH,), 2: ("x", WAVELENGTH), 3: ("y", "x", WAVELENGTH)}
 _BLOCK = 64
 """Lines that are averaged at a time."""
 _DEPTHS = (8, 10, 12, 14, 16)
@@ -53,17 +51,18 @@ class CameraFrames:
 
 
 def camera_frames(
-    raw: RawCube, nm: np.ndarray, white: Any, dark: Any, reflectance: Any, saturation: float | None
+    raw: RawCube,
+    nm: np.ndarray,
+    white: RawCube,
+    dark: RawCube | None,
+    reflectance: Any,
+    saturation: float | None,
 ) -> tuple[CameraFrames, list[str]]:
     """Return the frames of a cube whose bands are at `nm`, and notes on them.
 
-    `white` and `dark` are files or arrays, `reflectance` of the white a number, a CSV or a function of the
-    wavelength. Raises DataError or UsageError.
+    `reflectance` of the white is a number, a CSV or a function of the wavelength. Raises DataError or
+    UsageError.
     """
-    if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
-        raise UsageError(
-            f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
-        )
     bright, note = _frame(white, raw, "white")
     notes, black = [note], None
     if dark is None:
@@ -83,41 +82,8 @@ def camera_frames(
     return CameraFrames(bright, black, _white_reflectance(reflectance, nm, raw.path), saturation), notes
 
 
-def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
-    """The content of a frame for a cube. Raises DataError, or UsageError of a reader.
-
-    An array has the axes (bands), (x, bands) or (y, x, bands).
-    """
-    path = Path("the frame" if isinstance(frame, np.ndarray) else frame)
-    stored = path.is_file() and is_numpy(path) and path.suffix.lower() != ".npz"
-    if isinstance(frame, np.ndarray) or stored:
-        values: Any = frame if isinstance(frame, np.ndarray) else mapped_array(path)
-        rank, bands = len(values.shape), cube.wavelength.size
-        if rank not in _AXES:
-            raise DataError(
-                f"{path}: a frame has the axes bands, x and bands, or y, x and bands, not {rank} axes"
-            )
-        axes = _AXES[rank]
-        if rank == 3 and values.shape[0] == bands != values.shape[-1]:
-            axes = (WAVELENGTH, "y", "x")
-        dims = tuple(axis for axis in axes if axis != WAVELENGTH)
-        return RawCube(str(path), {"values": Stored(values, axes)}, dims, cube.wavelength)
-    try:
-        raw = read_raw(path, Asked())
-    except UsageError:  # it has no wavelengths of its own, or several variables
-        raw = read_raw(path, Asked(cube.wavelength, cube.unit))
-    comparable = raw.unit == cube.unit and raw.wavelength.shape == cube.wavelength.shape
-    if comparable and not np.allclose(raw.wavelength, cube.wavelength, 1e-4):
-        raise DataError(
-            f"{path}: the wavelengths of the frame differ from those of {cube.path}: record both with the "
-            "same settings of the camera"
-        )
-    return raw
-
-
-def _frame(given: Any, cube: RawCube, name: str) -> tuple[Stored, str]:
+def _frame(raw: RawCube, cube: RawCube, name: str) -> tuple[Stored, str]:
     """A frame for the pixels of a cube, and a note on its form. Raises DataError for another size."""
-    raw = _raw_frame(given, cube)
     frame, whole = raw.arrays["values"], cube.arrays["values"].sizes
     sizes, bands = frame.sizes, whole.pop(WAVELENGTH)
     if sizes[WAVELENGTH] != bands:
@@ -175,3 +141,58 @@ def _white_reflectance(reflectance: Any, nm: np.ndarray, path: str) -> np.ndarra
             "as in 0.99"
         )
     return values
+
+
+def read_mask(mask: str | os.PathLike[str] | np.ndarray, raw: RawCube) -> np.ndarray:
+    """Return True for the pixels to use (*pixels), where the mask is not zero and not NaN.
+
+    A mask of the last axes, as y and x of a series in time, applies to all of the first. Raises DataError for
+    another size, UsageError for what is no mask.
+    """
+    if isinstance(mask, np.ndarray):
+        values, name = mask, "the mask"
+    else:
+        name = os.fspath(mask)
+        if name in raw.others:
+            stored = raw.others[name]
+            order = [stored.axes.index(axis) for axis in raw.dims if axis in stored.axes]
+            values = np.transpose(stored.read(), order)
+        else:
+            values = _mask_file(Path(name), raw)
+    used = values != 0
+    if values.dtype.kind == "f":
+        used &= ~np.isnan(values)
+    if used.shape != raw.shape[-used.ndim :]:
+        raise DataError(
+            f"{name}: has {' x '.join(map(str, used.shape))} pixels and {raw.path} has "
+            f"{' x '.join(map(str, raw.shape))}: the mask must have the same"
+        )
+    if not used.any():
+        raise DataError(f"{name}: masks every pixel: what is not zero is used")
+    return np.broadcast_to(used, raw.shape)
+
+
+def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
+    if not path.is_file():
+        known = f" or one of its variables {', '.join(map(repr, raw.others))}" if raw.others else ""
+        raise UsageError(f"`mask` {str(path)!r} is no file{known}: name a PNG, a TIFF or a .npy file")
+    if path.suffix.lower() == ".npy":
+        return np.load(path)
+    kind = image_format(path)
+    if kind is None:
+        raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
+    try:
+        if kind == "TIFF":
+            import tifffile
+
+            values = tifffile.imread(path)
+        else:
+            from PIL import Image
+
+            with Image.open(path) as image:
+                values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
+    except ImportError as error:
+        raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
+    except Exception as error:  # decoders raise errors of every kind on damaged files
+        raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
+    return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)
