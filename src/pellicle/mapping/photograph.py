@@ -81,50 +81,48 @@ def map_photograph(
     transmitted = scene.light.signal == "T"
     seen = sight(Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted), space)
     reference, notes = white_reference(photograph, seen.coding, white)
-    chosen = _along(photograph, seen, strip) if strip is not None else _inside(photograph, seen, region)
-    exposed = chosen.linear / reference
+    linear, position, where, note = _chosen(photograph, seen, strip, region)
+    exposed = linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise
-    told = [*photograph.notes, *seen.notes, *notes, chosen.note, f"noise {sigma:.2g} of each channel"]
+    told = [*photograph.notes, *seen.notes, *notes, note, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
         told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
     spread = np.full(3, sigma)
     if space == "rgb":  # a camera's channels are linear, with the σ of their median
-        middle = np.maximum(np.median(chosen.linear.reshape(-1, 3), axis=0), 1e-3)
+        middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
         spread = sigma * gamma * middle ** (1 - 1 / gamma)
     inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread)
     films = inverse(coded if space == "srgb" else exposed, ORDERS)
-    about = chosen.where, space, tuple(told), photograph.path, photograph.sha256
-    return ThicknessMap(coded, _fitted(inverse, films, seen), films, chosen.position, *about)
+    about = where, space, tuple(told), photograph.path, photograph.sha256
+    # coded colours of the most probable thicknesses, at their exposures
+    best, exposure = films.thickness[..., 0], films.exposure[..., 0]
+    channels = [np.interp(best, inverse.thickness, column) for column in inverse.channels[:, 0].T]
+    fitted = np.stack(channels, axis=-1) * exposure[..., None]
+    fitted = seen.coding.encode(fitted, seen.coding.roots(fitted))
+    return ThicknessMap(coded, fitted, films, position, *about)
 
 
-class _Chosen(NamedTuple):
-    """Linear channels of the chosen positions, where they are, and a note on them."""
+def _chosen(
+    photograph: Photograph, seen: Sight, strip: Any, region: Any
+) -> tuple[np.ndarray, np.ndarray | None, str, str]:
+    """Linear channels of a strip, means across it, or of a rectangle, by default the whole photograph.
 
-    linear: np.ndarray
-    position: np.ndarray | None
-    where: str
-    note: str
-
-
-def _along(photograph: Photograph, seen: Sight, ends: Any) -> _Chosen:
-    """Means across a strip. Raises UsageError for ends outside the photograph."""
-    taken = strip_of(photograph, ends)
-    where = ends if isinstance(ends, str) else ",".join(map(str, ends))
-    linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
-    note = f"strip {where}: {len(linear)} positions, means of {taken.pixels.shape[1]} pixels"
-    return _Chosen(linear, taken.position, where, note)
-
-
-def _inside(photograph: Photograph, seen: Sight, region: Any) -> _Chosen:
-    """Pixels of a rectangle, by default the whole photograph. Raises UsageError for one outside."""
+    Also their positions along the strip, where they are, and a note on them. Raises UsageError for those
+    outside.
+    """
+    if strip is not None:
+        taken = strip_of(photograph, strip)
+        where = strip if isinstance(strip, str) else ",".join(map(str, strip))
+        linear = seen.coding.decoded(taken.pixels).mean(axis=1, dtype=float)
+        note = f"strip {where}: {len(linear)} positions, means of {taken.pixels.shape[1]} pixels"
+        return linear, taken.position, where, note
     box, *others = [Region(0, 0, *photograph.size)] if region is None else parse_regions(region)
     if others:
         raise UsageError("`region` of a map must be one rectangle")
     pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
-    note = f"region {box}: {box.width * box.height} pixels"
-    return _Chosen(seen.coding.decoded(pixels), None, str(box), note)
+    return seen.coding.decoded(pixels), None, str(box), f"region {box}: {box.width * box.height} pixels"
 
 
 def _inverse(
@@ -141,12 +139,3 @@ def _inverse(
     exposure = EXPOSURE if isinstance(scale, Drift) else float(getattr(scale, "start", scale))
     coding = "srgb" if space == "srgb" else "xyz"
     return ColourInverse.build(table, angle, space=coding, sigma=spread, exposure=exposure)
-
-
-def _fitted(inverse: ColourInverse, films: ColourThickness, seen: Sight) -> np.ndarray:
-    """Coded colours of the most probable thicknesses, at their exposures."""
-    best, exposure = films.thickness[..., 0], films.exposure[..., 0]
-    columns = inverse.channels[:, 0].T
-    channels = np.stack([np.interp(best, inverse.thickness, column) for column in columns], axis=-1)
-    exposed = channels * exposure[..., None]
-    return seen.coding.encode(exposed, seen.coding.roots(exposed))

@@ -148,6 +148,13 @@ def in_nm(
             + (f" and looks like {' or '.join(likely)}" if likely else "")
             + "; state their unit with `wavelength_unit`"
         )
+    _refuse_repeated(nm, path)
+    shown = shown or unit or "nm, assumed"
+    notes = [f"wavelength unit: {shown}" + ("" if shown.startswith("nm") else ", converted to nm")]
+    return nm, notes + ["bands sorted by wavelength"] * bool(np.any(np.diff(nm) < 0))
+
+
+def _refuse_repeated(nm: np.ndarray, path: str) -> None:
     order = np.argsort(nm, kind="stable")
     same = np.flatnonzero(np.diff(nm[order]) <= 1e-9 * nm.max())
     if same.size:
@@ -156,9 +163,6 @@ def in_nm(
             f"{path}: bands {first + 1} and {second + 1} have the same wavelength, {nm[first]:.6g} nm: "
             "correct it, or give `wavelengths`"
         )
-    shown = shown or unit or "nm, assumed"
-    notes = [f"wavelength unit: {shown}" + ("" if shown.startswith("nm") else ", converted to nm")]
-    return nm, notes + ["bands sorted by wavelength"] * bool(np.any(np.diff(nm) < 0))
 
 
 def chosen_bands(
@@ -173,12 +177,22 @@ def chosen_bands(
     if range is not None:
         used &= (nm >= range[0]) & (nm <= range[1])
     if good is not None and not np.all(good):
-        used &= np.asarray(good, bool)
-        notes.append(f"{int(np.sum(~np.asarray(good, bool)))} bands left out, which the file marks as bad")
+        used &= good
+        notes.append(f"{int(np.sum(~good))} bands left out, which the file marks as bad")
     if without is not None:
         dead = np.zeros(nm.size, bool)
         step = np.median(np.abs(np.diff(nm))) if nm.size > 1 else 1.0
-        for low, high in _intervals(without):
+        intervals = without
+        if isinstance(without, str):
+            try:
+                edges = [[float(x) for x in word.rstrip(":").split(":", 1)] for word in without.split(",")]
+            except ValueError:
+                raise UsageError(
+                    "`without_bands` must be wavelengths in nm, LO:HI or single ones, as in 755:775,820, not "
+                    f"{without!r}"
+                ) from None
+            intervals = [(edge[0], edge[-1]) for edge in edges]
+        for low, high in intervals:
             inside = (nm >= low) & (nm <= high)
             if low == high:
                 nearest = np.abs(nm - low)
@@ -197,22 +211,6 @@ def chosen_bands(
         )
     order = np.argsort(nm, kind="stable")
     return order[used[order]], notes
-
-
-def _intervals(without: str | Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    if not isinstance(without, str):
-        return [(float(low), float(high)) for low, high in without]
-    intervals = []
-    try:
-        for word in without.split(","):
-            low, _, high = word.partition(":")
-            intervals.append((float(low), float(high or low)))
-    except ValueError:
-        raise UsageError(
-            "`without_bands` must be wavelengths in nm, LO:HI or single ones, as in 755:775,820, not "
-            f"{without!r}"
-        ) from None
-    return intervals
 
 
 def sample_blocks(sizes: tuple[int, ...], points: int) -> Iterator[tuple[slice, ...]]:
@@ -239,16 +237,13 @@ def sample(arrays: Mapping[str, Any], rank: int, mask: np.ndarray | None = None)
     seen = _read(arrays, mask, list(sample_blocks(sizes, points)), shape[rank:])
     if int(np.prod(sizes)) * points <= WHOLE:
         return seen
-    lines = itertools.product(*(range(n) for n in sizes[:-1]))
-    while not _measured(seen) and (line := next(lines, None)):
+    for line in itertools.product(*(range(n) for n in sizes[:-1])):
+        values = next(iter(seen.values()))
+        if np.any(np.isfinite(values) & (values != 0)):
+            break
         where = (*(slice(i, i + 1) for i in line), slice(None))
         seen = _read(arrays, mask, [where], shape[rank:])
     return seen
-
-
-def _measured(seen: Mapping[str, np.ndarray]) -> bool:
-    values = next(iter(seen.values()))
-    return bool(np.any(np.isfinite(values) & (values != 0)))
 
 
 def _read(

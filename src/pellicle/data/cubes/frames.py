@@ -75,7 +75,10 @@ def camera_frames(
         notes.append(f"counts from {saturation:g} are saturated, as given")
     elif kind.kind in "ui":  # the limit of another camera is not known
         saturation = float(np.iinfo(kind).max)
-        largest = _largest(bright)
+        sizes = bright.sizes
+        first = max((axis for axis in sizes if axis != WAVELENGTH), key=sizes.__getitem__, default=WAVELENGTH)
+        lines = np.unique(np.linspace(0, sizes[first] - 1, _BLOCK).astype(int))  # a sample of the frame
+        largest = max(float(np.max(bright.read({first: slice(i, i + 1)}))) for i in lines)
         if largest < saturation and largest in (2.0**bits - 1 for bits in _DEPTHS):
             saturation = largest
         notes.append(f"counts from {saturation:g} are saturated")
@@ -113,14 +116,6 @@ def _frame(raw: RawCube, cube: RawCube, name: str) -> tuple[Stored, str]:
         f"{' x '.join(map(str, cube.shape))}: it must be an image of the same size, a line of as many x, or "
         "one spectrum"
     )
-
-
-def _largest(frame: Stored) -> float:
-    """The largest count in a sample of the frame."""
-    sizes = frame.sizes
-    first = max((axis for axis in sizes if axis != WAVELENGTH), key=sizes.__getitem__, default=WAVELENGTH)
-    lines = np.unique(np.linspace(0, sizes[first] - 1, _BLOCK).astype(int))
-    return max(float(np.max(frame.read({first: slice(i, i + 1)}))) for i in lines)
 
 
 def _white_reflectance(reflectance: Any, nm: np.ndarray, path: str) -> np.ndarray:

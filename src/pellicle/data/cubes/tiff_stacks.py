@@ -43,7 +43,13 @@ def read_tiff(path: Path, asked: Asked) -> RawCube:
         raise DataError(f"{path}: the TIFF cannot be read ({reason}); save it again") from None
     if wavelength is None:
         raise need_wavelengths(data.shape, str(path))
-    axes, told = _axes(data.shape, letters, wavelength.size, str(path))
+    # rows, columns and time as the file states them, the axis of the bands by its length
+    rest = [n for n, letter in zip(data.shape, letters, strict=True) if letter not in _NAMES]
+    pages = letters[0] in "QI" and len(data.shape) == 3 and wavelength.size != data.shape[0]
+    if {"Y", "X"} <= set(letters) and not pages and rest == [wavelength.size]:
+        axes, told = tuple(_NAMES.get(letter, "wavelength") for letter in letters), []
+    else:
+        axes, told = array_axes(data.shape, wavelength.size, str(path))
     return RawCube(
         str(path),
         {"values": Stored(data, axes)},
@@ -107,15 +113,6 @@ def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
     dtype = dtype.newbyteorder(file.byteorder)
     mapped = MappedFile(str(path), dtype, tuple(shape[i] for i in kept), int(first.dataoffset))
     return mapped, "".join(letters[i] for i in kept)
-
-
-def _axes(shape: tuple[int, ...], letters: str, bands: int, path: str) -> tuple[tuple[str, ...], list[str]]:
-    """Names of the axes: rows, columns and time as the file states them, that of the bands by its length."""
-    rest = [n for n, letter in zip(shape, letters, strict=True) if letter not in _NAMES]
-    pages = letters[0] in "QI" and len(shape) == 3 and bands != shape[0]
-    if not {"Y", "X"} <= set(letters) or pages or rest != [bands]:
-        return array_axes(shape, bands, path)
-    return tuple(_NAMES.get(letter, "wavelength") for letter in letters), []
 
 
 def _channel_wavelengths(file: Any) -> tuple[np.ndarray | None, str]:
