@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pellicle as pl
-from pellicle.reporting.rendering_display import display
+from pellicle.reporting.renderings import display
 from pellicle.simulation.environment import one_lamp
 from pellicle.simulation.surface_sphere import in_plane, render
 

@@ -25,7 +25,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour, lab
-from pellicle.reporting.rendering_display import display
+from pellicle.reporting.renderings import display
 from pellicle.simulation.surface_sphere import render
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single

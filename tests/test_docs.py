@@ -16,7 +16,7 @@ import jsonschema
 import pytest
 
 from pellicle.cli import app, main
-from pellicle.reporting import sphere_figures
+from pellicle.reporting import renderings
 
 ROOT = Path(__file__).parents[1]
 _PATHS = [
@@ -221,9 +221,9 @@ def run_command(monkeypatch, capsys):
     Spheres are drawn with 64 pixels across, not 260 or 420: rendering them takes most of the time.
     """
     for name in ("render", "ball", "bubble"):
-        drawn = getattr(sphere_figures, name)
+        drawn = getattr(renderings, name)
         small = lambda *arguments, drawn=drawn: drawn(*arguments[:-1], 64)  # noqa: E731
-        monkeypatch.setattr(sphere_figures, name, small)
+        monkeypatch.setattr(renderings, name, small)
 
     def run(command):
         monkeypatch.setattr(sys, "argv", shlex.split(command))

@@ -13,7 +13,7 @@ from PIL import Image
 import pellicle as pl
 from pellicle.colour import lab, sensor
 from pellicle.explorer.session import Session
-from pellicle.reporting.rendering_display import display, exposure
+from pellicle.reporting.renderings import display, exposure
 from pellicle.simulation.environment import studio
 from pellicle.simulation.film_sphere import ball, stack
 

@@ -12,9 +12,9 @@ from pellicle.fitting.curves import Index
 from pellicle.fitting.reported_layer import principal_indices
 from pellicle.materials import material
 from pellicle.reporting.figures import draw_fit as draw
+from pellicle.reporting.figures import of_index
 from pellicle.reporting.fit_tables import nk_csvs
 from pellicle.reporting.fit_text import report
-from pellicle.reporting.page.figures import of_index
 
 NM = np.linspace(400.0, 800.0, 41)
 

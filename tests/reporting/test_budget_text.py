@@ -6,8 +6,7 @@ from dataclasses import replace
 import pytest
 
 from pellicle.fitting.result import SystematicEffect
-from pellicle.reporting.fit_text import report
-from pellicle.reporting.parameter_text import budget
+from pellicle.reporting.fit_text import budget, report
 
 
 def effect(name, change, uncertainty=0.5, unit="nm"):

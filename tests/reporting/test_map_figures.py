@@ -5,9 +5,9 @@ import pytest
 
 from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.reporting import map_panels
-from pellicle.reporting.map_axes import Axis, MapAxes
 from pellicle.reporting.map_figures import figures
 from pellicle.reporting.map_panels import COLOURS, HATCHES, overlay
+from pellicle.reporting.map_places import Axis, MapAxes
 from tests.reporting.test_map_text import made as described
 
 pytest.importorskip("xarray")

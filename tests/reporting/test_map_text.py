@@ -8,8 +8,7 @@ import pytest
 
 from pellicle.mapping.map_result import Run
 from pellicle.mapping.pixels.results import CODES, STATUSES
-from pellicle.reporting.map_axes import map_axes
-from pellicle.reporting.map_places import place
+from pellicle.reporting.map_places import map_axes, place
 from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report, share
 

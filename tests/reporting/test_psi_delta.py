@@ -6,9 +6,9 @@ import numpy as np
 
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.reporting.figures import draw_fit as draw
+from pellicle.reporting.figures import of_part
 from pellicle.reporting.fit_tables import fit_csv
 from pellicle.reporting.matplotlib_figure import save_figure
-from pellicle.reporting.page.figures import of_part
 
 
 def labels(drawn) -> list[str]:

@@ -128,7 +128,7 @@ def _objects(
         raise UsageError("methods are compared on one layer under D65: leave out the other flags")
     start()
     if view == "methods":
-        from pellicle.reporting.sphere_figures import draw_methods
+        from pellicle.reporting.renderings import draw_methods
 
         for method in draw_methods(scene, out, nm, title):
             say(
@@ -136,13 +136,13 @@ def _objects(
                 f" {method.delta_e.max():.2g} at most, {method.seconds * 1e9:.0f} ns a colour"
             )
     elif view == "bubble":
-        from pellicle.reporting.sphere_figures import bubbles
+        from pellicle.reporting.renderings import bubbles
 
         bubbles(
             scene, out, [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)], layer, title, **eye
         )
     else:
-        from pellicle.reporting.sphere_figures import balls
+        from pellicle.reporting.renderings import balls
 
         balls(scene, out, [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)], layer, title, **eye)
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
@@ -158,7 +158,7 @@ def _surface(recipe: SurfaceRecipe, out: str, flags: SphereFlags, none_of_films:
         raise UsageError(f"--light must lie in 0 to 180 degrees, got {flags.light:g}")
     surface = recipe.scene()
     start()
-    from pellicle.reporting.sphere_figures import sphere
+    from pellicle.reporting.renderings import sphere
 
     sphere(surface, out, flags.light, Path(recipe.path).stem, environment=flags.environment)
     say(f"{out}: a sphere of {surface.model}, the main lamp {flags.light:g} degrees from the line of sight")

@@ -51,12 +51,12 @@ def export(
     described = _described(film, recipe)
     start()
     from pellicle.api.simulations import export as export_scene
-    from pellicle.reporting.export_text import text
+    from pellicle.reporting.renderings import export_text
 
     written = export_scene(
         described, to=to, path=out, numbers=numbers, thickness_map=thickness_map, layer=layer
     )
-    show({"target": to} | written.material.record() if json else text(written))
+    show({"target": to} | written.material.record() if json else export_text(written))
     say(f"{', '.join(str(path) for path in written.files)} written")
     return 0
 

@@ -18,7 +18,7 @@ from pellicle.fitting.curves import Curve as FittedCurve
 from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
 from pellicle.reporting import fit_text
-from pellicle.reporting.rendering_display import display, encode, exposure
+from pellicle.reporting.renderings import display, encode, exposure
 from pellicle.signals.base import Quantity
 from pellicle.simulation.environment import Sphere, sphere, studio
 

@@ -14,7 +14,7 @@ from pellicle.explorer.answers import png
 from pellicle.explorer.controls import Control, Structure
 from pellicle.explorer.programs import Curve
 from pellicle.forward_model.plan import Plan
-from pellicle.reporting.rendering_display import display
+from pellicle.reporting.renderings import display
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface, surface_view
 from pellicle.simulation.brdf import default_directions

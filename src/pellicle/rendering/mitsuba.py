@@ -41,28 +41,9 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
 
     An uneven film has no `.bsdf`, whose directions are those of one thickness.
     """
-    look, stem = material.look, path.with_suffix("")
+    look, uneven = material.look, material.thickness_map is not None
     alpha = look.roughness if look.roughness > 0 else ALPHA
-    names = {
-        "rgb": path.with_suffix(".bsdf"),
-        "spectral": stem.with_name(f"{stem.name}_spectral.bsdf"),
-        "lookup": path.with_suffix(".npz"),
-        "map": stem.with_name(f"{stem.name}_thickness.png"),
-        "plugin": path.with_name(f"{PLUGIN}.py"),
-        "measured": path.with_suffix(".xml"),
-        "scene": stem.with_name(f"{stem.name}_lookup.xml"),
-    }
-    uneven = material.thickness_map is not None
-    if path.suffix.lower() == ".bsdf":
-        if uneven:
-            raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
-        written = ["rgb", "spectral"]
-    elif uneven:
-        names["scene"] = names["measured"]
-        written = ["lookup", "map", "plugin", "scene"]
-    else:
-        written = ["rgb", "spectral", "lookup", "plugin", "measured", "scene"]
-    chosen = {key: names[key] for key in written}
+    chosen = _paths(path, uneven)
     for key, file in chosen.items():
         if file.exists() and key != "plugin":  # the same for every film
             raise UsageError(f"{file}: exists and is not overwritten; choose another `path` or remove it")
@@ -88,10 +69,36 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
         }
         write_text(chosen["scene"], _scene(scene))
     if "measured" in chosen:
-        note = f"mitsuba -m scalar_rgb {path.name}; in spectral variants -D table={names['spectral'].name}"
+        note = f"mitsuba -m scalar_rgb {path.name}; in spectral variants -D table={chosen['spectral'].name}"
         scene = {"comment": note, "measured": True, "table": chosen["rgb"].name}
         write_text(chosen["measured"], _scene(scene))
     return tuple(chosen.values())
+
+
+def _paths(path: Path, uneven: bool) -> dict[str, Path]:
+    """The files that are written, by what they are."""
+    stem = path.with_suffix("")
+    paths = {
+        "rgb": path.with_suffix(".bsdf"),
+        "spectral": stem.with_name(f"{stem.name}_spectral.bsdf"),
+        "lookup": path.with_suffix(".npz"),
+        "plugin": path.with_name(f"{PLUGIN}.py"),
+        "measured": path.with_suffix(".xml"),
+        "scene": stem.with_name(f"{stem.name}_lookup.xml"),
+    }
+    if path.suffix.lower() == ".bsdf":
+        if uneven:
+            raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
+        return {key: paths[key] for key in ("rgb", "spectral")}
+    if uneven:
+        image = stem.with_name(f"{stem.name}_thickness.png")
+        return {
+            "lookup": paths["lookup"],
+            "map": image,
+            "plugin": paths["plugin"],
+            "scene": paths["measured"],
+        }
+    return paths
 
 
 def _scene(content: Mapping[str, Any]) -> str:

@@ -1,25 +1,21 @@
 """Report, JSON record, page and folder of a comparison of recipes."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
-from pellicle.files import MARKER, new_folder, write_text
+from pellicle.files import new_folder
+from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.status import describe
+from pellicle.reporting import figures
 from pellicle.reporting.folders import PAGE, REPORT, folder_per_file, write_fit
-from pellicle.reporting.json_record import indented, versions
+from pellicle.reporting.json_record import taken, versions, write_result
 from pellicle.reporting.json_record import to_json as fit_to_json
-from pellicle.reporting.page import figures
 from pellicle.reporting.page.document import page
 from pellicle.reporting.page.fit_page import MOST_FIGURES, TONES
 from pellicle.reporting.plain_text import INDENT, block, table, wrapped
-
-if TYPE_CHECKING:
-    from pellicle.fitting.comparison import Candidate, Comparison
 
 SCHEMA = "pellicle.compare/1"
 _SHOWN = 5
@@ -35,20 +31,15 @@ def report(comparison: Comparison) -> str:
     data = f"{names}: {points} points, worth {comparison.effective_points:.3g} independent ones"
     rows = [("", "recipe", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status")]
     rows += [
-        (
-            "*" if c is best else "",
-            c.name,
-            f"{c.bic - best.bic:.1f}",
-            f"{c.aic - best.aic:.1f}",
-            str(c.free),
-            f"{c.fit.chi2_reduced:.3g}",
-            "" if c.fit.rms is None else f"{c.fit.rms:.3g}",
-            c.fit.status,
-        )
+        ("*" if c is best else "", c.name, *_criteria(c, best, 3), c.fit.status)
         for c in comparison.candidates
     ]
     note = f"{INDENT}* the recipe of least BIC; ΔBIC and ΔAIC are relative to it"
-    fits = [line for c in comparison.candidates for line in wrapped(_fit(c), "", "  ")]
+    fits = []
+    for c in comparison.candidates:
+        values, more = _leading(c, _SHOWN)
+        values += f" and {more} more" if more else ""
+        fits += wrapped(f"{c.name}: {values}. {c.fit.verdict}", "", "  ")
     return (
         block("Verdict", [*wrapped(comparison.verdict), *wrapped(data)])
         + block("Comparison", [*table(rows), "", note])
@@ -56,33 +47,37 @@ def report(comparison: Comparison) -> str:
     )
 
 
-def _fit(c: Candidate) -> str:
-    """The leading parameters of a fit and its verdict."""
-    leading = [p for p in c.fit.free if not p.name.startswith("instrument.")]
-    more = len(leading) - _SHOWN
-    values = ", ".join(describe(p) for p in leading[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
-    return f"{c.name}: {values}. {c.fit.verdict}"
+def _criteria(c: Candidate, best: Candidate, digits: int) -> tuple[str, ...]:
+    """Texts of ΔBIC, ΔAIC, number of free parameters, reduced χ² and rms."""
+    rms = "" if c.fit.rms is None else f"{c.fit.rms:.{digits}g}"
+    chi2 = f"{c.fit.chi2_reduced:.{digits}g}"
+    return f"{c.bic - best.bic:.1f}", f"{c.aic - best.aic:.1f}", str(c.free), chi2, rms
+
+
+def _leading(c: Candidate, most: int) -> tuple[str, int]:
+    """The first parameters of a fit in words, without those of the instrument, and the number of others."""
+    free = [p for p in c.fit.free if not p.name.startswith("instrument.")]
+    return ", ".join(describe(p) for p in free[:most]), max(len(free) - most, 0)
 
 
 def to_json(comparison: Comparison) -> dict[str, Any]:
     """Convert a comparison to dictionaries: the criteria of every recipe and the record of its fit."""
-    best = comparison.best
+    best, recipes = comparison.best, []
+    keys = ("status", "verdict", "parameters", "chi2_reduced", "rms", "rivals", "warnings", "seconds")
+    for c in comparison.candidates:
+        record = fit_to_json(c.fit)
+        criteria = {"delta_aic": c.aic - best.aic, "delta_bic": c.bic - best.bic}
+        recipes.append({"recipe": c.name, **taken(c, "free", "aic", "bic"), **criteria})
+        recipes[-1] |= {key: record[key] for key in keys}
     return {
         "schema": SCHEMA,
         "data": fit_to_json(best.fit)["data"],
         "best": best.name,
         "verdict": comparison.verdict,
         "effective_points": comparison.effective_points,
-        "recipes": [_candidate(c, best) for c in comparison.candidates],
+        "recipes": recipes,
         "versions": versions(),
     }
-
-
-def _candidate(c: Candidate, best: Candidate) -> dict[str, Any]:
-    record = fit_to_json(c.fit)
-    keys = ("status", "verdict", "parameters", "chi2_reduced", "rms", "rivals", "warnings", "seconds")
-    criteria = {"aic": c.aic, "bic": c.bic, "delta_aic": c.aic - best.aic, "delta_bic": c.bic - best.bic}
-    return {"recipe": c.name, "free": c.free, **criteria, **{key: record[key] for key in keys}}
 
 
 def failure(path: str, error: str) -> dict[str, Any]:
@@ -100,11 +95,9 @@ def write_comparison(folder: str | os.PathLike[str], comparison: Comparison) -> 
     folders = folder_per_file(target, [c.name for c in comparison.candidates])
     for c, own in zip(comparison.candidates, folders, strict=True):
         write_fit(own, c.fit)
-    write_text(target / MARKER, indented(to_json(comparison)), overwrite=True)
-    write_text(target / REPORT, report(comparison), overwrite=True)
     links = [(own / PAGE).relative_to(target).as_posix() for own in folders]
-    write_text(target / PAGE, comparison_page(comparison, links), overwrite=True)
-    return target
+    contents = {REPORT: report(comparison), PAGE: comparison_page(comparison, links)}
+    return write_result(target, to_json(comparison), contents)
 
 
 _MOST_PARAMETERS = 6
@@ -122,10 +115,20 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
     curves = [(c.name, c.fit) for c in others]
     parts = range(min(len(best.fit.parts), MOST_FIGURES))
     drawn = [figures.of_candidates(best.fit, curves, i) for i in parts]
-    rows = [
-        _row(c, best, None if c is best else others.index(c), link)
-        for c, link in zip(comparison.candidates, pages, strict=True)
-    ]
+    rows = []
+    for c, link in sorted(zip(comparison.candidates, pages, strict=True), key=lambda pair: pair[0].bic):
+        values, more = _leading(c, _MOST_PARAMETERS)
+        row = {
+            "name": c.name,
+            "link": None if link is None else quote(link),
+            "number": None if c is best else others.index(c),  # of its curve among those that can be shown
+            "status": c.fit.status,
+            "tone": TONES[c.fit.status],
+            "cells": _criteria(c, best, 4),
+            "parameters": values + (", ..." if more else ""),
+            "verdict": c.fit.verdict,
+        }
+        rows.append(row)
     return page(
         "comparison.html",
         f"{len(rows)} recipes compared",
@@ -135,28 +138,5 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
         best=best.name,
         verdict=comparison.verdict,
         points=f"{comparison.effective_points:.3g}",
-        rows=sorted(rows, key=lambda row: row["bic"]),
+        rows=rows,
     )
-
-
-def _row(c: Candidate, best: Candidate, number: int | None, link: str | None) -> dict[str, Any]:
-    """Cells of one recipe; `number` is that of its curve among those that can be shown, None for the best."""
-    free = [p for p in c.fit.free if not p.name.startswith("instrument.")]
-    told = ", ".join(describe(p) for p in free[:_MOST_PARAMETERS])
-    return {
-        "name": c.name,
-        "link": None if link is None else quote(link),
-        "number": number,
-        "status": str(c.fit.status),
-        "tone": TONES[c.fit.status],
-        "bic": c.bic - best.bic,
-        "cells": [
-            f"{c.bic - best.bic:.1f}",
-            f"{c.aic - best.aic:.1f}",
-            str(c.free),
-            f"{c.fit.chi2_reduced:.4g}",
-            "" if c.fit.rms is None else f"{c.fit.rms:.4g}",
-        ],
-        "parameters": told + (", ..." if len(free) > _MOST_PARAMETERS else ""),
-        "verdict": c.fit.verdict,
-    }

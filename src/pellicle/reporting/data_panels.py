@@ -1,20 +1,15 @@
 """Panels of measured data, and of data, fit and residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.reporting.drawable import SERIES, Band, Line, Panel, Place, Section, Table, stroke
+from pellicle.fitting.result import Part
+from pellicle.reporting.drawable import SERIES, Band, Line, Panel, Place, Section, Style, Table, stroke
 from pellicle.reporting.quantities import Quantity, abscissa, colours_of, display, lines_of, quantities
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Part
 
 MOST_NAMED = 8
 """Most lines, one for each angle and azimuth, that get a label."""
@@ -144,21 +139,14 @@ def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[lis
     """Patches of data above those of the fit, the values of each channel, and residuals in σ."""
     colours, curve = colours_of(part)
     angle = colours.angle
-    values, residuals = [], []
-    for c, q in enumerate(columns):
-        assert q.model is not None
-        assert q.missed is not None
-        at, (name, colour, _) = x + _SHIFT * (c - 1), q.drawn
-        values.append(Line(at, q.data, f"data {name}", colour, "ring"))
-        values.append(Line(at, q.model, f"fit {name}", colour, "cross", model=True))
-        residuals.append(Line(at, q.missed, name, colour, "circle", listed=False, model=True))
+    values, residuals = _channels(columns, [x + _SHIFT * (c - 1) for c in range(len(columns))], "circle")
     differences = () if curve.difference is None else curve.difference
     ticks = [f"{i:g}" for i in x] if angle is None else [f"{degrees:g}°" for degrees in angle]
     axis = {"span": (0.5, len(x) + 0.5), "ticks": ticks}
-    image = np.stack([display(colours, own) for own in (curve.data, curve.model)])
+    image = np.stack([display(colours, patches) for patches in (curve.data, curve.model)])
     sigma = [Band(np.array(axis["span"]), np.full(2, -1.0), np.ones(2), "±σ")]
     return [
-        [Panel("", height=1.6, image=image, captions=[f"ΔE {own:.2g}" for own in differences], **axis)],
+        [Panel("", height=1.6, image=image, captions=[f"ΔE {delta:.2g}" for delta in differences], **axis)],
         [Panel(f"{colours.space}", values, height=2.0, legend="above", **axis)],
         [Panel("(data − fit) / σ", residuals, sigma, legend="above", zero=True, **axis)],
     ]
@@ -166,18 +154,26 @@ def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[lis
 
 def _samples(samples: BrdfSamples, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
     """Samples and model, on a logarithmic axis if all are positive: a lobe spans decades; and residuals."""
-    measured, model, residuals = [], [], []
-    for q in columns:
+    values, residuals = _channels(columns, [x] * len(columns), "point")
+    scale = "log" if min(line.y.min() for line in values) > 0 else "linear"
+    label = "residual (1/sr)" if samples.sigma is None else "residual / σ"
+    values = [*values[::2], *values[1::2]]  # the model above all samples
+    return [
+        [Panel("BRDF (1/sr)", values, height=3.0, legend="inside", scale=scale)],
+        [Panel(label, residuals, zero=True)],
+    ]
+
+
+def _channels(
+    columns: Sequence[Quantity], abscissae: Sequence[np.ndarray], style: Style
+) -> tuple[list[Line], list[Line]]:
+    """Markers of data and fit of each channel in turn, and those of its residuals."""
+    values, residuals = [], []
+    for q, x in zip(columns, abscissae, strict=True):
         assert q.model is not None
         assert q.missed is not None
         name, colour, _ = q.drawn
-        measured.append(Line(x, q.data, f"data {name}", colour, "ring"))
-        model.append(Line(x, q.model, f"fit {name}", colour, "cross", model=True))
-        residuals.append(Line(x, q.missed, name, colour, "point", listed=False, model=True))
-    positive = min(min(line.y.min() for line in lines) for lines in (measured, model)) > 0
-    label = "residual (1/sr)" if samples.sigma is None else "residual / σ"
-    scale = "log" if positive else "linear"
-    return [
-        [Panel("BRDF (1/sr)", [*measured, *model], height=3.0, legend="inside", scale=scale)],
-        [Panel(label, residuals, zero=True)],
-    ]
+        values.append(Line(x, q.data, f"data {name}", colour, "ring"))
+        values.append(Line(x, q.model, f"fit {name}", colour, "cross", model=True))
+        residuals.append(Line(x, q.missed, name, colour, style, listed=False, model=True))
+    return values, residuals

@@ -126,6 +126,11 @@ class Table:
     comments: Sequence[str] = ()
 
 
+def labelled(name: str, unit: str) -> str:
+    """`thickness (nm)`, or the name alone of what has no unit."""
+    return f"{name} ({unit})" if unit else name
+
+
 def stroke(
     x: np.ndarray, y: np.ndarray, rows: np.ndarray, turns: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:

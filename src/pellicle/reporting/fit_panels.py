@@ -1,22 +1,17 @@
 """Panels of a fit: data of each part, misfit against thickness, n and k, profiles of graded layers."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
+from pellicle.fitting.result import Fit, Part, Profile, Rival
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import data_panels
 from pellicle.reporting.drawable import Band, Line, Panel, Section, Table
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit, Part, Profile, Rival
 
 MOST_LABELS = 6
 ROOM_FOR_LABEL = 0.025

@@ -1,10 +1,8 @@
 """Tables of a fit: data, model and residuals; n and k; profiles of graded layers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +11,12 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.fitting.curves import BIREFRINGENCE
+from pellicle.fitting.depth_profiles import FittedProfile
+from pellicle.fitting.result import Fit, Part
 from pellicle.reporting.drawable import Table
 from pellicle.reporting.plain_text import csv_text, written_by
 from pellicle.reporting.quantities import colours_in_words, colours_of, quantities
 from pellicle.signals.one_column import OneColumn
-
-if TYPE_CHECKING:
-    from pellicle.fitting.depth_profiles import FittedProfile
-    from pellicle.fitting.result import Fit, Part
 
 _JOINT = ("file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma", "azimuth_deg")
 

@@ -1,23 +1,17 @@
 """Report of a fit as plain text: the verdict first, then the numbers behind it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+import math
+import re
 
 import numpy as np
 
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
-from pellicle.fitting.result import Status
-from pellicle.fitting.status import RIVAL
-from pellicle.reporting import parameter_text
-from pellicle.reporting.parameter_text import LEAST_CORRELATION
-from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, wrapped
+from pellicle.fitting.result import LEVEL, Estimate, Fit, Part, Status
+from pellicle.fitting.status import RIVAL, describe
+from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, table, with_unit, wrapped
 from pellicle.reporting.quantities import colours_in_words, differences, weighted_delta
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit, Part
-    from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Posterior
 
 ADVICE = {
     Status.FAILED: "There is no result: the error says what to change.",
@@ -49,19 +43,24 @@ _RESIDUALS = {
 
 def report(fit: Fit, posterior: Posterior | None = None) -> str:
     """Format a fit, and its posterior if there is one, as text of at most 100 columns."""
+    plan = []
+    for part in fit.parts:
+        width = max(len(row.effect) for row in part.plan.rows)
+        rows = [(f"{row.effect:<{width}} {'on' if row.on else 'off':<3}", row.why) for row in part.plan.rows]
+        plan += [*(wrapped(f"{part.name}:") if part.name else []), *facts(rows)]
     blocks = [
         ("Verdict", _verdict(fit)),
         ("With and without a layer", facts(layer_test_rows(fit))),
         ("Fit statistics", facts(statistic_rows(fit))),
-        ("Parameters", parameter_text.parameters(fit)),
+        ("Parameters", _parameters(fit)),
         ("Birefringence: extraordinary less ordinary index", facts(_birefringence(fit))),
-        ("Uncertainty budget", parameter_text.budget(fit)),
-        (f"Correlations above {LEAST_CORRELATION:g}", parameter_text.correlations(fit)),
+        ("Uncertainty budget", budget(fit)),
+        (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),
         (
             f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",
-            parameter_text.rivals(fit),
+            _rivals(fit),
         ),
-        ("Plan: what was simulated", [line for part in fit.parts for line in _plan(part)]),
+        ("Plan: what was simulated", plan),
         ("Warnings", [line for text in fit.warnings for line in wrapped(text, "- ", "  ")]),
     ]
     text = "".join(block(title, lines) for title, lines in blocks if lines)
@@ -98,46 +97,31 @@ def _verdict(fit: Fit) -> list[str]:
     return [*wrapped(fit.verdict), *facts(rows)]
 
 
-def _spectrum(part: Part) -> str:
-    """`R, 41 points from 400 to 800 nm`."""
-    data, nm = part.spectrum, part.spectral.wavelength
-    light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
-    names = data.kind.parts
-    own = f" ({', '.join(names)})" if names else ""
-    text = f"{data.signal}{own}{light}, {nm.size} points"
-    if nm.size:
-        text += _range(nm, "nm")
-        if data.angle is not None and np.any(data.angle):
-            text += "," + _range(data.angle, "degrees")
-        if data.azimuth is not None:
-            text += f", azimuth{_range(data.azimuth, 'degrees')}"
-    return text + _independent(part, nm.size, "")
-
-
 def data_in_words(part: Part) -> str:
-    """Kind, number and range of the data of a part."""
-    match part.curve:
-        case Curve():
-            return _spectrum(part)
-        case ColourCurve():
-            return colours_in_words(part)
-        case _:
-            return _samples(part)
-
-
-def _samples(part: Part) -> str:
-    """`200 samples of R, G, B`."""
-    samples = part.samples
-    size = samples.values.size
-    return f"{len(samples)} samples of {', '.join(samples.channels)}" + _independent(
-        part, size, f", {size} values"
-    )
-
-
-def _independent(part: Part, size: int, values: str) -> str:
-    """The number of independent points, where it is clearly below that of the points."""
+    """Kind, number and range of the data of a part: `R, 41 points from 400 to 800 nm`, or
+    `200 samples of R, G, B`, and the number of independent points where it is clearly below that."""
+    if isinstance(part.curve, ColourCurve):
+        return colours_in_words(part)
+    if isinstance(part.curve, Curve):
+        data, nm = part.spectrum, part.spectral.wavelength
+        light = "" if data.polarisation == "unpolarised" else f" of {data.polarisation}-polarised light"
+        names = f" ({', '.join(data.kind.parts)})" if data.kind.parts else ""
+        size, values = nm.size, ""
+        text = f"{data.signal}{names}{light}, {size} points"
+        if size:
+            text += _range(nm, "nm")
+            if data.angle is not None and np.any(data.angle):
+                text += "," + _range(data.angle, "degrees")
+            if data.azimuth is not None:
+                text += f", azimuth{_range(data.azimuth, 'degrees')}"
+    else:
+        size = part.samples.values.size
+        text, values = (
+            f"{len(part.samples)} samples of {', '.join(part.samples.channels)}",
+            f", {size} values",
+        )
     worth = part.effective_points
-    return f"{values}, worth {worth:.3g} independent ones" if worth < 0.95 * size else ""
+    return text + (f"{values}, worth {worth:.3g} independent ones" if worth < 0.95 * size else "")
 
 
 def _range(values: np.ndarray, unit: str) -> str:
@@ -206,8 +190,144 @@ def _sweeps(part: Part, free: int) -> list[tuple[str, str]]:
     return [(f"sweeps{of}", f"{scatter}; {lack.verdict} (probability {lack.probability:.2g})")]
 
 
-def _plan(part: Part) -> list[str]:
-    """Every effect, on or off, and why; under the name of the spectrum in a joint fit."""
-    width = max(len(row.effect) for row in part.plan.rows)
-    rows = facts((f"{row.effect:<{width}} {'on' if row.on else 'off':<3}", row.why) for row in part.plan.rows)
-    return [*(wrapped(f"{part.name}:") if part.name else []), *rows]
+LEAST_CORRELATION = 0.5
+MOST_CORRELATIONS = 10
+MOST_RIVALS = 6
+_IMPOSSIBLE = 1e-6
+"""Share of a posterior below which nothing more is said of it."""
+
+NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|camera_\d+)(\..+)?")
+
+
+def _parameters(fit: Fit) -> list[str]:
+    """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
+    width = max((len(name) for name in fit.parameters), default=0) + 1
+    rows = [
+        (
+            f"{p.name + ':':<{width}}",
+            value_in_words(p),
+            bounds_in_words(p),
+        )
+        for p in sorted(fit.parameters.values(), key=lambda p: not p.free)
+    ]
+    middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
+    return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
+
+
+def value_in_words(p: Estimate) -> str:
+    """`751.66 ± 0.12 nm (0.016 %)`, with its standard error, or the best value and its limits where that is
+    infinite; a fixed value as such."""
+    best = with_unit(f"{p.value:.6g}", p.unit)
+    if not p.free:
+        return f"{best} (fixed)"
+    sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
+    limits = [
+        f"{side} {with_unit(f'{limit:.4g}', p.unit)} at 95 %" for side, limit in sides if limit is not None
+    ]
+    if not math.isfinite(p.stderr):
+        return f"not determined ({', '.join([f'best {best}', *limits])})"
+    relative = 100 * p.stderr / abs(p.value) if p.value else math.inf
+    notes = ", ".join([f"{relative:.2g} %", *limits] if relative < 100 else limits)
+    value = describe(p).removeprefix(f"{p.name} ")
+    return f"{value} ({notes})" if notes else value
+
+
+def bounds_in_words(p: Estimate) -> str:
+    """`[10, 3000]`, and the bound on which the value rests."""
+    if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
+        return ""
+    bounds = f"[{p.lower:g}, {p.upper:g}]"
+    if not p.at_bound:
+        return bounds
+    side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
+    return (
+        f"{bounds}  at its default {side} bound"
+        if p.default_bounds
+        else f"{bounds}  AT ITS {side.upper()} BOUND"
+    )
+
+
+def _correlations(fit: Fit) -> list[str]:
+    """Correlations above 0.5, the largest first.
+
+    Pairs of coefficients of the scale's and the offset's polynomials are left out: they follow from the
+    choice of the basis and say nothing of the layer. The JSON record has them.
+    """
+    names, matrix = fit.correlation_names, fit.correlation
+    pairs = [
+        (float(matrix[i, j]), names[i], names[j])
+        for j in range(len(names))
+        for i in range(j)
+        if abs(matrix[i, j]) > LEAST_CORRELATION
+        and not (NUISANCE.fullmatch(names[i]) and NUISANCE.fullmatch(names[j]))
+    ]
+    pairs.sort(key=lambda pair: -abs(pair[0]))
+    shown = pairs[:MOST_CORRELATIONS]
+    lines = table([(f"C({one}, {other})", f"{value:+.3f}") for value, one, other in shown])
+    return lines + _omitted(len(pairs) - len(shown))
+
+
+def _rivals(fit: Fit) -> list[str]:
+    """Other minima, the least Δχ² first, each with its parameters in the order of the fit's."""
+    shown = sorted(fit.rivals, key=lambda rival: rival.delta_chi2)[:MOST_RIVALS]
+    rows = []
+    for rival in shown:
+        cells = [f"Δχ² {rival.delta_chi2:.3g}"]
+        if (share := rival.probability) is not None:
+            cells.append(f"probability {f'{share:.2g}' if share > _IMPOSSIBLE else f'< {_IMPOSSIBLE:g}'}")
+        for name, p in fit.parameters.items():
+            if name in rival.parameters:
+                error = "" if rival.stderr is None else f" ± {rival.stderr[name]:.2g}"
+                cells.append(with_unit(f"{name} {rival.parameters[name]:.5g}{error}", p.unit))
+        rows.append(cells)
+    return table(rows) + _omitted(len(fit.rivals) - len(shown))
+
+
+def _omitted(count: int) -> list[str]:
+    return [f"{INDENT}... and {count} more in the JSON"] if count > 0 else []
+
+
+_SHOWN = 8
+_SMALL = 0.01
+"""Share of the standard error below which an effect is not listed."""
+
+
+def budget(fit: Fit) -> list[str]:
+    """Budget of the leading parameter: what each systematic effect, at its standard uncertainty, changes."""
+    lead, lines = next(iter(fit.free), None), budget_rows(fit)
+    if lead is None or not lines:
+        return []
+    smaller = len(fit.budget) + 1 - len(lines)
+    return [
+        *wrapped(f"{lead.name}: standard uncertainties, and what each alone would change"),
+        *table(lines),
+        *([f"{INDENT}... and {smaller} smaller in the JSON"] if smaller else []),
+        *wrapped(together(lead)),
+    ]
+
+
+def budget_rows(fit: Fit) -> list[tuple[str, str, str]]:
+    """Name, standard uncertainty and change of the leading parameter, of noise and of each larger effect.
+
+    Empty where the leading parameter has no finite error.
+    """
+    lead = next(iter(fit.free), None)
+    if lead is None or not fit.budget or not math.isfinite(lead.stderr):
+        return []
+    larger = [row for row in fit.budget if abs(row.changes[lead.name]) > _SMALL * lead.stderr]
+    rows = [("noise and residuals (type A)", "", with_unit(f"{lead.stderr_noise:.2g}", lead.unit))]
+    for row in larger[:_SHOWN]:
+        size = f"{row.uncertainty:.3g} {row.unit}" if row.unit else f"{100 * row.uncertainty:.3g} %"
+        rows.append((row.name, size, with_unit(f"{abs(row.changes[lead.name]):.2g}", lead.unit)))
+    return rows
+
+
+def together(lead: Estimate) -> str:
+    """The combined and the expanded uncertainty of the leading parameter."""
+    stderr, expanded = (with_unit(f"{error:.2g}", lead.unit) for error in (lead.stderr, lead.expanded))
+    freedom = lead.effective_degrees_of_freedom
+    of = f", {freedom:.3g} degrees of freedom" if freedom < 100 else ""
+    return (
+        f"together, less what the residuals exclude: {stderr}; expanded, {100 * LEVEL:.0f} %:"
+        f" {expanded} (coverage factor {lead.coverage_factor:.3g}{of})"
+    )

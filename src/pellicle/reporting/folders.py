@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pellicle.errors import UsageError
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.json_record import indented, to_json, versions
+from pellicle.reporting.json_record import indented, to_json, versions, write_result
 from pellicle.reporting.plain_text import csv_rows, written_by
 from pellicle.reporting.repeats import FILES as REPEATS
 
@@ -54,23 +54,24 @@ def write_fit(
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
     DataError for a full disk.
     """
+    from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
     from pellicle.reporting.figures import draw_fit
+    from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
     from pellicle.reporting.fit_text import report
-    from pellicle.reporting.matplotlib_figure import save_figure
     from pellicle.reporting.page.fit_page import fit_page
     from pellicle.reporting.page.repetition import repetition
 
-    target = new_folder(folder)
     record = to_json(fit, posterior)
     if described is not None:
         record[SCENE] = dict(described)
-    write_text(target / MARKER, indented(record), overwrite=True)  # first: it marks the folder as ours
-    write_text(target / REPORT, report(fit, posterior), overwrite=True)
-    _write_tables(target, fit)
+    contents = {REPORT: report(fit, posterior), "fit.csv": fit_csv(fit)}
+    contents |= nk_csvs(fit) if fit.layer_test is None else {}
+    if profiles := fitted_profiles(fit):
+        contents["profile.csv"] = profile_csv(fit, profiles)
+    target = write_result(folder, record, contents | {"figure.png": draw_fit(fit)})
     if recipe is not None:
         with suppress(UsageError):  # of a scene that no recipe can express
             write_text(target / "recipe.toml", recipe(target), overwrite=True)
-    save_figure(draw_fit(fit), target / "figure.png", overwrite=True)
     pictures = {} if posterior is None else _write_posterior(target, posterior)
     image = (target / "figure.png").read_bytes()
     text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe))
@@ -78,18 +79,6 @@ def write_fit(
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
     return target
-
-
-def _write_tables(target: Path, fit: Fit) -> None:
-    """Write fit.csv, n and k of films, and profiles of graded layers."""
-    from pellicle.fitting.depth_profiles import fitted_profiles  # imports JAX
-    from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
-
-    tables = {"fit.csv": fit_csv(fit)} | (nk_csvs(fit) if fit.layer_test is None else {})
-    if profiles := fitted_profiles(fit):
-        tables["profile.csv"] = profile_csv(fit, profiles)
-    for name, table in tables.items():
-        write_text(target / name, table, overwrite=True)
 
 
 def _write_posterior(target: Path, posterior: Posterior) -> dict[str, bytes]:
@@ -155,7 +144,16 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
     `records` are JSON records of fits and failures. An earlier summary in a folder that pellicle wrote is
     replaced. Raises UsageError in a folder with files that pellicle did not write.
     """
-    rows = [_summary_row(record) for record in records]
+    rows = []
+    for record in records:
+        data = record["data"]
+        row = {key: data[key] for key in ("path", "spectrum") if key in data}
+        row |= {key: record[key] for key in ("status", "verdict")}
+        for name, p in record["parameters"].items():
+            if p["free"]:
+                row |= {name: p["value"], f"{name}_stderr": p["stderr"]}
+        row |= {"rms": record["rms"], "chi2_reduced": record["chi2_reduced"]}
+        rows.append(row | {"sha256": data["sha256"] or "", "error": record.get("error", "")})
     ends = ("rms", "chi2_reduced", "sha256", "error")
     union = dict.fromkeys(name for row in rows for name in row)  # in order of appearance
     header = [*(name for name in union if name not in ends), *ends]
@@ -184,18 +182,3 @@ def write_index(
         for place in places
     ]
     write_text(target / PAGE, batch_page(records, links, repeats), overwrite=True)
-
-
-def _summary_row(record: Mapping[str, Any]) -> dict[str, Any]:
-    data = record["data"]
-    row = {"path": data["path"], **({"spectrum": data["spectrum"]} if "spectrum" in data else {})}
-    row |= {"status": record["status"], "verdict": record["verdict"]}
-    for name, p in record["parameters"].items():
-        if p["free"]:
-            row |= {name: p["value"], f"{name}_stderr": p["stderr"]}
-    return row | {
-        "rms": record["rms"],
-        "chi2_reduced": record["chi2_reduced"],
-        "sha256": data["sha256"] or "",
-        "error": record.get("error", ""),
-    }

@@ -13,7 +13,6 @@ import numpy as np
 
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.pixels.results import CODES, NO_DATA
-from pellicle.reporting.map_axes import MapAxes
 from pellicle.reporting.map_panels import (
     COLOURS,
     VALUES,
@@ -39,7 +38,7 @@ from pellicle.reporting.map_summary import (
     thinned,
 )
 from pellicle.reporting.map_text import in_words, ordinal
-from pellicle.reporting.matplotlib_figure import ABOVE, BLUE, ORANGE, marker_size, new_figure
+from pellicle.reporting.matplotlib_figure import ABOVE, BLUE, ORANGE, marker_size, new_figure, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,45 +61,31 @@ def figures(made: Dataset | Map, summary: MapSummary | None = None) -> Iterator[
     """
     summary = summarise(made) if summary is None else summary
     dataset = dataset_of(made)
-    sheet = Sheet(*_as_image(dataset, summary.axes), summary)
+    axes = summary.axes
+    if axes.kind == "line" and axes.series is not None:  # as an image of position and time
+        axes = replace(axes, kind="image", y=axes.series, series=None)
+    sheet = Sheet(dataset, axes, summary)
     first, *others = sorted(free_parameters(dataset), key=lambda name: not name.endswith("thickness"))
-    yield "map", draw_map(sheet, first)
+    yield "map", _draw(sheet, first, first=True)
     for variable in others:
-        yield variable, draw_parameter(sheet, variable)
-    if "rival_delta_chi2" in dataset and sheet.axes.series is None and sheet.axes.kind != "line":
+        yield variable, _draw(sheet, variable)
+    if "rival_delta_chi2" in dataset and axes.series is None and axes.kind != "line":
         yield "rival", draw_rival(sheet)
 
 
-def _as_image(dataset: Dataset, axes: MapAxes) -> tuple[Dataset, MapAxes]:
-    """A series of lines as an image of position and time."""
-    if axes.kind == "line" and axes.series is not None:
-        return dataset, replace(axes, kind="image", y=axes.series, series=None)
-    return dataset, axes
-
-
-def draw_map(sheet: Sheet, variable: str) -> Figure:
-    """Draw a parameter, its standard error, the statuses and a histogram; of a series, some frames of it."""
+def _draw(sheet: Sheet, variable: str, first: bool = False) -> Figure:
+    """Draw a parameter, its standard error and a histogram, of the first one also the statuses; of a series,
+    some frames of it."""
     if sheet.axes.series is not None:
         return _series(sheet, variable)
     if sheet.axes.kind == "line":
         return _line(sheet, variable)
-    figure, ((values, errors), (status, histogram)), _ = _page(sheet, 2, 2)
+    figure, panels, _ = _page(sheet, *((2, 2) if first else (1, 3)))
+    values, errors, *statuses, histogram = panels.flat
     values_panel(sheet, values, variable)
     errors_panel(sheet, errors, variable)
-    status_panel(sheet, status, sheet.codes(0), legend=True)
-    histogram_panel(sheet, histogram, variable)
-    return figure
-
-
-def draw_parameter(sheet: Sheet, variable: str) -> Figure:
-    """Draw a parameter, its standard error and a histogram; of a series or a line as of the first."""
-    if sheet.axes.series is not None:
-        return _series(sheet, variable)
-    if sheet.axes.kind == "line":
-        return _line(sheet, variable)
-    figure, ((values, errors, histogram),), _ = _page(sheet, 1, 3)
-    values_panel(sheet, values, variable)
-    errors_panel(sheet, errors, variable)
+    for panel in statuses:
+        status_panel(sheet, panel, sheet.codes(0), legend=True)
     histogram_panel(sheet, histogram, variable)
     return figure
 
@@ -207,7 +192,7 @@ def _title(sheet: Sheet, columns: int, remark: str) -> str:
     text = "\n".join(
         part for line in lines if line for part in textwrap.wrap(line, columns, break_on_hyphens=False)
     )
-    return text.replace("$", r"\$")
+    return plain(text)
 
 
 def _series(sheet: Sheet, variable: str) -> Figure:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES
-from pellicle.reporting.map_axes import MapAxes
+from pellicle.reporting.drawable import labelled
+from pellicle.reporting.map_places import MapAxes
 from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of
 from pellicle.reporting.map_text import share
-from pellicle.reporting.matplotlib_figure import BLACK, BLUE, GREY
+from pellicle.reporting.matplotlib_figure import BLACK, BLUE, GREY, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +67,8 @@ class Sheet:
     @property
     def side(self) -> int:
         """Side of the blocks of pixels that are one point of an image."""
-        return block(self.axes)
+        side = int(np.ceil(max(self.axes.shape[-2:]) / MOST_POINTS))
+        return side if self.axes.kind == "image" else 1
 
     @property
     def frames(self) -> list[int]:
@@ -87,16 +89,8 @@ class Sheet:
 
     def label(self, variable: str, of: str = "") -> str:
         """`thickness (nm)`, or `standard error of thickness (nm)`."""
-        unit = unit_of(self.data, variable)
         name = str(self.data[variable].attrs.get("long_name", parameter_name(self.data, variable)))
-        return of + name + (f" ({unit})" if unit else "")
-
-
-def extent(axes: MapAxes) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of an image whose first row is drawn first."""
-    assert axes.y is not None
-    x, y = axes.x.edges(), axes.y.edges()
-    return float(x[0]), float(x[-1]), float(y[-1]), float(y[0])
+        return of + labelled(name, unit_of(self.data, variable))
 
 
 def ratio(axes: MapAxes) -> float:
@@ -119,26 +113,16 @@ def overlay(codes: np.ndarray) -> np.ndarray:
     fine = codes.repeat(scale, axis=0).repeat(scale, axis=1)
     rows, columns = np.ogrid[: fine.shape[0], : fine.shape[1]]
     period, width = 14, 3
-    near = {
-        "/": (rows + columns) % period < width,
-        "\\": (rows - columns) % period < width,
-        "-": (rows + 0 * columns) % period < width,
-        "|": (columns + 0 * rows) % period < width,
-    }
-    marks = {
-        "////": near["/"],
-        "xxxx": near["/"] | near["\\"],
-        "----": near["-"],
-        "||||": near["|"],
-        "++++": near["-"] | near["|"],
-        "....": (rows % period < width + 1) & (columns % period < width + 1),
-    }
+    up, down = (rows + columns) % period < width, (rows - columns) % period < width
+    level, upright = (rows + 0 * columns) % period < width, (columns + 0 * rows) % period < width
+    dots = (rows % period < width + 1) & (columns % period < width + 1)
+    marks = {"/": up, "x": up | down, "-": level, "|": upright, "+": level | upright, ".": dots}
     image = np.zeros((*fine.shape, 4), np.float32)
     for word, hatch in HATCHES.items():
         own = fine == CODES[word]
         if own.any():
             image[own, :3], image[own, 3] = PALE, 1.0
-            image[own & marks[hatch], :3] = DARK
+            image[own & marks[hatch[0]], :3] = DARK
     return image
 
 
@@ -152,9 +136,9 @@ def hatched(words: Sequence[str]) -> list[Patch]:
 
 def label_axes(panel: Axes, axes: MapAxes) -> None:
     """Name the axes of an image, with equal scales where both have one unit."""
-    panel.set_xlabel(axes.x.label.replace("$", r"\$"))
+    panel.set_xlabel(plain(axes.x.label))
     assert axes.y is not None
-    panel.set_ylabel(axes.y.label.replace("$", r"\$"))
+    panel.set_ylabel(plain(axes.y.label))
     if _to_scale(axes):
         panel.set_aspect("equal", anchor="NW")
     if axes.kind == "image":
@@ -215,8 +199,10 @@ def paint(
     if axes.kind == "sites":
         drawn = _circles(sheet, panel, values, codes, cmap, style)
     else:
+        assert axes.y is not None
+        (left, *_, right), (top, *_, bottom) = axes.x.edges().tolist(), axes.y.edges().tolist()
         place: dict[str, Any] = {
-            "extent": extent(axes),
+            "extent": (left, right, bottom, top),  # the first row is drawn first
             "aspect": "auto",
             "interpolation": "nearest",
             "origin": "upper",
@@ -249,7 +235,7 @@ def _circles(
 
 def colour_bar(panel: Axes, drawn: Any, label: str, extend: str) -> Any:
     """Draw a colour bar as high as its panel, with its label above the panel."""
-    panel.set_title(label.replace("$", r"\$"), fontsize="medium", loc="left")
+    panel.set_title(plain(label), fontsize="medium", loc="left")
     root: Any = panel.figure
     width = panel.get_position().width * root.get_size_inches()[0]
     bar = root.colorbar(drawn, cax=panel.inset_axes((1 + 0.1 / width, 0.0, 0.16 / width, 1.0)), extend=extend)
@@ -275,14 +261,8 @@ def status_panel(sheet: Sheet, panel: Axes, codes: np.ndarray, legend: bool) -> 
         total, among = (made.pixels, " of all") if word == NO_DATA else (made.with_data, "")
         text = f"{word} {share(count, total)} %{among}"
         entries.append(Patch(facecolor=COLOURS[word], edgecolor=GREY, linewidth=0.5, label=text))
-    panel.legend(
-        handles=entries,
-        fontsize="small",
-        frameon=False,
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.02),
-        borderaxespad=0.2,
-    )
+    beside: Any = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.02), "borderaxespad": 0.2}
+    panel.legend(handles=entries, fontsize="small", frameon=False, **beside)
 
 
 def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
@@ -293,14 +273,8 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     panel.set(xlabel=sheet.label(variable), ylabel=sheet.axes.points)
     panel.spines[["top", "right"]].set_visible(False)
     if not values.size:
-        panel.text(
-            0.5,
-            0.5,
-            "no pixel has numbers\nthat can be used",
-            ha="center",
-            va="center",
-            transform=panel.transAxes,
-        )
+        text = "no pixel has numbers\nthat can be used"
+        panel.text(0.5, 0.5, text, ha="center", va="center", transform=panel.transAxes)
         return
     low, high, _ = limits(values)
     bins = int(np.clip(2 * values.size ** (1 / 3), 10, 80))
@@ -322,11 +296,6 @@ MOST_POINTS = 800
 """Most points of an image in each direction: more than a printed panel shows."""
 SLAB = 2**22
 """Most pixels that are read at once."""
-
-
-def block(axes: MapAxes) -> int:
-    """Side of the blocks of pixels that are one point of an image."""
-    return int(np.ceil(max(axes.shape[-2:]) / MOST_POINTS)) if axes.kind == "image" else 1
 
 
 def block_codes(codes: np.ndarray, side: int) -> np.ndarray:
@@ -376,9 +345,8 @@ def evenly(array: np.ndarray, axes: MapAxes, side: int) -> np.ndarray:
             continue
         edges = np.append(axis.edges()[:-1:side], axis.edges()[-1])
         points = np.linspace(edges[0], edges[-1], 2 * MOST_POINTS + 1)[1::2]
-        flip = edges[0] > edges[-1]
-        index = np.searchsorted(edges[::-1] if flip else edges, np.sort(points) if flip else points) - 1
-        index = (len(edges) - 2 - index)[::-1] if flip else index
+        sign = 1 if edges[-1] > edges[0] else -1
+        index = np.searchsorted(sign * edges, sign * points) - 1
         array = np.take(array, np.clip(index, 0, array.shape[along] - 1), axis=along)
     return array
 

@@ -16,8 +16,7 @@ from pellicle.mapping.growth import RATES, TIME, growth
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.mapping.store import variable_name
-from pellicle.reporting.map_axes import MapAxes, map_axes
-from pellicle.reporting.map_places import place
+from pellicle.reporting.map_places import MapAxes, map_axes, place
 
 if TYPE_CHECKING:
     from xarray import Dataset

@@ -11,7 +11,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.files import check_new, replacing
-from pellicle.reporting.drawable import Band, Line, Panel, Section
+from pellicle.reporting.drawable import Line, Panel, Section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,20 +110,24 @@ def draw(sections: Sequence[Section], title: str, width: float = WIDTH_INCHES) -
             for i, (_, row) in enumerate(rows)]  # fmt: skip
     first = 0
     for section in sections:
-        own = grid[first : first + len(section.rows)]
-        for axes_row, row in zip(own, section.rows, strict=True):
-            for axes, panel in zip(axes_row, row, strict=True):
-                if len(row) == 1 and axes is not own[0][0] and len(own[0]) == 1:
-                    axes.sharex(own[0][0])
-                draw_panel(axes, panel)
-        _label_abscissa(section, own)
-        if len(sections) > 1 and section.title:
-            own[0][0].set_title(plain(section.title), fontsize="small", loc="left")
-        for axes_row, row in zip(own, section.rows, strict=True):
-            for axes, panel in zip(axes_row, row, strict=True):
-                if panel.legend and axes.get_legend_handles_labels()[1]:
-                    _legend(axes, axes_row[-1], panel)
+        axes_rows = grid[first : first + len(section.rows)]
         first += len(section.rows)
+        panels = [
+            (axes, panel, axes_row)
+            for axes_row, row in zip(axes_rows, section.rows, strict=True)
+            for axes, panel in zip(axes_row, row, strict=True)
+        ]
+        top = axes_rows[0][0]
+        for axes, panel, axes_row in panels:
+            if len(axes_row) == 1 and axes is not top and len(axes_rows[0]) == 1:
+                axes.sharex(top)
+            draw_panel(axes, panel)
+        _label_abscissa(section, axes_rows)
+        if len(sections) > 1 and section.title:
+            top.set_title(plain(section.title), fontsize="small", loc="left")
+        for axes, panel, axes_row in panels:
+            if panel.legend and axes.get_legend_handles_labels()[1]:
+                _legend(axes, axes_row[-1], panel)
     _arrange(figure, grid, [row for _, row in rows], title)
     return figure
 
@@ -146,14 +150,18 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
     points = max((line.x.size for line in panel.lines), default=0)
     listed: set[str] = set()
     for band in panel.bands:
-        _band(axes, band, listed)
+        label = band.name if band.listed and band.name and band.name not in listed else "_"
+        listed.add(band.name)
+        known = np.isfinite(band.low) & np.isfinite(band.high)
+        style = {"color": COLOURS.get(band.colour, band.colour), "alpha": band.opacity, "lw": 0}
+        axes.fill_between(band.x, band.low, band.high, where=known, label=label, **style)
     for line in panel.lines:
         _line(axes, line, points, listed)
     if panel.zero:
         axes.axhline(0, color=GREY, linewidth=0.6)
     for left, right, name, shade in panel.spans:
         _span(axes, panel, left, right, name, shade)
-    upright = {} if panel.key else {"rotation": 90, "bbox": _BOX}
+    upright: Any = {} if panel.key else {"rotation": 90, "bbox": _BOX}
     for x, y, text in panel.notes:
         axes.annotate(text, (x, y), **_NOTE, **upright)
     if panel.key:
@@ -188,16 +196,6 @@ def _line(axes: Axes, line: Line, points: int, listed: set[str]) -> None:
     axes.plot(line.x, line.y, _MARKERS[line.style], **style)
 
 
-def _band(axes: Axes, band: Band, listed: set[str]) -> None:
-    label = band.name if band.listed and band.name and band.name not in listed else "_"
-    listed.add(band.name)
-    known = np.isfinite(band.low) & np.isfinite(band.high)
-    colour = COLOURS.get(band.colour, band.colour)
-    axes.fill_between(
-        band.x, band.low, band.high, where=known, color=colour, alpha=band.opacity, lw=0, label=label
-    )
-
-
 def _span(axes: Axes, panel: Panel, left: float, right: float, name: str, shade: float) -> None:
     """Shade a range of the abscissa and write its name, upright where it is narrow."""
     axes.axvspan(left, right, color=GREY, alpha=shade, linewidth=0)
@@ -224,8 +222,14 @@ def _patches(axes: Axes, panel: Panel) -> None:
 
 
 def _scale(axes: Axes, panel: Panel) -> None:
-    if panel.abscissa == "log":
-        _decades(axes)
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    if panel.abscissa == "log":  # plain numbers at 1, 2 and 5 of each decade
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.margins(x=0.05, y=0.1)
     if panel.scale == "log":
         axes.set_yscale("log")
     if panel.limits is not None:
@@ -243,17 +247,6 @@ def _scale(axes: Axes, panel: Panel) -> None:
         axes.set_xlim(panel.span)
     if panel.ticks:
         axes.set_xticks(np.arange(len(panel.ticks)) + 1.0, list(panel.ticks))
-
-
-def _decades(axes: Axes) -> None:
-    """Set a logarithmic abscissa with plain numbers at 1, 2 and 5 of each decade."""
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
-
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.05, y=0.1)
 
 
 def _legend(axes: Axes, last: Axes, panel: Panel) -> None:

@@ -12,7 +12,7 @@ from pellicle.data.cubes.checks import sample
 from pellicle.data.spectrum import Spectrum
 from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.plain_text import described
-from pellicle.reporting.quantities import display
+from pellicle.reporting.quantities import colour_codes
 from pellicle.signals.registry import KINDS
 
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
@@ -134,7 +134,7 @@ def _colours_rows(colours: Colours) -> list[tuple[str, str]]:
     """Labels and texts of the space, of each colour as `0.412 0.355 0.220  #695b38  at 45 degrees`, and of
     the noise."""
     light = f"{'transmitted' if colours.signal == 'T' else 'reflected'}, {colours.polarisation} light"
-    codes, digits = _codes(colours), 2 if colours.space == "lab" else 4
+    codes, digits = colour_codes(colours, colours.values), 2 if colours.space == "lab" else 4
     lines = []
     for i, values in enumerate(colours.values[:_COLOURS_SHOWN]):
         angle = "" if colours.angle is None else f"  at {colours.angle[i]:g} degrees"
@@ -167,15 +167,9 @@ def _colours_record(colours: Colours) -> dict[str, Any]:
         "values": {channel: [x.min(), x.max()] for channel, x in columns},
         "colours": colours.values,
         "sigma": colours.sigma,
-        "display": _codes(colours),
+        "display": colour_codes(colours, colours.values),
         **taken(colours, "white_balance", "gamma"),
     }
-
-
-def _codes(colours: Colours) -> list[str]:
-    """Each colour as a display shows it, #rrggbb."""
-    shown = np.round(255 * np.clip(display(colours, colours.values), 0, 1)).astype(int)
-    return ["#{:02x}{:02x}{:02x}".format(*rgb) for rgb in shown]
 
 
 _BANDS_SHOWN = 6

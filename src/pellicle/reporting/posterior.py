@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pellicle.files import check_space, replacing
+from pellicle.reporting.drawable import labelled
 from pellicle.reporting.json_record import one_line, posterior_to_json, to_json
 from pellicle.reporting.matplotlib_figure import BLUE, new_figure
 from pellicle.reporting.plain_text import block, table, wrapped
@@ -77,8 +78,7 @@ def corner_figure(posterior: Posterior) -> Figure:
         import corner
 
     size = len(posterior.names)
-    units = [posterior.fit.parameters[name].unit for name in posterior.names]
-    labels = [f"{name} ({unit})" if unit else name for name, unit in zip(posterior.names, units, strict=True)]
+    labels = [labelled(name, posterior.fit.parameters[name].unit) for name in posterior.names]
     figure = new_figure(2.4 * size + 1.2, 2.4 * size + 1.2, constrained=False)
     flat = posterior.draws.reshape(-1, size)
     moving = np.ptp(flat, axis=0) > 0

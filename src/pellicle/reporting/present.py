@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.accuracy.cost import Cost
 from pellicle.accuracy.surface import SurfaceCost
@@ -36,10 +37,45 @@ if TYPE_CHECKING:
 AnyCost = Cost | SurfaceCost
 
 
-def _is_map(result: object) -> TypeGuard[Map]:
-    """True for the map of a cube, whose module needs an optional package: no import, no such object."""
+class _Ways(NamedTuple):
+    """Functions that report, draw and write a result; None where it has no figure or no files."""
+
+    report: Callable[..., str]
+    draw: Callable[..., Figure] | None = None
+    write: Callable[..., Path] | None = None
+
+
+_WAYS: dict[type, _Ways] = {
+    Fit: _Ways(fit_text.report, figures.draw_fit, folders.write_fit),
+    Posterior: _Ways(
+        lambda posterior: fit_text.report(posterior.fit, posterior),
+        posterior.corner_figure,
+        lambda folder, posterior: folders.write_fit(folder, posterior.fit, posterior),
+    ),
+    Comparison: _Ways(comparison.report, None, comparison.write_comparison),
+    Repeats: _Ways(repeats.report, None, repeats.write_repeats),
+    Plan: _Ways(plans.report),
+    Cost: _Ways(cost.text, cost.draw, cost.write_cost),
+    SurfaceCost: _Ways(cost.text, cost.draw, cost.write_cost),
+    ThicknessMap: _Ways(photograph_map.report, photograph_map.draw, photograph_map.write_map),
+}
+
+
+def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
+    """A function of the ways of a result. Raises TypeError where it has none."""
+    ways = next((ways for kind, ways in _WAYS.items() if isinstance(result, kind)), None)
+    # the module of a cube's map needs an optional package: no import, no such object
     module = sys.modules.get("pellicle.mapping.map_result")
-    return module is not None and isinstance(result, module.Map)
+    if module is not None and isinstance(result, module.Map):
+        from pellicle.reporting import map_figures, map_text
+
+        ways = _Ways(
+            map_text.cube_report, lambda made: next(map_figures.figures(made))[1], map_text.write_cube_map
+        )
+    way = None if ways is None else getattr(ways, name)
+    if way is None:
+        raise TypeError(f"a {type(result).__name__} has no {wanted} have")
+    return way
 
 
 def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map | ThicknessMap) -> str:
@@ -59,26 +95,7 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map
 
     ```
     """
-    match result:
-        case Fit():
-            return fit_text.report(result)
-        case Posterior():
-            return fit_text.report(result.fit, result)
-        case Comparison():
-            return comparison.report(result)
-        case Repeats():
-            return repeats.report(result)
-        case Plan():
-            return plans.report(result)
-        case Cost() | SurfaceCost():
-            return cost.text(result)
-        case ThicknessMap():
-            return photograph_map.report(result)
-    if _is_map(result):
-        from pellicle.reporting.map_text import cube_report
-
-        return cube_report(result)
-    raise TypeError(f"a {type(result).__name__} has no report; fits, posteriors and plans have")
+    return _way(result, "report", "report; fits, posteriors and plans")(result)
 
 
 def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
@@ -92,20 +109,7 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
 
     **Raises:** TypeError for another object.
     """
-    match result:
-        case Fit():
-            return figures.draw_fit(result)
-        case Posterior():
-            return posterior.corner_figure(result)
-        case Cost() | SurfaceCost():
-            return cost.draw(result)
-        case ThicknessMap():
-            return photograph_map.draw(result)
-    if _is_map(result):
-        from pellicle.reporting import map_figures
-
-        return next(map_figures.figures(result))[1]
-    raise TypeError(f"a {type(result).__name__} has no figure; fits, posteriors and costs have")
+    return _way(result, "draw", "figure; fits, posteriors and costs")(result)
 
 
 def save(
@@ -122,24 +126,7 @@ def save(
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written;
     TypeError for another object.
     """
-    match result:
-        case Fit():
-            return folders.write_fit(folder, result)
-        case Posterior():
-            return folders.write_fit(folder, result.fit, result)
-        case Comparison():
-            return comparison.write_comparison(folder, result)
-        case Repeats():
-            return repeats.write_repeats(folder, result)
-        case Cost() | SurfaceCost():
-            return cost.write_cost(folder, result)
-        case ThicknessMap():
-            return photograph_map.write_map(folder, result)
-    if _is_map(result):
-        from pellicle.reporting.map_files import write_cube_map
-
-        return write_cube_map(folder, result)
-    raise TypeError(f"a {type(result).__name__} has no files; fits, posteriors and costs have")
+    return _way(result, "write", "files; fits, posteriors and costs")(folder, result)
 
 
 def html(result: Fit | Posterior | Comparison | Repeats | AnyCost | Map) -> str:

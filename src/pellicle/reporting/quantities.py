@@ -3,11 +3,9 @@
 Colours are also shown as a display has them, and in words.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +16,9 @@ from pellicle.data.colours import Colours
 from pellicle.data.half_angles import vectors
 from pellicle.data.spectrum import Spectrum, named
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
+from pellicle.fitting.result import Part
 from pellicle.reporting.drawable import CHANNELS, SERIES, Style
 from pellicle.signals.base import Quantity as Measured
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +50,17 @@ def quantities(
     """Quantities of measured data, in the order of their columns, with those of a fit's `curve`."""
     if isinstance(data, BrdfSamples):
         assert curve is not None
-        return _channels(data, data.values, data.sigma, curve.model, _channel_colours(data.channels))
+        colours = CHANNELS if set(data.channels) <= {"R", "G", "B"} else ("fit", "green", "blue", "fourth")
+        return _channels(data, data.values, data.sigma, curve.model, colours)
     if isinstance(data, Colours):
         assert isinstance(curve, ColourCurve)
         return _channels(data, curve.data, curve.sigma, curve.model, CHANNELS)
     assert curve is None or isinstance(curve, Curve)
-    known = [q for q in data.kind.quantities if curve is None or _in_curve(q, curve)]
+    known = [
+        q
+        for q in data.kind.quantities
+        if q.array != "depolarisation" or curve is None or curve.depolarisation_data is not None
+    ]
     return [_of_spectrum(data, curve, q, i) for i, q in enumerate(known)]
 
 
@@ -88,20 +89,12 @@ def _channels(
     ]
 
 
-def _channel_colours(channels: Sequence[str]) -> Sequence[str]:
-    return CHANNELS if set(channels) <= {"R", "G", "B"} else ("fit", "green", "blue", "fourth")
-
-
 def weighted_delta(curve: Curve) -> np.ndarray:
     """Residuals of Δ times ½ sin 2Ψ, (points, ratios): what they are on the sphere, in degrees of Ψ.
 
     Where a ratio is nearly 0, its Δ is noise alone.
     """
     return 0.5 * np.sin(2 * np.deg2rad(curve.model)) * curve.delta_residual
-
-
-def _in_curve(q: Measured, curve: Curve) -> bool:
-    return q.array != "depolarisation" or curve.depolarisation_data is not None
 
 
 def _of_spectrum(data: Spectrum, curve: Curve | None, q: Measured, i: int) -> Quantity:
@@ -208,6 +201,12 @@ def display(colours: Colours, values: np.ndarray) -> np.ndarray:
         return np.clip(values, 0.0, 1.0) ** (colours.gamma / _DISPLAY)
     white = colours.sensor[1].sum(axis=0)
     return np.asarray(srgb(linear_srgb(encoding(colours.space, white).decode(values), white)))
+
+
+def colour_codes(colours: Colours, values: np.ndarray) -> list[str]:
+    """Values (colours, 3) as a display shows them, #rrggbb."""
+    shown = np.round(255 * np.clip(display(colours, values), 0, 1)).astype(int)
+    return ["#{:02x}{:02x}{:02x}".format(*rgb) for rgb in shown]
 
 
 def colours_in_words(part: Part) -> str:

@@ -11,13 +11,13 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.targets import measured, seen_as
+from pellicle.reporting import figures
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.figures import draw_spectrum as draw_data
 from pellicle.reporting.fit_tables import fit_csv
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
 from pellicle.reporting.measured_text import describe
-from pellicle.reporting.page import figures
 from pellicle.signals.generalised import RATIOS, Generalised, block_frame, delta_sigma, upright
 from pellicle.signals.sphere import ncs, sphere_frame
 

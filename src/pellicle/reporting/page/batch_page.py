@@ -1,26 +1,22 @@
 """Page of a batch: numbers of each status, a figure, a table to sort and filter, the scatter of repeats."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 
+from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Status
 from pellicle.reporting import repeats as repeats_text
-from pellicle.reporting.drawable import Line, Panel, Section, Style, Table
+from pellicle.reporting.drawable import Line, Panel, Section, Style, Table, labelled
+from pellicle.reporting.fit_text import NUISANCE
 from pellicle.reporting.page.document import page
 from pellicle.reporting.page.fit_page import TONES
-from pellicle.reporting.parameter_text import NUISANCE
 from pellicle.reporting.plotly_figure import figure
-
-if TYPE_CHECKING:
-    from pellicle.fitting.repeated_measurements import Repeats
 
 Record = Mapping[str, Any]
 _MOST_PARAMETERS = 8
@@ -42,9 +38,15 @@ def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: 
     """
     links = [None if each is None else quote(each) for each in pages]
     names = _parameters(records)
-    units = {name: _unit(records, name) for name in names}
+    every = [record["parameters"] for record in records]
+    units = {name: next((p[name]["unit"] for p in every if name in p), "") for name in names}
     drawn = _figure(records, links, names[0], units[names[0]]) if names else None
     rows = [_row(record, link, names) for record, link in zip(records, links, strict=True)]
+    scatter = None
+    if repeats is not None:
+        head, *cells = repeats_text.rows(repeats)
+        scatter = {"verdict": repeats.verdict, "head": head[1:], "rows": cells}
+        scatter |= {"notes": repeats_text.notes(repeats), "warnings": repeats_text.warnings(repeats)}
     counts = Counter(str(record["status"]) for record in records)
     return page(
         "batch.html",
@@ -54,19 +56,8 @@ def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: 
         heads=[(name, units[name]) for name in names],
         rows=rows,
         counts=[(status, TONES[Status(status)], number) for status, number in counts.most_common()],
-        repeats=None if repeats is None else _scatter(repeats),
+        repeats=scatter,
     )
-
-
-def _scatter(repeats: Repeats) -> dict[str, Any]:
-    head, *rows = repeats_text.rows(repeats)
-    return {
-        "verdict": repeats.verdict,
-        "head": head[1:],
-        "rows": rows,
-        "notes": repeats_text.notes(repeats),
-        "warnings": repeats_text.warnings(repeats),
-    }
 
 
 def _parameters(records: Sequence[Record]) -> list[str]:
@@ -78,11 +69,6 @@ def _parameters(records: Sequence[Record]) -> list[str]:
         if p["free"] and not NUISANCE.fullmatch(name)
     )
     return sorted(names, key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
-
-
-def _unit(records: Sequence[Record], name: str) -> str:
-    units = (record["parameters"][name]["unit"] for record in records if name in record["parameters"])
-    return next(units, "")
 
 
 def _row(record: Record, link: str | None, names: Sequence[str]) -> dict[str, Any]:
@@ -135,7 +121,7 @@ def _figure(records: Sequence[Record], links: Sequence[str | None], name: str, u
                     links=[{"link": links[i]} if links[i] else {} for i, _, _ in rows],
                 )
             )
-    label = f"{name} ({unit})" if unit else name
+    label = labelled(name, unit)
     caption = (
         f"Fitted {label} of each file with its standard error. A click on a point opens the page of its fit."
     )

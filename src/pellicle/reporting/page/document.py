@@ -20,7 +20,6 @@ class Table(NamedTuple):
     caption: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
-    kind: str = ""
 
 
 def page(template: str, title: str, figures: Sequence[Mapping[str, Any]], **content: Any) -> str:

@@ -1,28 +1,24 @@
 """Page of a fit and its posterior: verdict, interactive figures, tables, sources, and how to repeat it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.result import Status
+from pellicle.fitting.result import Fit, Part, Status
 from pellicle.fitting.status import RIVAL
-from pellicle.reporting import fit_text, parameter_text
-from pellicle.reporting.drawable import Line, Panel, Section
+from pellicle.reporting import figures, fit_text
+from pellicle.reporting.drawable import Line, Panel, Section, labelled
 from pellicle.reporting.fit_panels import file_names
-from pellicle.reporting.page import figures, repetition
+from pellicle.reporting.json_record import taken
+from pellicle.reporting.page import repetition
 from pellicle.reporting.page.document import Table, page, picture
+from pellicle.reporting.plain_text import with_unit
 from pellicle.reporting.plotly_figure import figure
-from pellicle.reporting.quantities import colours_in_words, colours_of, display
-from pellicle.sampling.result import verdict
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit, Part
-    from pellicle.sampling.result import Posterior
+from pellicle.reporting.quantities import colour_codes, colours_in_words, colours_of
+from pellicle.sampling.result import Posterior, verdict
 
 TONES = {
     Status.CONVERGED: "good",
@@ -36,8 +32,6 @@ TONES = {
 """Class of the page's style for each status."""
 MOST_FIGURES = 40
 """Parts of a joint fit that have an interactive figure; the CSV file has them all."""
-_FAINT = 0.4
-"""Opacity of the background of a correlation of ±1; text on it keeps its contrast."""
 
 
 def fit_page(
@@ -54,71 +48,43 @@ def fit_page(
     """
     of_data = [figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
     misfit, index = figures.of_misfit(fit), figures.of_index(fit)
+    section = surface = None
     shown = [*of_data, *(each for each in (misfit, index) if each)]
-    about = None
     if posterior is not None:
-        about = posterior_section(posterior, pictures or {})
-        shown.append(about["trace"])
-    surface = None
+        section = posterior_section(posterior, pictures or {})
+        shown.append(section["trace"])
     if fit.layer_test is not None:
         from pellicle.reporting.page.surface_section import surface_section
 
         surface = surface_section(fit)
         shown.append(surface["lobes"])
-    names = " and ".join(name for name in file_names(fit) if name) or "fit"
-    content = {
-        **_tables(fit),
-        "data_figures": of_data,
-        "image": picture(image, f"Figure of the fit: {fit.verdict}"),
-        "misfit": misfit,
-        "index": index,
-        "surface": surface,
-        "posterior": about,
-        "again": [
-            {"name": f"again-{i}", "about": about, "text": text} for i, (about, text) in enumerate(again)
-        ],
-        "sources": repetition.sources(fit, posterior),
-        "bibtex": repetition.bibtex(),
-    }
-    return page("fit.html", names, shown, sections=_sections(content), **content)
-
-
-def _tables(fit: Fit) -> dict[str, Any]:
-    """Words, tables and swatches of a fit for the template, beside its figures."""
-    return {
-        "tone": TONES[fit.status],
-        "status": str(fit.status),
-        "verdict": fit.verdict,
-        "advice": fit_text.ADVICE[fit.status],
-        "warnings": fit.warnings,
-        "swatches": [_swatches(part) for part in fit.parts if isinstance(part.curve, ColourCurve)],
-        "rivals": _rivals(fit),
-        "parameters": _parameters(fit),
-        "matrix": _matrix(fit),
-        "budget": _budget(fit),
-        "together": parameter_text.together(fit.free[0]) if fit.budget and fit.free else "",
-        "layer": Table("Error on samples that were held out", (), fit_text.layer_test_rows(fit)),
-        "plans": [_plan(part) for part in fit.parts],
-        "statistics": _statistics(fit),
-    }
-
-
-def _sections(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    every = [
-        ("warnings", f"Warnings ({len(content['warnings'])})", content["warnings"]),
-        ("data", "Data and fit", True),
-        ("rivals", "Misfit and rivals", content["misfit"] or content["rivals"].rows),
-        ("nk", "n and k", content["index"]),
-        ("parameters", "Parameters", True),
-        ("layer", "Layer test", content["layer"].rows),
-        ("surface", "Sphere and lobes", content["surface"]),
-        ("posterior", "Posterior", content["posterior"]),
-        ("plan", "Plan", True),
-        ("statistics", "Statistics", True),
-        ("again", "Repeat it", content["again"]),
-        ("cite", "How to cite", True),
-    ]
-    return [(name, text) for name, text, there in every if there]
+    lead = fit.free[0] if fit.free else None
+    caption = f"Standard uncertainties, and what each alone would change {lead.name if lead else ''}"
+    return page(
+        "fit.html",
+        " and ".join(filter(None, file_names(fit))) or "fit",
+        shown,
+        **taken(fit, "status", "verdict", "warnings"),
+        **{"tone": TONES[fit.status], "advice": fit_text.ADVICE[fit.status]},
+        swatches=[_swatches(part) for part in fit.parts if isinstance(part.curve, ColourCurve)],
+        rivals=_rivals(fit),
+        parameters=_parameters(fit),
+        matrix=dict(zip(fit.correlation_names, np.asarray(fit.correlation).tolist(), strict=True)),
+        budget=Table(caption, ("effect", "uncertainty", "change"), fit_text.budget_rows(fit)),
+        together=fit_text.together(lead) if fit.budget and lead else "",
+        layer=Table("Error on samples that were held out", (), fit_text.layer_test_rows(fit)),
+        plans=[_plan(part) for part in fit.parts],
+        statistics=_statistics(fit),
+        data_figures=of_data,
+        image=picture(image, f"Figure of the fit: {fit.verdict}"),
+        misfit=misfit,
+        index=index,
+        surface=surface,
+        posterior=section,
+        again=again,
+        sources=repetition.sources(fit, posterior),
+        bibtex=repetition.bibtex(),
+    )
 
 
 def _rivals(fit: Fit) -> Table:
@@ -134,10 +100,10 @@ def _rivals(fit: Fit) -> Table:
             value = f"{rival.parameters[name]:.5g}" if name in rival.parameters else ""
             error = "" if rival.stderr is None or name not in rival.stderr else f" ± {rival.stderr[name]:.2g}"
             cells.append(value + error)
-        about = figures.label(rival, fit)
+        about = figures.rival_label(rival, fit)
         rows.append({"number": number, "about": about, "cells": cells, "shown": bool(rival.curves)})
-    units = {name: fit.parameters[name].unit for name in names if name in fit.parameters}
-    heads = [f"{name} ({units[name]})" if units.get(name) else name for name in names]
+    units = {name: p.unit for name, p in fit.parameters.items()}
+    heads = [labelled(name, units.get(name, "")) for name in names]
     head = ["rival", "Δχ²", *(["probability"] if known else []), *heads]
     caption = f"Other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)"
     return Table(caption, head, rows)
@@ -146,36 +112,14 @@ def _rivals(fit: Fit) -> Table:
 def _parameters(fit: Fit) -> Table:
     rows = []
     for p in sorted(fit.parameters.values(), key=lambda p: not p.free):
-        unit = f" {p.unit}" if p.unit else ""
-        if not p.free:
-            rows.append((p.name, f"{p.value:.6g}{unit} (fixed)", "", "", ""))
-            continue
-        finite = math.isfinite(p.stderr)
-        noise = f"{p.stderr_noise:.2g}{unit}" if math.isfinite(p.stderr_noise) else ""
-        expanded = f"± {p.expanded:.2g}{unit}" if finite else ""
-        words = parameter_text.value_in_words(p), expanded, noise, parameter_text.bounds_in_words(p)
-        rows.append((p.name, *words))
+        noise = expanded = ""
+        if p.free and math.isfinite(p.stderr_noise):
+            noise = with_unit(f"{p.stderr_noise:.2g}", p.unit)
+        if p.free and math.isfinite(p.stderr):
+            expanded = with_unit(f"± {p.expanded:.2g}", p.unit)
+        rows.append((p.name, fit_text.value_in_words(p), expanded, noise, fit_text.bounds_in_words(p)))
     head = ("parameter", "value ± standard error", "95 %", "error by noise alone", "bounds")
     return Table("Parameters, the free ones first", head, rows)
-
-
-def _matrix(fit: Fit) -> dict[str, Any]:
-    """Correlations with the tint of each cell: name of a colour and its opacity."""
-    names = fit.correlation_names
-
-    def cell(value: float) -> tuple[str, tuple[str, str]]:
-        if not math.isfinite(value):
-            return "", ("plus", "0")
-        return f"{value:+.2f}", ("plus" if value > 0 else "minus", f"{_FAINT * abs(value):.2f}")
-
-    rows = [(name, [cell(float(x)) for x in row]) for name, row in zip(names, fit.correlation, strict=True)]
-    return {"names": names, "rows": rows if len(names) > 1 else []}
-
-
-def _budget(fit: Fit) -> Table:
-    lead = next(iter(fit.free), None)
-    caption = f"Standard uncertainties, and what each alone would change {lead.name}" if lead else ""
-    return Table(caption, ("effect", "uncertainty", "change"), parameter_text.rows(fit))
 
 
 def _plan(part: Part) -> Table:
@@ -202,21 +146,17 @@ def _statistics(fit: Fit) -> Table:
 def _swatches(part: Part) -> dict[str, Any]:
     """Colours of data and fit as a browser shows them, and their differences."""
     data, curve = colours_of(part)
-    both = zip(display(data, curve.data), display(data, curve.model), strict=True)
+    codes = zip(colour_codes(data, curve.data), colour_codes(data, curve.model), strict=True)
     rows = [
         {
             "name": f"{i + 1}" if data.angle is None else f"{data.angle[i]:g}°",
-            "data": _hex(measured),
-            "fit": _hex(model),
+            "data": measured,
+            "fit": model,
             "difference": "" if curve.difference is None else f"{curve.difference[i]:.2g}",
         }
-        for i, (measured, model) in enumerate(both)
+        for i, (measured, model) in enumerate(codes)
     ]
     return {"caption": colours_in_words(part), "rows": rows}
-
-
-def _hex(rgb: Any) -> str:
-    return "#" + "".join(f"{round(255 * min(max(float(x), 0.0), 1.0)):02x}" for x in rgb)
 
 
 _STEPS, _WALKERS, _PARAMETERS = 300, 8, 8
@@ -264,8 +204,7 @@ def _trace(posterior: Posterior) -> dict[str, Any]:
     step = np.tile([*np.arange(steps) * (len(posterior.draws) / max(steps, 1)), np.nan], walkers)
     panels = []
     for i, name in enumerate(posterior.names[:_PARAMETERS]):
-        unit = posterior.fit.parameters[name].unit
-        title = f"{name} ({unit})" if unit else name
+        title = labelled(name, posterior.fit.parameters[name].unit)
         values = np.pad(draws[:, :, i], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()
         panels.append([Panel(title, [Line(step, values, title, "index-n", width=0.8, listed=False)])])
     caption = f"Trace of {walkers} of {posterior.draws.shape[1]} walkers after the burn-in."

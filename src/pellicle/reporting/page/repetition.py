@@ -1,21 +1,17 @@
 """Recipe and command that repeat a fit, and the sources to cite with it."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.fitting.result import Fit
 from pellicle.materials.named_dispersion import materials_in
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit
-    from pellicle.sampling.result import Posterior
+from pellicle.sampling.result import Posterior
 
 _LONGEST = 200_000
 """Bytes of a recipe above which it is not copied into the page."""

@@ -1,9 +1,7 @@
 """Section of a surface in the page of a fit: lobes of its BRDF, and a sphere under one lamp."""
 
-from __future__ import annotations
-
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,18 +9,16 @@ import numpy as np
 
 from pellicle.brdf.directions import direction, frame
 from pellicle.brdf.models import model
+from pellicle.fitting.result import Fit
 from pellicle.programs.cache import kept
 from pellicle.rendering.export import with_values
 from pellicle.reporting.drawable import CHANNELS, Line, Panel, Section, Table
+from pellicle.reporting.figures import rival_label
 from pellicle.reporting.page.document import picture
-from pellicle.reporting.page.figures import label
 from pellicle.reporting.plotly_figure import figure
-from pellicle.reporting.rendering_display import display
+from pellicle.reporting.renderings import display
 from pellicle.scene.surface import Surface
 from pellicle.simulation.environment import EYE, sphere
-
-if TYPE_CHECKING:
-    from pellicle.fitting.result import Fit
 
 _INCIDENCES = (15.0, 45.0, 70.0)
 _LEAVING = np.linspace(-88.0, 88.0, 177)
@@ -72,7 +68,7 @@ def surface_section(fit: Fit) -> dict[str, Any]:
         " angles to the eye are on the side of the mirror direction."
     )
     others = [
-        (f"rival: {label(rival, fit)}", _panels(own, names))
+        (f"rival: {rival_label(rival, fit)}", _panels(own, names))
         for rival, own in zip(fit.rivals, of_rivals, strict=True)
     ]
     rows = [[panel] for panel in _panels(lobes, names)]

@@ -5,9 +5,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.reporting import sphere_figures
-from pellicle.reporting.rendering_display import display, exposure
-from pellicle.reporting.sphere_figures import balls, bubbles
+from pellicle.reporting import renderings
+from pellicle.reporting.renderings import balls, bubbles, display, exposure
 from pellicle.simulation.environment import Rendering
 
 PNG = b"\x89PNG"
@@ -34,7 +33,7 @@ def test_figures_are_written(tmp_path, monkeypatch):
     balls(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", (50.0, 100.0), size=9)
     bubbles(film, tmp_path / "bubbles.png", (300.0, 100.0), size=9)
     assert all((tmp_path / name).read_bytes().startswith(PNG) for name in ("balls.png", "bubbles.png"))
-    monkeypatch.setattr(sphere_figures, "bubble", lambda *_: pytest.fail("drawn before it is refused"))
+    monkeypatch.setattr(renderings, "bubble", lambda *_: pytest.fail("drawn before it is refused"))
     with pytest.raises(UsageError, match="exists"):
         bubbles(film, tmp_path / "bubbles.png", (300.0,), size=9)
     with pytest.raises(UsageError, match="there is no folder"):

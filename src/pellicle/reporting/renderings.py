@@ -1,9 +1,13 @@
-"""Figures of spheres: a surface with its BRDF, balls under a film, a bubble, one film by several methods."""
+"""Renderings: their display in sRGB, figures of spheres, and the report of a film exported to a renderer.
+
+Spheres are a surface with its BRDF, balls under a film, a bubble, and one film by several methods.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import jax
@@ -11,19 +15,52 @@ import numpy as np
 
 from pellicle.accuracy.colour_methods import EXACT, ColourMap, colour_maps
 from pellicle.accuracy.colour_methods import EYE as OBSERVER
-from pellicle.colour import linear_srgb, sensor
-from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
-from pellicle.reporting.rendering_display import display, encode, exposure
+from pellicle.colour import linear_srgb, sensor, srgb
+from pellicle.colour.spaces import LUMINANCE, into_srgb
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, plain, save_figure
+from pellicle.reporting.plain_text import block, table, wrapped
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
-from pellicle.simulation.environment import EYE, Environment, Sphere, light_tent, one_lamp, studio
+from pellicle.simulation.environment import EYE, Environment, Rendering, Sphere, light_tent, one_lamp, studio
 from pellicle.simulation.environment import sphere as sphere_pixels
 from pellicle.simulation.film_sphere import ball, bubble, stack
 from pellicle.simulation.surface_sphere import in_plane, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
+
+    from pellicle.rendering.export import Export
+
+_srgb = jax.jit(srgb)  # compiled one by one its operations take 0.3 s
+WHITE_PERCENTILE = 99.5
+"""Percentile of the luminance that is shown as white: lamps are brighter than what they light."""
+
+
+def exposure(*renderings: Rendering, percentile: float = WHITE_PERCENTILE) -> float:
+    """Factor, of two digits, that shows this percentile of the spheres' luminance as white."""
+    luminance = np.concatenate([(p.linear @ LUMINANCE)[p.coverage > 0.5] for p in renderings])
+    white = np.percentile(luminance, percentile)
+    return float(f"{1 / white:.2g}") if white > 0 else 1.0
+
+
+def display(rendering: Rendering, factor: float | None = None, background: float = 1.0) -> np.ndarray:
+    """Convert a rendering to sRGB (size, size, 3), multiplied by an exposure (its own if None).
+
+    Colours outside sRGB, and brighter than white, are mixed with grey by `into_srgb`. `background` is the
+    sRGB value around the sphere.
+    """
+    factor = exposure(rendering) if factor is None else factor
+    shown = encode(factor * rendering.linear)
+    share = rendering.coverage[..., None]
+    return share * shown + (1 - share) * background
+
+
+def encode(linear: np.ndarray) -> np.ndarray:
+    """Convert linear sRGB (..., 3) to display values, colours outside as `into_srgb` says."""
+    return np.asarray(_srgb(into_srgb(linear)))
+
 
 INCIDENCES = (15.0, 45.0, 70.0)
 LEAVING = np.linspace(-88.0, 88.0, 353)
@@ -66,15 +103,9 @@ def sphere(
     grid = figure.add_gridspec(len(lobes), 2, width_ratios=[2.2, 1])
     axes = figure.add_subplot(grid[:, 0])
     _show(axes, display(rendering, factor))
-    axes.set_title(title.replace("$", r"\$"), loc="left", fontsize="medium")
-    axes.text(
-        0.0,
-        -0.01,
-        _lighting(f"D65, {environment}", factor),
-        transform=axes.transAxes,
-        va="top",
-        fontsize="x-small",
-    )
+    axes.set_title(plain(title), loc="left", fontsize="medium")
+    note = f"D65, {environment}; exposure × {factor:g}"
+    axes.text(0.0, -0.01, note, transform=axes.transAxes, va="top", fontsize="x-small")
     for row, (angle, values) in enumerate(lobes.items()):
         _draw_lobe(figure.add_subplot(grid[row, 1], projection="polar"), angle, values, surface)
     save_figure(figure, target, dpi=DPI)
@@ -132,7 +163,7 @@ def balls(
         rows["seen through"] = [display(each, factor, behind) for each in through]
         rows["together"] = [display(each.whole, factor, behind) for each in renderings]
     names = [f"{nm:g} nm" for nm in thickness]
-    save_figure(_draw_grid(rows, names, title, _lighting(f"{illuminant}, studio", factor)), target, dpi=DPI)
+    _save_grid(target, rows, names, title, f"{illuminant}, studio; exposure × {factor:g}")
 
 
 def bubbles(
@@ -154,11 +185,9 @@ def bubbles(
     tent = light_tent()
     renderings = [bubble(films, top, tent, size) for top in thickness]
     factor = exposure(*renderings)
-    shown = [display(each, factor, _background(tent, factor)) for each in renderings]
+    rows = {"": [display(each, factor, _background(tent, factor)) for each in renderings]}
     names = [f"{float(f'{top:.3g}'):g} nm at the top" for top in thickness]
-    save_figure(
-        _draw_grid({"": shown}, names, title, _lighting(f"{illuminant}, light tent", factor)), target, dpi=DPI
-    )
+    _save_grid(target, rows, names, title, f"{illuminant}, light tent; exposure × {factor:g}")
 
 
 def _background(surroundings: Environment, factor: float) -> float:
@@ -166,12 +195,10 @@ def _background(surroundings: Environment, factor: float) -> float:
     return float(encode(np.full(3, factor * surroundings.radiance(-EYE)))[0])
 
 
-def _lighting(lamps: str, factor: float) -> str:
-    return f"{lamps}; exposure × {factor:g}"
-
-
-def _draw_grid(rows: dict[str, list[np.ndarray]], names: list[str], title: str, note: str) -> Figure:
-    """Rows of renderings under the names of the columns."""
+def _save_grid(
+    path: Path, rows: dict[str, list[np.ndarray]], names: list[str], title: str, note: str
+) -> None:
+    """Write rows of renderings under the names of the columns."""
     count = len(names)
     figure = new_figure(0.3 + 1.9 * count, 0.6 + 1.95 * len(rows))
     panels = figure.subplots(len(rows), count, squeeze=False)
@@ -181,9 +208,13 @@ def _draw_grid(rows: dict[str, list[np.ndarray]], names: list[str], title: str, 
         row[0].set_ylabel(word, fontsize="small")
     for axes, name in zip(panels[0], names, strict=True):
         axes.set_title(name, fontsize="small")
-    figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize="medium")
+    _describe(figure, title, note)
+    save_figure(figure, path, dpi=DPI)
+
+
+def _describe(figure: Figure, title: str, note: str) -> None:
+    figure.suptitle(plain(title), x=0.01, ha="left", fontsize="medium")
     figure.supxlabel(note, x=0.01, ha="left", fontsize="x-small")
-    return figure
 
 
 def _show(axes: Axes, image: np.ndarray) -> None:
@@ -198,7 +229,7 @@ FILMS, ANGLES = 160, 80
 """Thicknesses and angles at which colours are computed; pixels are interpolated between them."""
 STEEPEST = 80.0
 """Largest angle of incidence: beyond it, at 1.5 % of the radius from the limb, colours stay the same."""
-WHITE_PERCENTILE = 92.0
+LIMB_PERCENTILE = 92.0
 """Percentile of the luminance that is shown as white: at the limb any film reflects more than elsewhere."""
 LARGEST = 10.0
 """ΔE2000 at the end of the scale; two colours that differ so are different at a glance."""
@@ -221,57 +252,53 @@ def draw_methods(
 
     **Raises:** UsageError as `colour_maps` does, for another file type, and where the file exists.
     """
-    target = figure_path(path)
-    nm, degrees = np.linspace(*thickness, FILMS), np.linspace(0.0, STEEPEST, ANGLES)
-    maps = colour_maps(scene, nm, degrees)
-    factor = float(f"{1 / np.percentile(maps[0].xyz[..., 1], WHITE_PERCENTILE):.2g}")
-    save_figure(_draw(maps, factor, thickness, title, sphere_pixels(size)), target, dpi=DPI)
-    return maps
-
-
-def _draw(
-    maps: list[ColourMap], factor: float, thickness: tuple[float, float], title: str, pixels: Sphere
-) -> Figure:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    white, scale = sensor(*OBSERVER).white, Normalize(0.0, LARGEST)
+    target = figure_path(path)
+    nm, degrees = np.linspace(*thickness, FILMS), np.linspace(0.0, STEEPEST, ANGLES)
+    maps = colour_maps(scene, nm, degrees)
+    factor = float(f"{1 / np.percentile(maps[0].xyz[..., 1], LIMB_PERCENTILE):.2g}")
+    pixels = sphere_pixels(size)
+    scale = Normalize(0.0, LARGEST)
     figure = new_figure(1.0 + 1.9 * len(maps), 5.1)
     panels = figure.subplots(2, len(maps), squeeze=False)
     for above, below, colours in zip(*panels, maps, strict=True):
-        linear = np.asarray(linear_srgb(colours.xyz, white))
-        above.imshow(
-            display(pixels.rendering(_over(pixels, linear)), factor, DARK), interpolation="antialiased"
-        )
-        above.set_title(f"{colours.name}\n{_time(colours.seconds)} a colour", fontsize="small")
-        error = np.full(pixels.mask.shape, np.nan)
-        error[pixels.mask] = np.where(
-            pixels.share > 0.5, _over(pixels, colours.delta_e[..., None])[:, 0], np.nan
-        )
-        below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
-        mean, largest = (_size(size) for size in (np.mean(colours.delta_e), np.max(colours.delta_e)))
-        words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
-        below.set_title(words, fontsize="small")
+        _draw_method(above, below, colours, pixels, factor, scale)
     for axes in panels.flat:
         axes.set(xticks=[], yticks=[])
         axes.set_frame_on(False)
     mappable = ScalarMappable(norm=scale, cmap="magma_r")
     figure.colorbar(mappable, ax=panels[1], label="ΔE2000", shrink=0.85, pad=0.01, extend="max")
-    figure.suptitle(title.replace("$", r"\$"), x=0.01, ha="left", fontsize="medium")
     note = (
         f"D65, surroundings of one radiance; exposure × {factor:g}; {thickness[0]:g} nm at the top to"
         f" {thickness[1]:g} nm at the bottom; 0° in the middle to {STEEPEST:g}° at the limb"
     )
-    figure.supxlabel(note, x=0.01, ha="left", fontsize="x-small")
-    return figure
+    _describe(figure, title, note)
+    save_figure(figure, target, dpi=DPI)
+    return maps
 
 
-def _size(delta_e: float) -> str:
-    return f"{delta_e:.2g}" if delta_e >= 1e-3 else "below 0.001"
-
-
-def _time(seconds: float) -> str:
-    return f"{seconds * 1e9:.0f} ns" if seconds < 1e-6 else f"{seconds * 1e6:.1f} µs"
+def _draw_method(
+    above: Axes, below: Axes, colours: ColourMap, pixels: Sphere, factor: float, scale: Normalize
+) -> None:
+    """The ball by one method, its time, and below it the ΔE2000 of each pixel."""
+    linear = np.asarray(linear_srgb(colours.xyz, sensor(*OBSERVER).white))
+    ball_of_film = display(pixels.rendering(_over(pixels, linear)), factor, DARK)
+    above.imshow(ball_of_film, interpolation="antialiased")
+    seconds = colours.seconds
+    time = f"{seconds * 1e9:.0f} ns" if seconds < 1e-6 else f"{seconds * 1e6:.1f} µs"
+    above.set_title(f"{colours.name}\n{time} a colour", fontsize="small")
+    error = np.full(pixels.mask.shape, np.nan)
+    of_pixels = _over(pixels, colours.delta_e[..., None])[:, 0]
+    error[pixels.mask] = np.where(pixels.share > 0.5, of_pixels, np.nan)
+    below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
+    mean, largest = (
+        f"{size:.2g}" if size >= 1e-3 else "below 0.001"
+        for size in (np.mean(colours.delta_e), np.max(colours.delta_e))
+    )
+    words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
+    below.set_title(words, fontsize="small")
 
 
 def _over(pixels: Sphere, values: np.ndarray) -> np.ndarray:
@@ -282,3 +309,28 @@ def _over(pixels: Sphere, values: np.ndarray) -> np.ndarray:
     column = np.rad2deg(np.arccos(pixels.cosine)) / STEEPEST * (values.shape[1] - 1)
     at = np.stack([row, np.minimum(column, values.shape[1] - 1)])
     return np.stack([map_coordinates(each, at, order=1) for each in np.moveaxis(values, -1, 0)], axis=-1)
+
+
+def export_text(export: Export) -> str:
+    """Format an exported film as plain text."""
+    material = export.material
+    notes = [line for note in material.look.notes for line in wrapped(note, "- ", "  ")]
+    if material.solved is None:
+        return block(f"{export.title}: {material.name}", [*wrapped("exact colours, tabulated"), *notes])
+    sets = {"as it is": material.solved.physical, "solved": material.solved.effective}
+    rows = [("", *sets)]
+    even = len(material.look.thickness) == 1
+    ends = [solution.scale * material.look.thickness[[0, -1]] for solution in sets.values()]
+    spans = (f"{low:.5g}" if even else f"{low:.5g} to {high:.5g}" for low, high in ends)
+    rows.append(("thickness (nm)", *spans))
+    for key in material.solved.physical.numbers:
+        values = (np.ravel(solution.numbers[key]) for solution in sets.values())
+        rows.append((key, *(" ".join(f"{x:.4g}" for x in value) for value in values)))
+    rows.append(("mean ΔE2000", *(f"{each.error.mean:.2f}" for each in sets.values())))
+    rows.append(("largest ΔE2000", *(f"{each.error.largest:.1f}" for each in sets.values())))
+    used = "solved numbers are" if material.solved.used == "effective" else "film's own numbers are"
+    said = wrapped(
+        f"ΔE2000 of {material.solved.formula.name} from the exact colours (CIE 1931, D65), 0 to 80 degrees."
+        f" The {used} drawn; the file has both."
+    )
+    return block(f"{export.title}: {material.name}", [*table(rows), "", *said, *notes])
