@@ -141,6 +141,27 @@ class Option:
         return schema
 
 
+@dataclass(frozen=True)
+class SpectrumOption(Option):
+    """An option of spectra alone."""
+
+    kinds: tuple[str, ...] = (SPECTRA,)
+
+
+@dataclass(frozen=True)
+class ColourOption(Option):
+    """An option of colours alone."""
+
+    kinds: tuple[str, ...] = (COLOURS,)
+
+
+@dataclass(frozen=True)
+class CommonOption(Option):
+    """An option of spectra, colours and BRDF samples."""
+
+    kinds: tuple[str, ...] = (SPECTRA, COLOURS, BRDF)
+
+
 class Options:
     """Base of the records of options."""
 
@@ -175,47 +196,35 @@ class CameraOptions(Options):
     """Observer or camera of the colours of a film, and its light; `[camera]` of a recipe. Files are CSV."""
 
     observer: Annotated[
-        str | None, Option("1931 (2 degrees) or 1964 (10 degrees).", kinds=(COLOURS,), words=("1931", "1964"))
+        str | None, ColourOption("1931 (2 degrees) or 1964 (10 degrees).", words=("1931", "1964"))
     ] = None
     illuminant: Annotated[
         str | None,
-        Option(
-            "E, A, D50, D55, D65 or D75 (D65).",
-            kinds=(COLOURS,),
-            words=("E", "A", "D50", "D55", "D65", "D75"),
-        ),
+        ColourOption("E, A, D50, D55, D65 or D75 (D65).", words=("E", "A", "D50", "D55", "D65", "D75")),
     ] = None
     lamp: Annotated[
-        str | None,
-        Option("CSV of the lamp's spectrum, for --illuminant.", kinds=(COLOURS,), is_file=True),
+        str | None, ColourOption("CSV of the lamp's spectrum, for --illuminant.", is_file=True)
     ] = None
     sensitivities: Annotated[
-        str | None,
-        Option("CSV of a camera's three sensitivities (signal rgb).", kinds=(COLOURS,), is_file=True),
+        str | None, ColourOption("CSV of a camera's three sensitivities (signal rgb).", is_file=True)
     ] = None
     chart: Annotated[
         str | None,
-        Option(
-            "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).",
-            kinds=(COLOURS,),
-            is_file=True,
+        ColourOption(
+            "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).", is_file=True
         ),
     ] = None
     gamma: Annotated[
-        float | None,
-        Option("Coding of the signal rgb: linear^(1/GAMMA) (1).", kinds=(COLOURS,), least=0.1, most=10),
+        float | None, ColourOption("Coding of the signal rgb: linear^(1/GAMMA) (1).", least=0.1, most=10)
     ] = None
     white_balance: Annotated[
         str | None,
-        Option(
-            "fixed, or free for an unknown factor of each channel.", kinds=(COLOURS,), words=("fixed", "free")
-        ),
+        ColourOption("fixed, or free for an unknown factor of each channel.", words=("fixed", "free")),
     ] = None
     white: Annotated[
-        str | list[int] | None,
-        Option("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.", kinds=(COLOURS,)),
+        str | list[int] | None, ColourOption("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
     ] = None
-    transmitted: Annotated[bool | None, Option("The light has passed the film.", kinds=(COLOURS,))] = None
+    transmitted: Annotated[bool | None, ColourOption("The light has passed the film.")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,10 +236,9 @@ class SpectrumOptions(Options):
     )
     signal: Annotated[
         str | None,
-        Option(
+        CommonOption(
             "R, T, psi-delta, mueller, generalised-psi-delta, contrast, srgb, rgb, xyz or lab (that of the"
             " file).",
-            kinds=(SPECTRA, COLOURS, BRDF),
             words=(*SIGNALS, "brdf"),
         ),
     ] = None
@@ -239,56 +247,45 @@ class SpectrumOptions(Options):
     )
     range: Annotated[
         tuple[float, float] | None,
-        Option("Wavelengths to use in nm.", metavar="LO:HI", kinds=(SPECTRA,), parse=parse_range),
+        SpectrumOption("Wavelengths to use in nm.", metavar="LO:HI", parse=parse_range),
     ] = None
     columns: Annotated[
         str | Sequence[str] | None,
-        Option(
-            "Names of the columns in order, _ to skip.",
-            metavar="NAME,...",
-            kinds=(SPECTRA, COLOURS, BRDF),
-        ),
+        CommonOption("Names of the columns in order, _ to skip.", metavar="NAME,..."),
     ] = None
     wavelength_unit: Annotated[
-        str | None, Option("nm, um, A, eV, cm-1 or THz.", kinds=(SPECTRA,), find=_wavelength_unit)
+        str | None, SpectrumOption("nm, um, A, eV, cm-1 or THz.", find=_wavelength_unit)
     ] = None
     signal_unit: Annotated[
         str | None, Option("fraction, percent or absorbance; 8-bit or 16-bit of colours.", find=_signal_unit)
     ] = None
     folded: Annotated[
         bool | None,
-        Option(
-            "Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).",
-            kinds=(SPECTRA,),
-            negative=True,
+        SpectrumOption(
+            "Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).", negative=True
         ),
     ] = None
     transmission: Annotated[
         bool | None,
-        Option("Psi and delta are those of transmitted light, t_p/t_s (that of the file).", kinds=(SPECTRA,)),
+        SpectrumOption("Psi and delta are those of transmitted light, t_p/t_s (that of the file)."),
     ] = None
     analyser: Annotated[
         float | None,
-        Option(
+        SpectrumOption(
             "Analyser angle in degrees (for alpha and beta columns).",
-            kinds=(SPECTRA,),
             least=0,
             most=90,
             exclusive=True,
             unit="degrees",
         ),
     ] = None
-    spot: Annotated[
-        int | None,
-        Option("Spot of an Accurion file, counted from 1.", kinds=(SPECTRA,), least=1),
-    ] = None
+    spot: Annotated[int | None, SpectrumOption("Spot of an Accurion file, counted from 1.", least=1)] = None
     elements: Annotated[
         Sequence[str] | None,
-        Option(
+        SpectrumOption(
             "Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
             metavar="m12,...",
             parse=lambda text, name: [word.strip() for word in text.split(",")],
-            kinds=(SPECTRA,),
         ),
     ] = None
 
@@ -299,22 +296,19 @@ class ReadingOptions(SpectrumOptions):
 
     noise: Annotated[
         float | str | None,
-        Option(
+        CommonOption(
             'Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
             metavar="SIGMA",
-            kinds=(SPECTRA, COLOURS, BRDF),
             parse=_number_or_text,
         ),
     ] = None
     region: Annotated[
         str | list[int] | list[list[int]] | None,
-        Option(
-            "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several.", kinds=(COLOURS,)
-        ),
+        ColourOption("X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."),
     ] = None
     points: Annotated[
         str | list[int] | list[list[int]] | None,
-        Option("X,Y of a film in a photograph; ';' between several.", kinds=(COLOURS,)),
+        ColourOption("X,Y of a film in a photograph; ';' between several."),
     ] = None
     angle: Annotated[
         float | list[float] | None,
@@ -329,14 +323,10 @@ class ReadingOptions(SpectrumOptions):
     ] = None
     reference: Annotated[
         str | None,
-        Option(
-            "Raw counts of a bare reference; DATA are then raw counts too.", kinds=(SPECTRA,), is_file=True
-        ),
+        SpectrumOption("Raw counts of a bare reference; DATA are then raw counts too.", is_file=True),
     ] = None
-    reference_material: Annotated[str | None, Option("Material of the reference (Si).", kinds=(SPECTRA,))] = (
-        None
-    )
-    dark: Annotated[str | None, Option("Raw counts without light.", kinds=(SPECTRA,), is_file=True)] = None
+    reference_material: Annotated[str | None, SpectrumOption("Material of the reference (Si).")] = None
+    dark: Annotated[str | None, SpectrumOption("Raw counts without light.", is_file=True)] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -345,19 +335,14 @@ class FitOptions(Options):
 
     loss: Annotated[
         str | None,
-        Option(
+        CommonOption(
             "least-squares, or huber or student-t to give outliers little weight.",
-            kinds=(SPECTRA, COLOURS, BRDF),
             words=("least-squares", "huber", "student-t"),
         ),
     ] = None
     tolerance: Annotated[
         float | None,
-        Option(
-            "Leave out effects that change the signal by less than this (0: none).",
-            kinds=(SPECTRA, COLOURS, BRDF),
-            least=0,
-        ),
+        CommonOption("Leave out effects that change the signal by less than this (0: none).", least=0),
     ] = None
 
 

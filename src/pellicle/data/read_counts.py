@@ -165,21 +165,14 @@ def _reflectance(
     """The calibrated spectrum of a sample. Raises DataError for values that are no reflectance."""
     place, remedy = sample.place(f"reflectance from {source}"), "leave it out with `range`, or measure again"
     check_power("reflectance", values, sigma, place, too_high=remedy, remedy=remedy)
-    return Spectrum(
-        wavelength=sample.wavelength,
+    return replace(
+        sample,
         values=values,
         signal="R",
         sigma=sigma,
-        polarisation=sample.polarisation,
-        angle=sample.angle,
-        azimuth=sample.azimuth,
-        path=sample.path,
-        sha256=sample.sha256,
+        calibrated=True,
         notes=(*sample.notes, note),
-        lines=sample.lines,
         sweeps=tuple(sweeps),
-        name=sample.name,
-        declared=sample.declared,
     )
 
 

@@ -109,21 +109,8 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
         kept = [sweep for i, sweep in enumerate(sweeps) if i not in copies]
         one = kept[0] if len(kept) == 1 else mean_spectrum(kept)
         return dataclasses.replace(one, notes=(*one.notes, note))
-    size, alike, mean = repeatability(sweeps), _alike(deviations(sweeps)), _mean(sweeps)
-    level, unit = float(np.sqrt(np.mean(mean["values"] ** 2))), ""
-    if first.kind.degrees:
-        level, unit = math.degrees(0.5), " degrees"
-    apart = size / level
-    if alike > _ALIKE and apart > MOST_APART:
-        place = f"{first.path}: the" if first.path else "the"
-        raise DataError(
-            f"{place} {count} sweeps over the same wavelengths differ by {100 * apart:.0f} % of the signal,"
-            " alike at neighbouring points, too much for repeats of one measurement; keep the rows of one"
-            " sweep, or add the column in which they differ, such as angle_deg"
-        )
-    note = f"{count} sweeps over the same wavelengths, averaged; a point scatters by {size:.2g}{unit}"
-    if alike > _ALIKE:
-        note += ", for the most part alike at neighbouring points: the sweeps drift"
+    mean = _mean(sweeps)
+    note = _note(sweeps, float(np.sqrt(np.mean(mean["values"] ** 2))))
     return dataclasses.replace(first, **mean, notes=(*first.notes, note), sweeps=tuple(sweeps))
 
 
@@ -147,11 +134,24 @@ def deviations(sweeps: Sequence[Spectrum]) -> Float[np.ndarray, "sweeps points c
     return points - points.mean(axis=0)
 
 
-def _alike(deviations: Float[np.ndarray, "sweeps points channels"]) -> float:
-    """Share of the variance that neighbouring points have in common, from their covariance."""
-    variance = float(np.mean(deviations**2))
-    common = float(np.mean(deviations[:, 1:] * deviations[:, :-1]))
-    return min(max(common / variance, 0.0), 1.0) if variance > 0 else 0.0
+def _note(sweeps: Sequence[Spectrum], level: float) -> str:
+    """A sentence on the repeatability of sweeps whose mean has the rms `level`. Raises DataError."""
+    size, count, first, unit = repeatability(sweeps), len(sweeps), sweeps[0], ""
+    if first.kind.degrees:
+        level, unit = math.degrees(0.5), " degrees"
+    apart = deviations(sweeps)
+    # the covariance of neighbouring points
+    alike = float(np.mean(apart[:, 1:] * apart[:, :-1])) > _ALIKE * float(np.mean(apart**2))
+    if alike and size / level > MOST_APART:
+        place = f"{first.path}: the" if first.path else "the"
+        raise DataError(
+            f"{place} {count} sweeps over the same wavelengths differ by {100 * size / level:.0f} % of the"
+            " signal, alike at neighbouring points, too much for repeats of one measurement; keep the rows of one"
+            " sweep, or add the column in which they differ, such as angle_deg"
+        )
+    note = f"{count} sweeps over the same wavelengths, averaged; a point scatters by {size:.2g}{unit}"
+    drift = ", for the most part alike at neighbouring points: the sweeps drift"
+    return note + drift if alike else note
 
 
 def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:

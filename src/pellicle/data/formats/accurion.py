@@ -37,7 +37,14 @@ def layout(file: TextFile, spot: int | None = None) -> Table | None:
         return None
     names = headings[heading]
     columns = {name: names.index(name) for name in (*_UNITS, "Zone", "ROIidx", *_POSITION) if name in names}
-    _check_units(columns, headings[heading + 1] if heading + 1 < len(headings) else [], path)
+    units = headings[heading + 1] if heading + 1 < len(headings) else []
+    for name, expected in _UNITS.items():
+        unit = units[columns[name]] if columns[name] < len(units) else ""
+        if unit != expected:
+            raise DataError(
+                f"{path}: the heading of an Accurion file gives {name} in {unit!r}, not in {expected!r}; "
+                "export it in that unit"
+            )
     rows = [(line, [cell.strip() for cell in line.text.split("\t")]) for line in lines]
     short = next((line for line, cells in rows if len(cells) < len(names)), None)
     if short is not None:
@@ -47,13 +54,13 @@ def layout(file: TextFile, spot: int | None = None) -> Table | None:
         )
     notes = ["read as an Accurion data file"]
     if "Zone" in columns:
-        zones = _zones(rows, columns["Zone"])
-        notes.append(_zone_note(list(zones)))
-        of_zones = [_select_spot(zone, columns, spot, path) for zone in zones.values()]
-        rows, spot_notes = _mean([spot_rows for spot_rows, _ in of_zones], columns), of_zones[0][1]
+        zones, note = _zones(rows, columns["Zone"])
+        of_zones = [_select_spot(zone, columns, spot, path) for zone in zones]
+        notes += [note, *of_zones[0][1]]
+        rows = _mean([spot_rows for spot_rows, _ in of_zones], columns)
     else:
         rows, spot_notes = _select_spot(rows, columns, spot, path)
-    notes += spot_notes
+        notes += spot_notes
     points, missing = measured(rows, (columns["Psi"], columns["Delta"]))
     if not points:
         raise DataError(f"{path}: has no point with psi and delta; check the measurement")
@@ -61,32 +68,16 @@ def layout(file: TextFile, spot: int | None = None) -> Table | None:
     return plain_columns(_NAMES, kept, [*notes, *missing])
 
 
-def _check_units(columns: dict[str, int], units: Sequence[str], path: str) -> None:
-    for name, expected in _UNITS.items():
-        unit = units[columns[name]] if columns[name] < len(units) else ""
-        if unit != expected:
-            raise DataError(
-                f"{path}: the heading of an Accurion file gives {name} in {unit!r}, not in {expected!r}; "
-                "export it in that unit"
-            )
-
-
-def _zones(rows: Rows, zone: int) -> dict[str, Rows]:
-    """The rows of each zone to use: of the mean if the file has it, else of every zone measured."""
+def _zones(rows: Rows, zone: int) -> tuple[list[Rows], str]:
+    """The rows of each zone to use, and a note: the mean if the file has it, else every zone measured."""
     zones: dict[str, Rows] = {}
     for row in rows:
         zones.setdefault(row[1][zone], []).append(row)
     if MEAN_ZONE in zones:
-        return {MEAN_ZONE: zones[MEAN_ZONE]}
-    return {name: zones[name] for name in sorted(zones) if name != SPREAD_ZONE} or zones
-
-
-def _zone_note(zones: Sequence[str]) -> str:
-    if list(zones) == [MEAN_ZONE]:
-        return "zone 0, the mean of the zones, taken"
-    if len(zones) == 1:
-        return f"measured in zone {zones[0]} only"
-    return f"the mean of zones {', '.join(zones)} taken"
+        return [zones[MEAN_ZONE]], "zone 0, the mean of the zones, taken"
+    names = sorted(zones.keys() - {SPREAD_ZONE}) or [*zones]
+    note = f"the mean of zones {', '.join(names)} taken" if len(names) > 1 else ""
+    return [zones[name] for name in names], note or f"measured in zone {names[0]} only"
 
 
 def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
@@ -106,20 +97,15 @@ def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
         same = [cells, *(zone[point(cells)] for zone in others if point(cells) in zone)]
         mean = list(cells)
         for name in ("Psi", "Delta"):
-            values = [one[columns[name]] for one in same]
-            whole = (
-                len(values) == len(zones) and not set(values) & _UNMEASURED and all(map(is_number, values))
-            )
-            mean[columns[name]] = f"{_mean_angle([float(value) for value in values]):.6g}" if whole else "NaN"
+            texts = [one[columns[name]] for one in same]
+            mean[columns[name]] = "NaN"
+            if len(texts) == len(zones) and not set(texts) & _UNMEASURED and all(map(is_number, texts)):
+                # degrees may lie on both sides of 0 and 360
+                first, *further = map(float, texts)
+                apart = [0.0, *((value - first + 180.0) % 360.0 - 180.0 for value in further)]
+                mean[columns[name]] = f"{(first + sum(apart) / len(apart)) % 360.0:.6g}"
         means.append((line, mean))
     return means
-
-
-def _mean_angle(values: Sequence[float]) -> float:
-    """Mean of angles in degrees that may lie on both sides of 0 and 360."""
-    first = values[0]
-    apart = [(value - first + 180.0) % 360.0 - 180.0 for value in values]
-    return (first + sum(apart) / len(apart)) % 360.0
 
 
 def _spots(rows: Rows, columns: dict[str, int], path: str) -> list[Rows]:
@@ -136,21 +122,16 @@ def _spots(rows: Rows, columns: dict[str, int], path: str) -> list[Rows]:
         counts[point] += 1
         by_spot.setdefault((region, counts[point]), []).append((line, cells))
     spots = list(by_spot.values())
-    if len(spots) > 1:
-        for spot in spots:
-            _check_positions(spot, columns, path)
+    for (before, first), *others in spots if len(spots) > 1 else ():
+        for line, cells in others:
+            apart = _distance(_position(first, columns), _position(cells, columns))
+            if apart > DRIFT_MM:
+                raise DataError(
+                    f"{path}: line {line.number} lies {apart:.3g} mm from line {before.number}, which should "
+                    "be of the same spot: some of its points are missing; keep the rows of one spot in the "
+                    "file"
+                )
     return spots
-
-
-def _check_positions(spot: Rows, columns: dict[str, int], path: str) -> None:
-    (before, first), *_ = spot
-    for line, cells in spot:
-        apart = _distance(_position(first, columns), _position(cells, columns))
-        if apart > DRIFT_MM:
-            raise DataError(
-                f"{path}: line {line.number} lies {apart:.3g} mm from line {before.number}, which should be "
-                "of the same spot: some of its points are missing; keep the rows of one spot in the file"
-            )
 
 
 def _region(cells: list[str], columns: dict[str, int]) -> str:
@@ -168,24 +149,18 @@ def _distance(one: tuple[float, ...], other: tuple[float, ...]) -> float:
     return dist(one, other) if len(one) == len(other) else 0.0
 
 
-def _labels(spots: list[Rows], columns: dict[str, int]) -> list[str]:
-    """A label that identifies each spot: ` in region 2`, ` at -18.183, -30.305 mm` or ` from line 9`."""
-    heads = [(line, _region(cells, columns), _position(cells, columns)) for (line, cells), *_ in spots]
-    regions = len({region for _, region, _ in heads}) > 1
-    places = any(_distance(heads[0][2], position) > DRIFT_MM for *_, position in heads)
-    labels = []
-    for line, region, position in heads:
-        place = f" at {', '.join(f'{x:g}' for x in position)} mm" if places else ""
-        labels.append((f" in region {region}" if regions else "") + place or f" from line {line.number}")
-    return labels
-
-
 def _select_spot(rows: Rows, columns: dict[str, int], spot: int | None, path: str) -> tuple[Rows, list[str]]:
     """The rows of one spot, and notes. Raises UsageError where `spot` is missing or wrong."""
     spots = _spots(rows, columns, path)
     if spot is None and len(spots) == 1:
         return spots[0], []
-    labels = _labels(spots, columns)
+    heads = [(line, _region(cells, columns), _position(cells, columns)) for (line, cells), *_ in spots]
+    regions = len({region for _, region, _ in heads}) > 1
+    places = any(_distance(heads[0][2], position) > DRIFT_MM for *_, position in heads)
+    labels = []  # ` in region 2`, ` at -18.183, -30.305 mm` or ` from line 9`
+    for line, region, position in heads:
+        place = f" at {', '.join(f'{x:g}' for x in position)} mm" if places else ""
+        labels.append((f" in region {region}" if regions else "") + place or f" from line {line.number}")
     if spot is not None and 1 <= spot <= len(spots):
         return spots[spot - 1], [f"spot {spot} of {len(spots)}{labels[spot - 1] if len(spots) > 1 else ''}"]
     if len(spots) == 1:

@@ -22,10 +22,6 @@ GRAZING = 1e-3
 """Degrees from 90 within which a cosine-weighted value does not determine the BRDF."""
 
 
-def _spherical(theta_l: np.ndarray, phi_l: np.ndarray, theta_v: np.ndarray, phi_v: np.ndarray) -> Angles:
-    return theta_l, phi_l, theta_v, phi_v
-
-
 def _isotropic(theta_v: np.ndarray, theta_l: np.ndarray, phi: np.ndarray) -> Angles:
     return theta_l, np.zeros_like(phi), theta_v, -phi  # ALTA counts from the viewer to the light
 
@@ -49,7 +45,7 @@ def _half_isotropic(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray)
 
 
 INPUTS: dict[str, tuple[tuple[str, ...], Callable[..., Angles]]] = {
-    "SPHERICAL_TL_PL_TV_PV": (("theta_l", "phi_l", "theta_v", "phi_v"), _spherical),
+    "SPHERICAL_TL_PL_TV_PV": (("theta_l", "phi_l", "theta_v", "phi_v"), lambda *angles: angles),
     "ISOTROPIC_TV_TL_DPHI": (("theta_v", "theta_l", "dphi"), _isotropic),
     "ISOTROPIC_TL_TV_PROJ_DPHI": (("theta_l", "x", "y"), _projected),
     "RUSIN_TH_PH_TD_PD": (("theta_h", "phi_h", "theta_d", "phi_d"), _half),
@@ -158,36 +154,27 @@ def from_table(table: Table, header: Header) -> BrdfSamples:
     end = start + len(header.channels)
     theta_i, phi_i, theta_o, phi_o = map(np.rad2deg, directions(*columns[:start]))
     values, notes = np.stack(columns[start:end], axis=1), table.notes
-    sigma = _sigma(header, columns[end:])
-    if sigma is not None:
+    bounds, sigma = iter(columns[end:]), None
+    if 0 not in header.intervals:  # a radius, or both ends
+        radii = [
+            next(bounds) if kind == 1 else (-next(bounds) + next(bounds)) / 2 for kind in header.intervals
+        ]
+        sigma = np.stack(radii, axis=1)
         notes = (*notes, "the radius of the intervals (#VS) read as the standard deviation")
     elif any(header.intervals):
         notes = (*notes, "intervals (#VS) ignored, since not every channel has one")
     if header.param_out == COSINE:
-        weight = _cosine(theta_o, table)[:, None]
+        grazing = np.abs(theta_o - 90) < GRAZING
+        if grazing.any():
+            raise DataError(
+                f"{table.path}: {table.place(int(np.argmax(grazing)))}: theta_o is 90 degrees, where a value "
+                "weighted with its cosine does not determine the BRDF; delete that row"
+            )
+        # 1 below the horizon, which `BrdfSamples` refuses
+        weight = np.where(theta_o < 90, np.cos(np.deg2rad(theta_o)), 1.0)[:, None]
         values, sigma = values / weight, None if sigma is None else sigma / weight
         notes = (*notes, "values divided by cos(theta_o), their weight according to the header")
     return BrdfSamples(
         theta_i, phi_i, theta_o, phi_o, values, header.channels, sigma, table.path, table.sha256, notes,
         table.lines,
     )  # fmt: skip
-
-
-def _sigma(header: Header, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
-    if 0 in header.intervals:
-        return None
-    columns, radii = iter(bounds), []
-    for kind in header.intervals:
-        radii.append(next(columns) if kind == 1 else (-next(columns) + next(columns)) / 2)
-    return np.stack(radii, axis=1)
-
-
-def _cosine(theta: np.ndarray, table: Table) -> np.ndarray:
-    """cos θ_o, 1 below the horizon, which `BrdfSamples` refuses. Raises DataError at grazing angles."""
-    grazing = np.abs(theta - 90) < GRAZING
-    if grazing.any():
-        raise DataError(
-            f"{table.path}: {table.place(int(np.argmax(grazing)))}: theta_o is 90 degrees, where a value "
-            "weighted with its cosine does not determine the BRDF; delete that row"
-        )
-    return np.where(theta < 90, np.cos(np.deg2rad(theta)), 1.0)

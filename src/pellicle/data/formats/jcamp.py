@@ -61,13 +61,11 @@ class _Block:
     records: dict[str, tuple[str, Line]] = field(default_factory=dict)
     tables: list[Rows] = field(default_factory=list)
 
-    def text(self, label: str) -> str:
-        """Return the value of a record, empty where the block has none."""
-        return self.records[label][0] if label in self.records else ""
-
-    def parts(self, label: str) -> list[str]:
-        """Return the values of a record of NTUPLES, one for each variable."""
-        return [part.strip() for part in self.text(label).split(",")]
+    def text(self, label: str, place: int | None = None) -> str:
+        """Return the value of a record, of NTUPLES that of the variable at a place; empty without one."""
+        text = self.records[label][0] if label in self.records else ""
+        parts = [text] if place is None else [part.strip() for part in text.split(",")]
+        return parts[place or 0] if (place or 0) < len(parts) else ""
 
 
 def read(file: TextFile) -> list[Table] | None:
@@ -161,9 +159,9 @@ def _scales(block: _Block, path: str) -> Scales:
         _number(block, "FIRSTX", path),
         _number(block, "LASTX", path),
         _number(block, "DELTAX", path),
-        _count(_number(block, "NPOINTS", path), block, "NPOINTS", path),
-        _factor(_number(block, "XFACTOR", path), "XFACTOR", path),
-        _factor(_number(block, "YFACTOR", path), "YFACTOR", path),
+        _count(block, "NPOINTS", path),
+        _factor(block, "XFACTOR", path),
+        _factor(block, "YFACTOR", path),
         "," if comma else ".",
     )
 
@@ -171,35 +169,27 @@ def _scales(block: _Block, path: str) -> Scales:
 def _paged(block: _Block, table: Rows, path: str) -> tuple[str, str, Scales] | None:
     """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
     form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
-    symbols = [symbol.upper() for symbol in block.parts("SYMBOL")]
+    symbols = [symbol.strip().upper() for symbol in block.text("SYMBOL").split(",")]
     if form is None or not {form[1].upper(), form[2].upper()} <= set(symbols):
         return None
     x, y = symbols.index(form[1].upper()), symbols.index(form[2].upper())
-
-    def part(label: str, place: int) -> str:
-        parts = block.parts(label)
-        return parts[place] if place < len(parts) else ""
-
-    def number(label: str, place: int) -> float | None:
-        return _parsed(part(label, place), label, block, path) if part(label, place) else None
-
     scales = Scales(
-        number("FIRST", x),
-        number("LAST", x),
+        _number(block, "FIRST", path, x),
+        _number(block, "LAST", path, x),
         None,
-        _count(number("VARDIM", y), block, "VARDIM", path),
-        _factor(number("FACTOR", x), "FACTOR", path),
-        _factor(number("FACTOR", y), "FACTOR", path),
+        _count(block, "VARDIM", path, y),
+        _factor(block, "FACTOR", path, x),
+        _factor(block, "FACTOR", path, y),
         ".",
     )
-    return part("UNITS", x), part("UNITS", y) or part("VARNAME", y), scales
+    return block.text("UNITS", x), block.text("UNITS", y) or block.text("VARNAME", y), scales
 
 
-def _number(block: _Block, label: str, path: str) -> float | None:
-    return _parsed(block.text(label), label, block, path) if block.text(label) else None
-
-
-def _parsed(text: str, label: str, block: _Block, path: str) -> float:
+def _number(block: _Block, label: str, path: str, place: int | None = None) -> float | None:
+    """The number of a record, of a variable of NTUPLES that at its `place`; None where there is none."""
+    text = block.text(label, place)
+    if not text:
+        return None
     line = block.records[label][1]
     if not _NUMBER.fullmatch(text):
         raise DataError(f"{path}: line {line.number}: {label} is {text[:40]!r}, not a number; correct it")
@@ -209,13 +199,15 @@ def _parsed(text: str, label: str, block: _Block, path: str) -> float:
     return value
 
 
-def _factor(value: float | None, label: str, path: str) -> float:
+def _factor(block: _Block, label: str, path: str, place: int | None = None) -> float:
+    value = _number(block, label, path, place)
     if value == 0:
         raise DataError(f"{path}: {label} is 0, which leaves no values; export it again")
     return 1.0 if value is None else value
 
 
-def _count(value: float | None, block: _Block, label: str, path: str) -> int | None:
+def _count(block: _Block, label: str, path: str, place: int | None = None) -> int | None:
+    value = _number(block, label, path, place)
     if value is None:
         return None
     if value != int(value) or not 1 <= value <= MOST_POINTS:
@@ -285,15 +277,7 @@ def _even(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], list
             f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX "
             f"{last:g} are {step:g} apart; export it again"
         )
-    _check_starts(table, starts, (first, step), scales.x_factor, path)
-    return np.linspace(first, last, len(y)).tolist(), y
-
-
-def _check_starts(
-    table: Rows, starts: Sequence[tuple[float, int]], axis: tuple[float, float], factor: float, path: str
-) -> None:
-    """Refuse a line whose abscissa is not where FIRSTX, LASTX and NPOINTS put it."""
-    first, step = axis
+    factor = scales.x_factor
     for (line, _), (abscissa, position) in zip(table.rows, starts, strict=True):
         expected = first + step * position
         room = 0.3 * abs(step) + abs(factor) + 1e-6 * abs(expected)
@@ -303,6 +287,7 @@ def _check_starts(
                 f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and "
                 f"NPOINTS put {expected:g}; points are missing or the records are wrong, so export it again"
             )
+    return np.linspace(first, last, len(y)).tolist(), y
 
 
 def _check_number(count: int, scales: Scales, table: Rows, path: str) -> None:

@@ -15,7 +15,7 @@ from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, 
 from pellicle.data.tabular.columns import Column, is_header, recognise
 from pellicle.data.tabular.layout import find_layout
 from pellicle.data.tabular.table import Table, declarations, plain_columns
-from pellicle.data.tabular.text import Line, TextFile, is_number
+from pellicle.data.tabular.text import TextFile, is_number
 
 _MOST_HEADING = 40
 _BASELINE = re.compile(r"base ?line|(100|0) ?%? ?[TR]\b", re.IGNORECASE)
@@ -29,10 +29,6 @@ class _Scan(NamedTuple):
     columns: tuple[Column, ...]
     rows: Rows
 
-    @property
-    def readable(self) -> bool:
-        return any(column.role not in _IGNORED for column in self.columns[1:])
-
 
 def scans_side_by_side(file: TextFile) -> list[Table] | None:
     """Return one layout for each scan, without baselines, or None for another format."""
@@ -41,7 +37,12 @@ def scans_side_by_side(file: TextFile) -> list[Table] | None:
         for delimiter in ("\t", ";", ","):
             groups = _groups(all_cells(lines[header].text, delimiter))
             names = all_cells(lines[header - 1].text, delimiter) if header else []
-            if groups and (len(groups) > 1 or _names_scan(names, lines[header - 1].text)):
+            above = lines[header - 1].text  # over a single scan `sample 1,` or `"sample 1"`
+            if len(names) == 1:
+                named = len(above) > 2 and above[0] == above[-1] == '"'
+            else:
+                named = bool(names and names[0]) and not any(names[1:]) and not is_number(names[0], ",")
+            if groups and (len(groups) > 1 or named):
                 return _scans(file, header, delimiter, groups, names)
     return None
 
@@ -60,13 +61,6 @@ def _groups(header: Sequence[str]) -> list[tuple[Column, ...]]:
     return groups if all(len(group) > 1 for group in groups) else []
 
 
-def _names_scan(names: Sequence[str], text: str) -> bool:
-    """Return True for the line `sample 1,` or `"sample 1"` over a single scan."""
-    if len(names) == 1:
-        return len(text) > 2 and text[0] == text[-1] == '"'
-    return len(names) > 1 and bool(names[0]) and not any(names[1:]) and not is_number(names[0], ",")
-
-
 def _scans(
     file: TextFile, header: int, delimiter: str, groups: Sequence[tuple[Column, ...]], names: Sequence[str]
 ) -> list[Table] | None:
@@ -79,7 +73,8 @@ def _scans(
     scans = [scan for scan in scans if scan.rows]
     collected = [match[1].strip() for line in below if (match := _COLLECTED.search(line.text))]
     instrument = next((m[1].strip() for line in below if (m := _INSTRUMENT.match(line.text.strip()))), "")
-    kept = [scan for scan in scans if scan.readable and not _BASELINE.search(scan.name)] or scans
+    readable = [scan for scan in scans if any(column.role not in _IGNORED for column in scan.columns[1:])]
+    kept = [scan for scan in readable if not _BASELINE.search(scan.name)] or scans
     left_out = [repr(scan.name) for scan in scans if scan not in kept]
     notes = [f"{len(scans)} scans side by side"] if len(scans) > 1 else []
     notes += [f"left out as baselines or other quantities: {', '.join(left_out)}"] if left_out else []
@@ -142,7 +137,15 @@ def stacked_tables(file: TextFile) -> list[Table] | None:
     headers = [i for i, line in enumerate(lines) if first is not None and line.text == first.text]
     if len(headers) < 2:
         return None
-    starts = [_title(lines, header, after) for header, after in zip(headers, [-1, *headers], strict=False)]
+    starts = []
+    for header, after in zip(headers, [-1, *headers], strict=False):
+        start = header  # the first line above that is no row of the table before
+        while start > after + 1 and not (
+            len(cells := all_cells(lines[start - 1].text)[:2]) == 2
+            and all(is_number(cell, ",") for cell in cells)
+        ):
+            start -= 1
+        starts.append(start)
     layouts = []
     for i, (start, header) in enumerate(zip(starts, headers, strict=True)):
         stop = starts[i + 1] if i + 1 < len(starts) else len(lines)
@@ -151,16 +154,3 @@ def stacked_tables(file: TextFile) -> list[Table] | None:
         note = f"table {i + 1} of {len(headers)} in the file"
         layouts.append(dataclasses.replace(layout, name=title, remarks=(note, *layout.remarks)))
     return layouts
-
-
-def _title(lines: Sequence[Line], header: int, after: int) -> int:
-    """Index of the first line above a header that is no row of the table before, whose header is `after`."""
-    start = header
-    while start > after + 1 and not _is_row(lines[start - 1]):
-        start -= 1
-    return start
-
-
-def _is_row(line: Line) -> bool:
-    cells = all_cells(line.text)[:2]
-    return len(cells) == 2 and all(is_number(cell, ",") for cell in cells)

@@ -154,14 +154,16 @@ def named_columns(table: Table, columns: str | Sequence[str] | None) -> tuple[Co
     if columns is not None:
         parsed = parse_columns(columns, table.path, table.width)
         return tuple(_with_unit_of_file(table, column) for column in parsed)
-    if names is None:
-        return _declared_columns(table)
+    if names is None:  # the file may declare the quantity above its rows
+        if declared.signal is None or table.width not in (2, 3):
+            return None
+        of_signal = declared.signal.column
+        signal = dataclasses.replace(of_signal, position=1, name=f"declared {of_signal.name}")
+        sigma = [Column(2, "column 3", "sigma")] if table.width == 3 else []
+        return (dataclasses.replace(first_column(table), name="column 1"), signal, *sigma)
     recognised = recognise_all(names)
     # x, y and Y are three quantities, R and r one
-    alike = [
-        name if column.role == "other" else name.lower()
-        for name, column in zip(names, recognised, strict=True)
-    ]
+    alike = [x if column.role == "other" else x.lower() for x, column in zip(names, recognised, strict=True)]
     twice = next((name for i, name in enumerate(names) if name and alike[i] in alike[:i]), None)
     if twice is not None:
         raise DataError(
@@ -225,20 +227,6 @@ def _with_unit_of_file(table: Table, column: Column) -> Column:
             f"name it absorbance there, or {column.name}_fraction if it is none"
         )
     return dataclasses.replace(column, unit=with_unit.unit, unknown_unit=with_unit.unknown_unit)
-
-
-def _declared_columns(table: Table) -> tuple[Column, ...] | None:
-    """The columns of a table without a header, whose quantity the file declares above it; None otherwise."""
-    declared = table.declared
-    if declared.signal is None or table.width not in (2, 3):
-        return None
-    signal = declared.signal.column
-    label = f"declared {signal.name}"
-    columns = [
-        dataclasses.replace(first_column(table), name="column 1"),
-        dataclasses.replace(signal, position=1, name=label),
-    ]
-    return (*columns, *([Column(2, "column 3", "sigma")] if table.width == 3 else []))
 
 
 def _with_declared(table: Table, column: Column, unnamed: bool) -> Column:

@@ -40,28 +40,20 @@ def find_layout(file: TextFile) -> Table:
     delimiter, decimal = _dialect(lines, path)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
+        last, hint = lines[-1], ""
+        if re.search(r"\d\s*%", last.text):
+            hint = "; leave the % signs out of the cells and put one into the header"
+        elif re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", last.text):
+            hint = "; export numbers without thousands separators"
         raise DataError(
-            f"{path}: line {lines[-1].number} ends the file without any row of two numbers; "
-            f"expected rows of a wavelength and a value, as 550,0.21{_hint(lines[-1].text)}"
+            f"{path}: line {last.number} ends the file without any row of two numbers; "
+            f"expected rows of a wavelength and a value, as 550,0.21{hint}"
         )
     width = len(split(lines[first].bare, delimiter))
     start, header = _rows_begin(lines, first, width, delimiter, decimal)
-    notes = []
-    if header is not None:
-        names = header_cells(lines[header].text, delimiter, width)
-        if header + 1 < start:  # a row of units below the names
-            units = split(lines[header + 1].text, delimiter)
-            units += [""] * (len(names) - len(units))
-            units = [unit.strip("[]() ") for unit in units]
-            names = [
-                f"{name} ({unit})" if unit and f"({unit})" not in name else name
-                for name, unit in zip(names, units, strict=False)
-            ]
-        names = _told_apart(names, split(lines[header - 1].text, delimiter) if header else [])
-    else:
-        names = _commented_header(lines[start], file.comments, delimiter, width)
-        if names:
-            notes.append("column names taken from the comment above the first row")
+    names, notes = _names(file, lines, start, header, delimiter, width), []
+    if names and header is None:
+        notes.append("column names taken from the comment above the first row")
     if names and width > len(names):
         raise DataError(
             f"{path}: line {lines[first].number} has {width} values but the header on line "
@@ -110,23 +102,28 @@ def _without_quotes(lines: Sequence[Line]) -> Sequence[Line]:
     ]
 
 
-def _hint(text: str) -> str:
-    """Say what keeps a line from being a row of numbers, as far as that is common."""
-    if re.search(r"\d\s*%", text):
-        return "; leave the % signs out of the cells and put one into the header"
-    if re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", text):
-        return "; export numbers without thousands separators"
-    return ""
-
-
-def _told_apart(names: list[str], above: Sequence[str]) -> list[str]:
-    """The names, with the samples that a line above them gives where names are repeated."""
-    if len(above) != len(names) or len(set(above)) < len(above) or len(set(names)) == len(names):
-        return names
-    return [
-        f"{sample} {name}" if names.count(name) > 1 else name
-        for sample, name in zip(above, names, strict=True)
-    ]
+def _names(
+    file: TextFile, lines: Sequence[Line], start: int, header: int | None, delimiter: str, width: int
+) -> list[str] | None:
+    """Names of the columns with the units of a row below, and samples of a line above where they repeat; or
+    those in the last comment above the rows, as numpy.savetxt writes them."""
+    if header is None:
+        above = [comment for comment in file.comments if comment.number < lines[start].number]
+        names = header_cells(above[-1].text, delimiter, width) if above else []
+        return names if len(names) == width and is_header(names) else None
+    names = header_cells(lines[header].text, delimiter, width)
+    if header + 1 < start:
+        units = [unit.strip("[]() ") for unit in split(lines[header + 1].text, delimiter)]
+        units += [""] * (len(names) - len(units))
+        names = [
+            f"{name} ({unit})" if unit and f"({unit})" not in name else name
+            for name, unit in zip(names, units, strict=False)
+        ]
+    samples = split(lines[header - 1].text, delimiter) if header else []
+    if len(names) == len(samples) == len(set(samples)) and len(set(names)) < len(names):
+        pairs = zip(samples, names, strict=True)
+        names = [f"{sample} {name}" if names.count(name) > 1 else name for sample, name in pairs]
+    return names
 
 
 def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, int]:
@@ -172,14 +169,12 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
 
 def _first_numeric(lines: Sequence[Line], delimiter: str, decimal: str) -> int | None:
     """Index of the first line that is all numbers, else of the first with two numbers."""
-    partial = None
-    for i, line in enumerate(lines):
-        numbers, cells = _numbers_in(line, delimiter, decimal)
-        if numbers == cells >= 2:
-            return i
-        if numbers >= 2 and partial is None:
-            partial = i
-    return partial
+    for complete in (True, False):
+        for i, line in enumerate(lines):
+            numbers, cells = _numbers_in(line, delimiter, decimal)
+            if numbers >= 2 and (numbers == cells or not complete):
+                return i
+    return None
 
 
 def _rows_begin(
@@ -194,9 +189,9 @@ def _rows_begin(
         if is_header(header_cells(lines[header].text, delimiter, width)):
             units_below = header + 1 < first and is_unit_row(split(lines[header + 1].text, delimiter))
             return header + (2 if units_below else 1), header
-    start = first
-    while start and _is_faulty_row(lines[start - 1], width, delimiter, decimal):
-        start -= 1
+    start, above = first, [split(line.bare, delimiter) for line in lines[:first]]
+    while start and len(above[start - 1]) == width and is_number(above[start - 1][0], decimal):
+        start -= 1  # a faulty row
     declared = declarations(lines[start - 1 : start])
     if start and not (lines[start - 1].text.startswith(_MARKER) or declared.axis or declared.signal):
         cells = split(lines[start - 1].text, delimiter)
@@ -204,8 +199,8 @@ def _rows_begin(
         known = any(column.role != "other" for column in recognise_all(cells))
         words = delimiter == " " and (not known or cells[0].endswith(":"))
         if len(cells) >= width and not words and not any(is_number(cell, decimal) for cell in cells):
-            above = split(lines[start - 2].text, delimiter) if start > 1 and is_unit_row(cells) else []
-            named = len(above) == len(cells) and recognise_all(above)[0].role == "wavelength"
+            names = split(lines[start - 2].text, delimiter) if start > 1 and is_unit_row(cells) else []
+            named = len(names) == len(cells) and recognise_all(names)[0].role == "wavelength"
             return start, start - 2 if named else start - 1
     return start, None
 
@@ -221,11 +216,6 @@ def _rows_end(lines: Sequence[Line], delimiter: str, decimal: str) -> int:
     return last + 1 if below.number > lines[last].number + 1 or below.text[0] in "[<" else len(lines)
 
 
-def _is_faulty_row(line: Line, width: int, delimiter: str, decimal: str) -> bool:
-    cells = split(line.bare, delimiter)
-    return len(cells) == width and is_number(cells[0], decimal)
-
-
 def header_cells(text: str, delimiter: str, width: int) -> list[str]:
     """Column names of a header line, whose delimiter may differ from that of the rows."""
     candidates = [
@@ -239,15 +229,6 @@ def header_cells(text: str, delimiter: str, width: int) -> list[str]:
     # names of several words, two blanks apart
     candidates.append(re.split(r"\s{2,}", text.removeprefix(words[0]).strip() if marked else text.strip()))
     return next((names for names in candidates if len(names) == width), candidates[0])
-
-
-def _commented_header(
-    first_row: Line, comments: Sequence[Line], delimiter: str, width: int
-) -> list[str] | None:
-    """Names in the last comment above the rows, as numpy.savetxt writes them, if they are a header."""
-    above = [comment for comment in comments if comment.number < first_row.number]
-    names = header_cells(above[-1].text, delimiter, width) if above else []
-    return names if len(names) == width and is_header(names) else None
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
