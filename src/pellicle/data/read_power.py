@@ -126,10 +126,12 @@ def _signals(
     measured = [c for c in columns if c.role in SIGNALS]
     absorbed = [c for c in measured if c.role == "T" and c.unit == "absorbance"]
     if signal == "R" and measured and measured == absorbed and not by_caller:
+        known = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle", "azimuth": "azimuth"}
+        renamed = ",".join("log(1/R)" if c is absorbed[0] else known.get(c.role, "_") for c in columns)
         raise UsageError(
             f"{table.path}: {listed(measured)} is an absorbance, read as T = 10^-A, which contradicts "
             '`signal="R"`; leave that out, or if it is log(1/R), say so with '
-            f'`columns="{_renamed(columns, absorbed[0])}"`'
+            f'`columns="{renamed}"`'
         )
     measured = [c for c in measured if signal in (None, c.role)]
     if not measured:
@@ -145,12 +147,6 @@ def _signals(
     return measured
 
 
-def _renamed(columns: Sequence[Column], column: Column) -> str:
-    """Names for the argument `columns` with which a column of absorbance is log(1/R)."""
-    words = {"wavelength": "wavelength", "sigma": "sigma", "angle": "angle", "azimuth": "azimuth"}
-    return ",".join("log(1/R)" if c is column else words.get(c.role, "_") for c in columns)
-
-
 def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None) -> list[Column]:
     """An intensity, or columns whose names state no quantity, where the caller states it."""
     intensity = only(table, columns, "intensity")
@@ -160,15 +156,27 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
         )
     if intensity:
         return [intensity]
-    _check_no_other_signal(table, columns, signal)
     roles = {c.role for c in columns}
+    if other := next((role for role in SIGNALS if role in roles), None):
+        raise UsageError(f'{table.path}: has {other}, which contradicts `signal="{signal}"`; correct that')
+    for name, known in _SEVERAL_COLUMNS.items():
+        if roles & set(known):
+            raise UsageError(
+                f'{table.path}: has {name}, which contradicts `signal="{signal}"`; leave that out'
+            )
     named = [c for c in columns if c.name not in ("_", "")]
     processed = [c for c in named if c.role == "processed"]
     free = [c for c in named if c.role in ("other", "value")]
     foreign = [c for c in columns if c.role in ("foreign", "counts", *COUNTS)]
     counters = [] if foreign else free
     unnamed = processed or [c for c in free if c.name.strip().lower() not in COUNTERS] or counters
-    _check_one_angle(table, unnamed)
+    angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
+    if len(angles) > 1:
+        raise DataError(
+            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose two with "
+            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other '
+            "with a column angle_deg"
+        )
     if signal is not None and unnamed and "wavelength" in roles:
         return [replace(c, role=signal) for c in unnamed]
     sample = only(table, columns, "sample counts")
@@ -180,29 +188,6 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
             'reflectance needs the material of the reference as well, as in `reference_material="Si"`'
         )
     raise _no_signal(table, columns, unnamed if "wavelength" in roles else [], foreign)
-
-
-def _check_no_other_signal(table: Table, columns: Sequence[Column], signal: str | None) -> None:
-    """Raise UsageError for columns of another signal than the one that the caller states."""
-    roles = {c.role for c in columns}
-    other = next((role for role in SIGNALS if role in roles), None)
-    if other:
-        raise UsageError(f'{table.path}: has {other}, which contradicts `signal="{signal}"`; correct that')
-    for name, known in _SEVERAL_COLUMNS.items():
-        if roles & set(known):
-            raise UsageError(
-                f'{table.path}: has {name}, which contradicts `signal="{signal}"`; leave that out'
-            )
-
-
-def _check_one_angle(table: Table, unnamed: Sequence[Column]) -> None:
-    angles = [c for c in unnamed if c.name.strip().lower().startswith(("psi", "delta", "ψ", "δ"))]
-    if len(angles) > 1:
-        raise DataError(
-            f"{table.path}: {listed(angles)} may be psi and delta at several angles; choose two with "
-            '`columns=["wavelength", "psi", "delta", "_"]` and `angle=70`, or write them below each other '
-            "with a column angle_deg"
-        )
 
 
 def _no_signal(

@@ -146,8 +146,8 @@ def _note(sweeps: Sequence[Spectrum], level: float) -> str:
         place = f"{first.path}: the" if first.path else "the"
         raise DataError(
             f"{place} {count} sweeps over the same wavelengths differ by {100 * size / level:.0f} % of the"
-            " signal, alike at neighbouring points, too much for repeats of one measurement; keep the rows of one"
-            " sweep, or add the column in which they differ, such as angle_deg"
+            " signal, alike at neighbouring points, too much for repeats of one measurement; keep the rows of"
+            " one sweep, or add the column in which they differ, such as angle_deg"
         )
     note = f"{count} sweeps over the same wavelengths, averaged; a point scatters by {size:.2g}{unit}"
     drift = ", for the most part alike at neighbouring points: the sweeps drift"
@@ -159,12 +159,11 @@ def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
     kind, count = sweeps[0].kind, len(sweeps)
     points = np.mean([kind.coordinates(sweep) for sweep in sweeps], axis=0)
     averaged: dict[str, Any] = dict(kind.averaged(points))
-    depolarised = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
-    averaged["depolarisation"] = np.mean(depolarised, axis=0) if len(depolarised) == count else None
+    shares = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
+    averaged["depolarisation"] = np.mean(shares, axis=0) if len(shares) == count else None
     for name in ("sigma", "delta_sigma", "depolarisation_sigma"):
-        own = [getattr(sweep, name) for sweep in sweeps]
-        known = all(x is not None for x in own) and not (
-            name == "depolarisation_sigma" and averaged["depolarisation"] is None
-        )
-        averaged[name] = np.sqrt(np.sum(np.square(own), axis=0)) / count if known else None
+        errors = [error for sweep in sweeps if (error := getattr(sweep, name)) is not None]
+        averaged[name] = np.sqrt(np.sum(np.square(errors), axis=0)) / count if len(errors) == count else None
+    if averaged["depolarisation"] is None:
+        averaged["depolarisation_sigma"] = None
     return averaged

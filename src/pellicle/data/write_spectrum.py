@@ -55,29 +55,22 @@ def _columns(spectrum: Spectrum) -> list[_Column]:
         columns.append(_Column("angle_deg", spectrum.angle, "degree", "angle_of_incidence"))
     if spectrum.azimuth is not None:
         columns.append(_Column("azimuth_deg", spectrum.azimuth, "degree", "sample_azimuth"))
-    kind, name = spectrum.kind, _signal_header(spectrum)
+    kind, name = spectrum.kind, ""
+    if not (kind.degrees or kind.parts):  # the only column of the signal
+        name = f"{kind.word}{_POLARISED[spectrum.polarisation] if kind.has_scale else ''}"
+        if kind.of_counts or not spectrum.calibrated:
+            name = "counts" if kind.of_counts else "intensity"
     shares = [q for q in kind.quantities if q.array == "depolarisation"]
     for group in ([q for q in kind.quantities if q not in shares], shares):
         for q in group:
-            stored = q.name if kind.degrees or kind.parts else kind.noun
-            columns.append(
-                _Column(name or q.header, q.measured(spectrum), "degree" if q.unit else "", stored)
-            )
+            unit, stored = "degree" if q.unit else "", kind.noun if name else q.name
+            columns.append(_Column(name or q.header, q.measured(spectrum), unit, stored))
         for q in group:
             if (error := q.error(spectrum)) is not None:
                 header, stored = ("sigma", kind.noun) if name else (f"sigma_{q.header}", q.name)
-                columns.append(_Column(header, error, "degree" if q.unit else "", f"{stored}_errors"))
+                unit = "degree" if q.unit else ""
+                columns.append(_Column(header, error, unit, f"{stored}_errors"))
     return columns
-
-
-def _signal_header(spectrum: Spectrum) -> str:
-    """Name of the only column of a signal; empty where there are several."""
-    kind = spectrum.kind
-    if kind.degrees or kind.parts:
-        return ""
-    if kind.of_counts or not spectrum.calibrated:
-        return "counts" if kind.of_counts else "intensity"
-    return f"{kind.word}{_POLARISED[spectrum.polarisation] if kind.has_scale else ''}"
 
 
 def _facts(spectrum: Spectrum) -> list[tuple[str, str]]:

@@ -28,6 +28,13 @@ _SIGNALS = {"N", "C", "S", "intensity", *(q.name for q in _QUANTITIES if q.array
 _ERRORS = {q: f"sigma_{q}" for q in ("depolarisation", *(q.name for q in _QUANTITIES))}
 _ERRORS |= dict.fromkeys(ONE_COLUMN, "sigma")
 _MOST_MEMBERS = 1000
+_FACTS = (
+    ("date", "start_time"),
+    ("instrument", "instrument/device_information/model"),
+    ("instrument", "instrument/model"),
+    ("sample", "sample/sample_name"),
+)
+"""Date, instrument and sample in an entry."""
 
 
 def read(content: bytes, path: str) -> list[Table] | None:
@@ -46,12 +53,12 @@ def read(content: bytes, path: str) -> list[Table] | None:
 
 
 def read_hdf5(content: bytes, path: str) -> list[Table]:
-    """Return the spectra of an HDF5 file, in this process. Raises DataError as `layouts` does."""
+    """Return the spectra of an HDF5 file, in this process. Raises DataError as `read` does."""
     import h5py
 
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            layouts = list(_layouts(file, path))
+            tables = list(_spectra(file, path))
     except DataError:
         raise
     except Exception as error:  # h5py raises OSError, KeyError, RuntimeError, ... on damaged files
@@ -59,15 +66,18 @@ def read_hdf5(content: bytes, path: str) -> list[Table]:
             f"{path}: is an HDF5 (NeXus) file that cannot be read ({' '.join(str(error).split())[:200]}); "
             "export it as CSV"
         ) from None
-    if not layouts:
+    if not tables:
         raise DataError(
             f"{path}: is an HDF5 (NeXus) file without a wavelength, energy or wavenumber beside a "
             "reflectance, a transmittance or psi and delta in a group NXdata; export the spectrum as CSV"
         )
-    return layouts if len(layouts) > 1 else [replace(layouts[0], name="")]
+    return tables if len(tables) > 1 else [replace(tables[0], name="")]
 
 
-def _layouts(file: Any, path: str) -> Iterator[Table]:
+def _spectra(file: Any, path: str) -> Iterator[Table]:
+    members = (hdf5.member(file, name, path) for name in list(file)[:_MOST_MEMBERS])
+    entry = next((e for e in members if e is not None and hdf5.attribute(e, "NX_class") == "NXentry"), None)
+    texts = [] if entry is None else [(f, hdf5.text(hdf5.member(entry, at, path))) for f, at in _FACTS]
     for name, group in hdf5.groups(file, path):
         if len(group) > _MOST_MEMBERS:
             continue
@@ -78,25 +88,9 @@ def _layouts(file: Any, path: str) -> Iterator[Table]:
         else:
             continue
         if columns:
-            facts = [("format", "NeXus" if name != "/" else "NetCDF"), *_facts(file, path)]
+            facts = [("format", "NeXus" if name != "/" else "NetCDF"), *(fact for fact in texts if fact[1])]
             said = [f"read as HDF5, group {name}", *notes]
             yield array_columns(list(columns), list(columns.values()), said, name=name, facts=facts)
-
-
-def _facts(file: Any, path: str) -> Iterator[tuple[str, str]]:
-    """Date, instrument and sample of the entry."""
-    entries = (hdf5.member(file, name, path) for name in list(file)[:_MOST_MEMBERS])
-    entry = next((e for e in entries if e is not None and hdf5.attribute(e, "NX_class") == "NXentry"), None)
-    if entry is None:
-        return
-    for fact, where in (
-        ("date", "start_time"),
-        ("instrument", "instrument/device_information/model"),
-        ("instrument", "instrument/model"),
-        ("sample", "sample/sample_name"),
-    ):
-        if value := hdf5.text(hdf5.member(entry, where, path)):
-            yield fact, value
 
 
 def _named(name: str, units: str) -> str:
