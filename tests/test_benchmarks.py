@@ -1,13 +1,18 @@
-"""Parts of the benchmarks that a wrong number would not reveal: the film of the others, the flag --device."""
+"""Parts of the benchmarks that a wrong number would not reveal. No other package is needed."""
 
 import importlib
+import json
+import math
 import os
+import runpy
+import sys
 from pathlib import Path
 
 import jax
 import numpy as np
 import pytest
-import tmm
+
+from .by_tmm import films, ncs, psi_delta
 
 HERE = Path(__file__).parents[1] / "benchmarks"
 NM = np.linspace(400.0, 900.0, 5)
@@ -26,33 +31,22 @@ def benchmark(modules_of):
     jax.config.update("jax_enable_x64", double)
 
 
-def _by_tmm(polarisation: str, angle: float, i: int, layers=LAYERS, substrate=SILICON) -> dict:
-    indices = [1.0, *(n[i] for n, _ in layers), substrate[i]]
-    depths = [np.inf, *(d for _, d in layers), np.inf]
-    return tmm.coh_tmm(polarisation, indices, depths, np.deg2rad(angle), NM[i])
-
-
 def test_film_of_the_other_programs_agrees_with_tmm(benchmark):
     """Pellicle's Δ is minus the phase of tmm's time convention."""
     film = benchmark("whole_fits.numpy_film")
-    R = [_by_tmm("s", 0.0, i)["R"] for i in range(5)]
-    np.testing.assert_allclose(film.reflectance(NM, LAYERS, SILICON), R, rtol=1e-12)
-    ratio = np.array([_by_tmm("p", 65.0, i)["r"] / _by_tmm("s", 65.0, i)["r"] for i in range(5)])
+    indices, depths = zip(*LAYERS, strict=True)
+    stack = NM, [1.0, *indices, SILICON], depths
+    np.testing.assert_allclose(film.reflectance(NM, LAYERS, SILICON), films("s", *stack), rtol=1e-12)
     psi, delta = film.psi_delta(NM, LAYERS, SILICON, np.full(5, 65.0))
-    np.testing.assert_allclose(np.tan(np.deg2rad(psi)), np.abs(ratio), rtol=1e-12)
-    np.testing.assert_allclose(np.exp(-1j * np.deg2rad(delta)), ratio / np.abs(ratio), rtol=1e-12)
+    for found, truth in zip((psi, delta), psi_delta(*ncs(*stack, 65.0).T), strict=True):
+        np.testing.assert_allclose(np.mod(found, 360), truth, rtol=1e-11)
 
 
 def test_film_of_the_other_programs_on_a_plate_agrees_with_tmm(benchmark):
     film = benchmark("whole_fits.numpy_film")
     plate, absorbing = np.full(5, 1.52), [(LAYERS[0][0] + 0.05j, 200.0), LAYERS[1]]
-    expected = [
-        tmm.inc_tmm(
-            *("s", [1.0, absorbing[0][0][i], absorbing[1][0][i], 1.52, 1.0]),
-            *([np.inf, 200.0, 7.0, 1e6, np.inf], ["i", "c", "c", "i", "i"], 0.0, NM[i]),
-        )["T"]
-        for i in range(5)
-    ]
+    indices = [1.0, *(n for n, _ in absorbing), 1.52, 1.0]
+    expected = films("s", NM, indices, [200.0, 7.0, 1e6], kind="T", coherence="iccii")
     np.testing.assert_allclose(film.plate_transmittance(NM, absorbing, plate), expected, rtol=1e-12)
 
 
@@ -77,22 +71,74 @@ def test_device_that_is_absent_ends_with_code_2(benchmark, capsys):
     assert "no GPU on this machine, only cpu" in capsys.readouterr().err
 
 
-@pytest.mark.slow
-def test_device_table_shows_rate_limit_and_error(benchmark, capsys, monkeypatch):
-    before = jax.config.jax_default_device
-    film = benchmark("film")
-    try:
-        device = benchmark("device").chosen("cpu")
-        assert jax.config.jax_default_device == device
-        monkeypatch.setattr(film.on_device, "COPIED_BYTES", {"cpu": 2**16})
-        monkeypatch.setattr(film.on_device, "LEAST_SECONDS", 0.0)
-        with jax.enable_x64(True):
-            film.device_table(device, 3)
-    finally:
-        jax.config.update("jax_default_device", before)
-    lines = capsys.readouterr().out.splitlines()[2:]
-    assert [line.split(",")[0] for line in lines] == ["float32"] * 3 + ["float64"] * 3
-    for line in lines:
-        rate, limit, share, error = (float(word.rstrip("%")) for word in line.split()[2:])
-        assert share == pytest.approx(100 * rate / limit, rel=0.02, abs=0.06)
-        assert 0 < error < (2e-6 if line.startswith("float32") else 1e-14)
+PEERS = Path(__file__).parents[1] / "benchmarks" / "peers"
+PEER_MODULES = ("cases", "truth", "table", "packages", "birefringent", "graded", "adapters.pellicle_any")
+
+
+@pytest.fixture(scope="module")
+def peers(modules_of):
+    """Modules of the script, which belong to no package."""
+    with modules_of(PEERS, *PEER_MODULES) as modules:
+        yield modules
+
+
+def test_reference_values_agree_with_pellicle(peers):
+    """Two programs and two formulas; at a critical substrate the square root amplifies rounding."""
+    cases, ours, table = peers["cases"], peers["adapters.pellicle_any"], peers["table"]
+    for name, case in cases.CASES.items():
+        smooth = name not in cases.WITHOUT_SLOPE
+        truth = peers["truth"].truth(case, slopes=smooth)
+        assert table.error(ours.values(case, np.float64), truth["values"], "values") < (
+            1e-12 if smooth else 5e-7
+        ), name
+        if smooth:
+            assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
+
+
+@pytest.mark.parametrize("name", ["films", "birefringent", "graded"])
+def test_tables_are_inserted_into_the_page(peers, name):
+    script = runpy.run_path(str(PEERS / "__main__.py"), run_name="peers")
+    page, (begin, end) = script["PAGE"].read_text("utf-8"), (script[x].format(name) for x in ("BEGIN", "END"))
+    again = script["inserted"](page, "new tables", name)
+    before, _, rest = page.partition(begin)
+    assert again == before + begin + "\n\nnew tables\n\n" + rest[rest.index(end) :]
+
+
+def test_every_package_has_an_adapter(peers):
+    packages, others = peers["packages"], peers["birefringent"].PACKAGES
+    adapters = {path.stem for path in (PEERS / "adapters").glob("*.py")}
+    assert {p.adapter for p in (*packages.OURS, *packages.PEERS, *others)} <= adapters
+    assert all(p.install for p in packages.PEERS)
+
+
+def test_errors_and_cells(peers):
+    table = peers["table"]
+    truth = {"values": {"Rs": [0.5], "Rp": [0.25]}}
+    assert table.error({"Rp": [0.25], "Rs": [0.4]}, truth["values"], "values") == pytest.approx(0.1)
+    assert table.error({"Rs": [1.0]}, {"Rs": [0.5]}, "slopes") == pytest.approx(0.5 / 0.501)
+    assert math.isnan(table.error({"Rs": [math.nan]}, truth["values"], "values"))
+
+    def cell(answer):
+        return table.cell(answer, truth, "values")
+
+    assert cell({"values": {"Rs": [0.5]}}) == "0"
+    assert cell({"values": {"Rs": [0.5 + 1e-4]}, "warnings": ["beware"]}) == "1e-04†"
+    assert cell({"values": {"Rs": [0.51]}}) == "**1e-02**"
+    assert cell({"values": {"Rs": [math.nan]}}) == "**nan**"
+    assert cell({"values": "hang"}) == "**hang**"
+    assert cell({"values": "ValueError: no such thing"}) == "**refuses**"
+    assert cell({}) == ""
+
+
+def test_graded_films_in_homogeneous_slices(peers, monkeypatch):
+    """Of second order in their thickness; tmm is among the tools of the tests."""
+    graded = peers["graded"]
+    monkeypatch.setattr(graded, "SLICES", (8, 16))
+    table = json.loads(graded.TABLE.read_text("utf-8"))
+    name = "linear on silicon"
+    rows = {name: table["rows"][name]}
+    monkeypatch.setattr(graded, "truths", lambda: {name: np.array(rows[name]["values"][:4], dtype=float)})
+    package = next(x for x in graded.PACKAGES if x.adapter == "tmm")
+    coarse, fine = graded.theirs(rows, table["nm"], package, Path(sys.executable))
+    assert np.log2(coarse.errors / fine.errors) == pytest.approx(2, abs=0.3)
+    assert min(coarse.microseconds, fine.microseconds) > 0

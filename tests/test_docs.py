@@ -1,7 +1,8 @@
 """Commands, Python blocks and TOML blocks of the README and the documentation run.
 
 Every `pellicle` command on a page is run here, in the page's order. Commands of other programs are listed in
-`ELSEWHERE`, and commands that are too slow for every test run in `SLOW`, each with the reason.
+`ELSEWHERE`, and commands that are too slow for every test run in `SLOW`, each with the reason, which is often
+another test (of `tests/`).
 """
 
 import json
@@ -31,120 +32,83 @@ FILE = re.compile(r"[\w./-]+\.(csv|txt|dat|toml)$")
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
+
+def each(command: str, names: str) -> list[str]:
+    """The command with each of these names."""
+    return [command.format(name) for name in names.split()]
+
+
 EXIT_4 = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
-SLOW = {
-    "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml": "compiles for half a minute;"
-    " tests/fitting/film/test_generalised.py fits such data",
-    **{
-        f"pellicle {command} docs/examples/tilted_microscope.toml": "compiles for half a minute;"
-        " tests/forward_model/test_lens.py"
-        for command in ("simulate", "fit oriented.csv --recipe")
-    },
-    "pellicle fit partial.csv --recipe docs/examples/partial_window.toml": "compiles for 6 s; "
-    "tests/fitting/film/test_back_collected.py fits these data",
-    **{
-        f"pellicle chart docs/surfaces/{name}.toml": "one sphere of eight is drawn here"
-        for name in (
-            *("figure_2_coloured", "figure_2_clay", "figure_3_parallel", "figure_3_deviated"),
-            *("figure_4", "figure_5_low", "figure_5_high"),
-        )
-    },
-    "pellicle chart measurements/recipes/gold_on_glass_12nm.toml": "the page draws balls of hematite",
-    "pellicle chart docs/cost/soap_film.toml --view": "tests/simulation/test_bubble.py and"
-    " tests/accuracy/test_colour_maps.py: smaller ones",
-    "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png": "draws a sphere of full size",
-    "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv": "compiles for 4 s;"
-    " tests/forward_model/test_anisotropic.py",
-    "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv": "compiles for 4 s;"
-    " tests/forward_model/test_generalised.py",
-    "pellicle fit film.csv --recipe docs/examples/mueller.toml": "compiles for 10 s;"
-    " tests/fitting/film/test_mueller.py fits another film",
-    "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml": "compiles for half a minute;"
-    " tests/hard/test_anisotropic.py: values and derivatives",
-    "pellicle compare film.csv": "compiles for 6 s; tests/cli/test_compare_command.py compares other scenes",
-    "pellicle fit --recipe fits/cauchy_100nm/recipe.toml": "one of the studies of tests/test_fits.py",
-    "pellicle cost docs/cost/soap_film.toml --out cost": "fits with many solvers: one to two minutes",
-    **{
-        f"pellicle cost docs/{scene}.toml --datasets 0": "compiles twenty programs"
-        for scene in (
-            *("cost/soap_film", "cost/cuo_on_aluminium"),
-            *("examples/coated_window", "examples/microscope", "examples/graded"),
-        )
-    },
-    "pellicle cost docs/examples/film_colours.toml": "compiles twenty programs",
-    "pellicle plan docs/examples/graded.toml": "compiles ten programs; tests/effects/test_plan.py: its row",
-    "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded": "compiles for 20 s",
-    "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml": (
-        "compiles for 20 s"
-    ),
-    "pellicle cost docs/surfaces/tempered_steel.toml --out cost": "compiles forty programs in half a minute",
-    "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml": "compiles for 10 s; "
-    "tests/cli/test_brdf_command.py fits another surface",
-    "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel": "compiles for 20 s; "
-    "tests/sampling samples another surface",
-}
+SLOW = (
+    # compile for 4 to 30 s; what the test that is named covers
+    "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml",  # fitting/film/test_generalised.py
+    "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv",  # forward_model
+    "pellicle simulate docs/examples/tilted_microscope.toml",  # forward_model/test_lens.py
+    "pellicle fit oriented.csv --recipe docs/examples/tilted_microscope.toml",
+    "pellicle fit partial.csv --recipe docs/examples/partial_window.toml",  # test_back_collected.py
+    "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv",  # test_anisotropic.py
+    "pellicle fit film.csv --recipe docs/examples/mueller.toml",  # fitting/film/test_mueller.py
+    "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml",  # hard/test_anisotropic.py
+    "pellicle compare film.csv",  # cli/test_compare_command.py
+    "pellicle plan docs/examples/graded.toml",  # effects/test_plan.py
+    "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded",
+    "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
+    "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
+    "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel",  # sampling
+    # one of the studies of test_fits.py
+    "pellicle fit --recipe fits/cauchy_100nm/recipe.toml",
+    # draw more than one sphere of eight, and in full size
+    *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
+    *each("pellicle chart docs/surfaces/figure_{}.toml", "4 5_low 5_high"),
+    "pellicle chart measurements/recipes/gold_on_glass_12nm.toml",
+    "pellicle chart docs/cost/soap_film.toml --view",  # simulation/test_bubble.py: smaller ones
+    "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png",
+    # compile twenty to forty programs, or fit with many solvers for minutes
+    "pellicle cost docs/cost/soap_film.toml --out cost",
+    *each("pellicle cost docs/{}.toml --datasets 0", "cost/soap_film cost/cuo_on_aluminium"),
+    *each("pellicle cost docs/examples/{}.toml --datasets 0", "coated_window microscope graded"),
+    "pellicle cost docs/examples/film_colours.toml",
+    "pellicle cost docs/surfaces/tempered_steel.toml --out cost",
+)
 CI = ("make fit", "make test", "make notebooks", "make docs", "make dist")
-_LONG_STUDY = "takes hours; its tables are kept, and the modules that it uses have their own tests"
-ELSEWHERE = {
-    **dict.fromkeys(CI, "run by CI: .ci/run"),
-    "make browser-tests": "needs Chromium; tests/reporting/test_page_in_browser.py, tests/explorer",
-    "make dist-check": "installs the wheel for every Python found; .ci/run: make dist",
-    "make fits": "tests/test_fits.py: one study in every run, all of them in make slow",
-    **dict.fromkeys(("make slow", "make coverage"), "run these tests"),
-    **dict.fromkeys(
-        ("make bench", *(f"python benchmarks/{name}.py" for name in ("fit", "film", "cold_start"))),
-        "speed is measured by benchmarks, never tested",
-    ),
-    "make properties": "tests/properties: the same on a hundred scenes",
-    "make fuzz": "tests/data/test_fuzz.py: a short run",
-    "make verdicts": "tests/test_verdicts.py: its model, cases and scores",
-    "make peers": "installs several GB; tests/test_peers.py needs no other package",
-    "make schema": "tests/recipes/test_schema.py: the kept schema",
-    "make figures": "tests/reference checks the numbers; the figures are kept",
-    "source .venv/bin/activate": "a shell builtin; make fit creates the folder",
-    "pellicle fit wafer.txt --layer cauchy --substrate Si": "a file of the reader",
-    "pellicle demo": "tests/cli/test_demo_command.py",
-    **dict.fromkeys(
-        (
-            "pellicle explore",
-            "pellicle explore docs/examples/oxide.toml",
-            "pellicle explore --layer TiO2 --substrate BK7 --back air --signal T",
-            "pellicle explore --signal psi-delta --angle 65,70,75",
-        ),
-        "serves a page until it is interrupted; tests/explorer/test_server.py",
-    ),
-    "pellicle --install-completion": "would change the user's shell; part of cyclopts",
-    "python benchmarks/anisotropic.py": "speed is measured by benchmarks; tests/optics/test_berreman.py",
-    **dict.fromkeys(
-        [f"python benchmarks/peers --group {group} --write" for group in ("birefringent", "graded")],
-        "make peers",
-    ),
-    "python benchmarks/peers/agreement.py --stacks 1000": "needs pyElli; tests/optics/test_berreman.py",
-    "python benchmarks/published.py": "tests/reference/test_published_layers.py: the same numbers",
-    "python benchmarks/explorer.py": "speed is measured by benchmarks; tests/explorer",
-    "python benchmarks/calibration.py": _LONG_STUDY,
-    "python benchmarks/colour_inverse.py": "tests/colour/test_inverse.py: 300 colours of one film",
-    "python benchmarks/colour_series.py": "tests/colour/test_series.py: fewer colours",
-    "python benchmarks/map.py": "speed is measured by benchmarks; tests/mapping: a few pixels",
-    "python benchmarks/map_regions.py": "takes minutes; tests/mapping/test_pixel_errors.py: a few pixels",
-    "python benchmarks/posterior.py": _LONG_STUDY,
-    "python benchmarks/renderers.py": "takes minutes; tests/rendering: one film for each renderer",
-    "python benchmarks/colour.py": _LONG_STUDY,
-    "python benchmarks/camera_colours.py": "minutes; tests/fitting/film/test_colour_fit.py: a few films",
-    "python benchmarks/multiple_scattering.py": "tests/brdf/test_multiple_scattering.py: its limits",
-    "python benchmarks/brdf_bands.py": "takes minutes; tests/brdf/test_sensor_bands.py: its bands",
-    "python benchmarks/brdf_errors.py": _LONG_STUDY,
-    "python benchmarks/brdf_recovery.py": _LONG_STUDY,
-    "python benchmarks/mitsuba_films.py": "tests/rendering/test_mitsuba.py: one film",
-    "python scripts/render_blade.py": "renders for minutes; tests/rendering/test_mitsuba.py: its materials",
-    "python -m pytest": "runs these tests",
-    "python scripts/make_measurements.py": "tests/test_measurements.py: two of the files",
-    "python scripts/index_materials.py": "tests/materials/test_catalogue.py: the kept index",
-}
+ELSEWHERE = (
+    *CI,  # .ci/run
+    "make browser-tests",  # needs Chromium; reporting/test_page_in_browser.py, explorer
+    "make dist-check",  # installs the wheel for every Python found; .ci/run: make dist
+    "make fits",  # test_fits.py: all of them in make slow
+    *("make slow", "make coverage", "python -m pytest"),  # run these tests
+    "make properties",  # properties: the same on thousands of scenes
+    "make fuzz",  # data/test_fuzz.py: a short run
+    "make verdicts",  # test_verdicts.py: its model, cases and scores
+    # install several GB; test_benchmarks.py needs no other package
+    *("make peers", "python benchmarks/peers/agreement.py --stacks 1000"),
+    *each("python benchmarks/peers --group {} --write", "birefringent graded"),
+    "make schema",  # recipes/test_schema.py: the kept schema
+    "make figures",  # reference: the numbers; the figures are kept
+    "source .venv/bin/activate",  # a shell builtin; make fit creates the folder
+    "pellicle fit wafer.txt --layer cauchy --substrate Si",  # a file of the reader
+    "pellicle demo",  # cli/test_demo_command.py
+    # serve a page until they are interrupted; explorer/test_server.py
+    *("pellicle explore", "pellicle explore docs/examples/oxide.toml"),
+    "pellicle explore --layer TiO2 --substrate BK7 --back air --signal T",
+    "pellicle explore --signal psi-delta --angle 65,70,75",
+    "pellicle --install-completion",  # would change the user's shell; part of cyclopts
+    # speed is measured by benchmarks, never tested
+    "make bench",
+    *each("python benchmarks/{}.py", "fit film cold_start anisotropic explorer map"),
+    # take hours; their tables are kept, and the modules that they use have their own tests
+    *each("python benchmarks/{}.py", "calibration posterior colour brdf_errors brdf_recovery"),
+    # take minutes, for which a test has a few films or pixels: reference, colour, mapping, rendering, brdf
+    *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
+    *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
+    "python scripts/render_blade.py",  # rendering/test_mitsuba.py: its materials
+    "python scripts/make_measurements.py",  # test_measurements.py
+    "python scripts/index_materials.py",  # materials/test_catalogue.py: the kept index
+)
 
 
 def commands(text: str) -> list[str]:
@@ -169,7 +133,7 @@ def pellicle_commands(page: str) -> list[str]:
 
 
 def is_slow(command: str) -> bool:
-    return command.startswith(tuple(SLOW))
+    return command.startswith(SLOW)
 
 
 PAGES_WITH_COMMANDS = [page for page in PAGES if pellicle_commands(page)]

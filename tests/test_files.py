@@ -79,8 +79,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, write):
 
     def fail_half_way():
         with replacing(target, overwrite=True) as temporary:
-            assert temporary.suffix == ".png"
-            assert temporary.parent == tmp_path
+            assert (temporary.suffix, temporary.parent) == (".png", tmp_path)
             temporary.write_text("ha")
             raise RuntimeError("half")
 
@@ -98,27 +97,28 @@ def test_places_that_cannot_be_written(tmp_path):
 
 
 def test_folders_that_are_new_or_empty_or_ours(tmp_path):
-    assert new_folder(tmp_path / "a" / "b").is_dir()
-    assert new_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
-    (tmp_path / "a" / "b" / "result.json").write_text('{"schema": "pellicle.fit/1"}')
-    (tmp_path / "a" / "b" / "diary.txt").write_text("mine")
-    new_folder(tmp_path / "a" / "b")
-    assert (tmp_path / "a" / "b" / "diary.txt").read_text() == "mine"
+    folder = tmp_path / "a" / "b"
+    assert new_folder(folder).is_dir()
+    assert new_folder(folder) == folder
+    (folder / "result.json").write_text('{"schema": "pellicle.fit/1"}')
+    (folder / "diary.txt").write_text("mine")
+    new_folder(folder)
+    assert (folder / "diary.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize(("name", "text"), [("diary.txt", "mine"), ("result.json", '{"schema": "other"}')])
-def test_a_folder_with_files_of_others_is_refused(tmp_path, name, text):
+@pytest.mark.parametrize(
+    ("name", "text", "asked", "words"),
+    [
+        ("diary.txt", "mine", ".", "holds files that pellicle did not write; .*"),
+        ("result.json", '{"schema": "other"}', ".", "holds files that pellicle did not write; .*"),
+        ("out", "mine", "out", "out: is a file, not a folder; .*"),
+        ("out", "mine", "out/deeper", "cannot be made .*"),
+    ],
+)
+def test_files_of_others_are_no_folder(tmp_path, name, text, asked, words):
     (tmp_path / name).write_text(text)
-    with pytest.raises(UsageError, match=r"holds files that pellicle did not write; .* `folder`"):
-        new_folder(tmp_path)
-
-
-def test_a_file_is_no_folder(tmp_path):
-    (tmp_path / "out").write_text("mine")
-    with pytest.raises(UsageError, match=r"out: is a file, not a folder; .*`folder`"):
-        new_folder(tmp_path / "out")
-    with pytest.raises(UsageError, match=r"cannot be made .*`folder`"):
-        new_folder(tmp_path / "out" / "deeper")
+    with pytest.raises(UsageError, match=words + "`folder`"):
+        new_folder(tmp_path / asked)
 
 
 def _stray(folder, process, name="figure", machine=None):
@@ -168,10 +168,8 @@ def test_a_killed_process_leaves_a_name_that_is_recognised(tmp_path):
 )
 def test_a_full_disk_is_one_sentence_and_leaves_the_old_file(tmp_path, write, error):
     target = write("old", "chain.h5")
-    with (
-        pytest.raises(DataError, match=r"chain\.h5: cannot be written \(.*No space left.*make room"),
-        replacing(target, overwrite=True),
-    ):
+    words = r"chain\.h5: cannot be written \(.*No space left.*make room"
+    with pytest.raises(DataError, match=words), replacing(target, overwrite=True):
         raise error
     assert target.read_text() == "old"
     assert os.listdir(tmp_path) == ["chain.h5"]

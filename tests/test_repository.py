@@ -1,9 +1,11 @@
-"""The citation file is complete, and CONTRIBUTING describes the folders and modules that there are."""
+"""Files of the project agree: citation, CONTRIBUTING, metadata, the conda recipe and the workflows."""
 
+import pkgutil
 import re
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -25,6 +27,41 @@ def test_the_citation_file_is_complete():
         assert reference.get("doi", family) in sources, reference["title"]
 
 
+PAGES = [
+    *(ROOT / x for x in ("README.md", "CONTRIBUTING.md", "fits/README.md")),
+    *(ROOT / "docs").rglob("*.md"),
+]
+CODE = {
+    path: path.read_text("utf-8")
+    for x in ("src", "tests", "scripts", "benchmarks")
+    for path in (ROOT / x).rglob("*.py")
+}
+WORDS = {word for text in CODE.values() for word in re.findall(r"\w+", text)}
+WORDS |= {"properdocs", "validation"}  # of the site's settings
+WORDS |= {"sigma_psi_ane", "sigma_delta_ane"}  # columns whose names are composed
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_modules_and_identifiers_named_on_a_page_exist(page):
+    """Files by their path in the repository or in the package, or by the end of it; `NAME` in `module.py` (or
+    of, to, from it) stands in it, `pl.NAME` is public, and any other identifier is in some module."""
+    text = re.sub(r"^```.*?^```", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    files = set(re.findall(r"`([\w./]+\.(?:py|toml)|\w+/[\w./]+\.md)`", text)) - {
+        "NN_name.py",
+        "pellicle_film.py",
+    }
+    kept = ["/" + path.relative_to(ROOT).as_posix() for path in (*ROOT.glob("*"), *ROOT.glob("[a-z]*/**/*"))]
+    written = re.findall(r"--out (\S+)", page.read_text("utf-8"))
+    assert not [x for x in files if x not in written and not any(path.endswith("/" + x) for path in kept)]
+    for name, module in re.findall(r"`(\w+)(?:\([^`]*\))?` (?:in|of|to|from)\s+`([\w/]+\.py)`", text):
+        texts = [code for path, code in CODE.items() if path.as_posix().endswith("/" + module)]
+        assert any(re.search(rf"\b{name}\b", code) for code in texts), (name, module)
+    for name in re.findall(r"`((?:pl|pellicle)(?:\.\w+)+)(?:\([^`]*\))?`", text):
+        assert pkgutil.resolve_name(name.replace("pl.", "pellicle.", 1)) is not None
+    if page.stem != "from_other_programs":
+        assert set(re.findall(r"`([A-Za-z_]\w*)(?:\([^`]*\))?`", text)) <= WORDS
+
+
 def test_the_house_is_drawn_in_the_order_of_the_import_contract():
     """The diagram of CONTRIBUTING, whose indented lines are folders inside of others."""
     (diagram,) = re.findall(r"^```text\n(.*?)^```", CONTRIBUTING, re.MULTILINE | re.DOTALL)
@@ -33,25 +70,72 @@ def test_the_house_is_drawn_in_the_order_of_the_import_contract():
     assert drawn == pyproject["tool"]["importlinter"]["contracts"][0]["layers"]
 
 
-def test_modules_named_in_contributing_exist():
-    """By their path in the repository or in the package, or by the end of it."""
-    named = set(re.findall(r"`([\w./]+\.(?:py|toml|csv|md))`", CONTRIBUTING)) - {"NN_name.py"}
-    paths = [*ROOT.glob("*"), *ROOT.glob("[a-z]*/**/*")]
-    kept = ["/" + path.relative_to(ROOT).as_posix() for path in paths if path.is_file()]
-    assert not [name for name in named if not any(path.endswith("/" + name) for path in kept)]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+OF_DEVELOPERS = {"all", "browser", "dev", "docs", "notebooks"}
+MAKEFILE = (ROOT / "Makefile").read_text("utf-8")
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+OTHER_NAMES = {"matplotlib-base": "matplotlib", "python-flatbuffers": "flatbuffers"}
+"""Names of conda-forge that differ from those of the package index."""
 
 
-def test_identifiers_named_in_contributing_exist():
-    """`NAME` in `module.py` (or of, to, from it) stands in it, any other identifier in some module."""
-    code = {path: path.read_text("utf-8") for path in (ROOT / "src" / "pellicle").rglob("*.py")}
-    words = {word for text in code.values() for word in re.findall(r"\w+", text)}
-    words |= {
-        word for path in (ROOT / "tests").rglob("*.py") for word in re.findall(r"\w+", path.read_text())
-    }
-    beside = re.findall(r"`(\w+)(?:\([^`]*\))?` (?:in|of|to|from)\s+`([\w/]+\.py)`", CONTRIBUTING)
-    assert beside
-    for name, module in beside:
-        texts = [text for path, text in code.items() if path.as_posix().endswith("/" + module)]
-        assert any(re.search(rf"\b{name}\b", text) for text in texts), (name, module)
-    named = re.findall(r"`([A-Za-z_]\w*)(?:\([^`]*\))?`", CONTRIBUTING)
-    assert {name for name in named if name not in words} <= {"properdocs", "validation"}
+def names_and_bounds(requirements: list[str]) -> dict[str, str]:
+    """Return the bound of each requirement by its name, without blanks."""
+    split = [re.fullmatch(r"([\w-]+)\s*(.*)", requirement) for requirement in requirements]
+    return {OTHER_NAMES.get(m[1], m[1]): m[2].replace(" ", "") for m in split if m}
+
+
+def test_the_extra_all_has_every_extra_for_users():
+    [requirement] = EXTRAS["all"]
+    assert (
+        set(requirement.removeprefix("pellicle[").removesuffix("]").split(","))
+        == EXTRAS.keys() - OF_DEVELOPERS
+    )
+
+
+def test_the_conda_recipe_has_the_dependencies_of_the_project():
+    recipe = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text("utf-8"))
+    run = names_and_bounds(recipe["requirements"]["run"])
+    assert run.pop("python") == PROJECT["requires-python"]
+    assert run == names_and_bounds(PROJECT["dependencies"])
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["build-system"]["requires"]
+    assert names_and_bounds(build).items() <= names_and_bounds(recipe["requirements"]["host"]).items()
+    assert recipe["build"]["python"]["entry_points"] == [f"pellicle = {PROJECT['scripts']['pellicle']}"]
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.stem)
+def test_workflows_run_targets_and_scripts_that_exist(path):
+    steps = [
+        step for job in yaml.safe_load(path.read_text("utf-8"))["jobs"].values() for step in job["steps"]
+    ]
+    for command in (step["run"] for step in steps if "run" in step):
+        program, *arguments = command.split()
+        exists = (ROOT / program).is_file()
+        assert exists or (program == "make" and re.search(rf"^{arguments[0]}:", MAKEFILE, re.MULTILINE)), (
+            command
+        )
+
+
+def test_every_declared_python_is_installed_by_the_workflow_and_tried_by_make():
+    declared = {line.rpartition(" ")[2] for line in PROJECT["classifiers"] if re.search(r"3\.\d+$", line)}
+    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8")
+    assert declared == set(re.findall(r"^ {12}(3\.\d+)$", workflow, re.MULTILINE))
+    assert declared == set(
+        re.findall(r"python(3\.\d+)", re.findall(r"^PYTHONS \?= (.*)$", MAKEFILE, re.MULTILINE)[0])
+    )
+
+
+@pytest.mark.parametrize(
+    ("version", "citation", "changelog", "found"),
+    [
+        ("0.2.0", "version: 0.2.0\n", "## 0.2.0 (2026-11-23)\n", 0),
+        ("0.2.0", "version: 0.1.0\n", "## 0.2.0 (2026-11-23)\n", 1),
+        ("0.2.0", "version: 0.2.0\n", "## 0.2.0 (unreleased)\n", 1),
+        ("0.2.0.dev7+g1234567", "version: 0.1.0\n", "## 0.1.0 (unreleased)\n", 0),
+    ],
+)
+def test_a_release_is_compared_with_the_citation_and_the_changelog(
+    load_script, version, citation, changelog, found
+):
+    script = load_script("scripts/check_distribution.py")
+    assert len(script.release_differences(version, citation, changelog)) == found

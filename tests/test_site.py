@@ -1,11 +1,9 @@
-"""The documentation site: its navigation, and the pages that are made of executed notebooks.
-
-`make docs` checks links and anchors; the engine does not report what is checked here.
-"""
+"""The documentation site: its navigation, and the notebooks that become its pages."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
+import jupytext
 import nbformat
 import pytest
 import yaml
@@ -66,3 +64,31 @@ def test_a_notebook_becomes_a_page_with_its_figures(staged):
 def test_a_notebook_that_wrote_to_stderr_is_refused(staged):
     with pytest.raises(SystemExit, match=r"01_films\.ipynb wrote to stderr: a warning"):
         staged(nbformat.v4.new_output("stream", name="stderr", text="a warning"))
+
+
+PAIRS = sorted((ROOT / "notebooks").glob("*.py"))
+
+
+def sources(notebook):
+    return [(cell.cell_type, cell.source) for cell in notebook.cells]
+
+
+def test_every_notebook_has_a_script():
+    assert PAIRS
+    assert [path.stem for path in PAIRS] == [
+        path.stem for path in sorted((ROOT / "notebooks").glob("*.ipynb"))
+    ]
+
+
+@pytest.mark.parametrize("path", PAIRS, ids=lambda path: path.stem)
+def test_notebooks(path):
+    """A notebook agrees with its script, contains no outputs and is a page of the documentation."""
+    notebook, script = jupytext.read(path.with_suffix(".ipynb")), jupytext.read(path, fmt="py:percent")
+    assert sources(notebook) == sources(script), "jupytext --sync notebooks/*.py"
+    assert notebook.metadata.kernelspec.name == "python3"
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert all(not cell.outputs and cell.execution_count is None for cell in code)
+    assert f": tutorials/{path.stem}.md\n" in (ROOT / "mkdocs.yml").read_text("utf-8")
+    title = script.cells[0]
+    assert title.cell_type == "markdown"
+    assert title.source.startswith("# ")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.accuracy.film_methods import reference_signal
@@ -10,12 +9,12 @@ from pellicle.accuracy.high_precision import signal
 from pellicle.errors import UsageError
 from pellicle.scene.instrument import Instrument
 
+from ..by_tmm import films, ncs
 from .conftest import NM, few
 
 AT = np.array([0, 4, 8])
 STACK = [pl.Layer(pl.dispersion.Constant(2.1, 0.05), 120.0), pl.Layer(pl.dispersion.Constant(0.2, 3.4), 15.0)]
-INDICES, DEPTHS = [1.0, 2.1 + 0.05j, 0.2 + 3.4j, 1.5], [np.inf, 120.0, 15.0, np.inf]
-THETA = np.deg2rad(50.0)
+INDICES, DEPTHS = [1.0, 2.1 + 0.05j, 0.2 + 3.4j, 1.5], [120.0, 15.0]
 
 
 def seen(light, layers=STACK, substrate: object = 1.5):
@@ -27,23 +26,12 @@ def seen(light, layers=STACK, substrate: object = 1.5):
 @pytest.mark.parametrize("kind", ["R", "T"])
 def test_powers(kind, letter):
     found = seen(pl.Light(angle=50.0, signal=kind, polarisation=letter))[:, 0]
-    truth = [tmm.coh_tmm(letter, INDICES, DEPTHS, THETA, nm)[kind] for nm in NM[AT]]
-    np.testing.assert_allclose(found, truth, atol=1e-14)
+    np.testing.assert_allclose(found, films(letter, NM[AT], INDICES, DEPTHS, 50.0, kind), atol=1e-14)
 
 
 def test_ellipsometry():
     found = seen(pl.Light(angle=50.0, signal="psi-delta"))
-    for row, nm in zip(found, NM[AT], strict=True):
-        angles = tmm.ellips(INDICES, DEPTHS, THETA, nm)
-        psi, delta = angles["psi"], np.pi - angles["Delta"]  # r_p has the other sign in tmm's Δ
-        sphere = [np.cos(2 * psi), np.sin(2 * psi) * np.cos(delta), np.sin(2 * psi) * np.sin(delta)]
-        np.testing.assert_allclose(np.abs(row), np.abs(sphere), atol=1e-13)
-    exact = pl.ellipsometry(NM[AT], [120.0, 15.0], [2.1 + 0.05j, 0.2 + 3.4j], 1.5, angle=50.0)
-    twice, delta = 2 * np.deg2rad(exact[0]), np.deg2rad(exact[1])
-    np.testing.assert_allclose(
-        found, np.stack([np.cos(twice), np.sin(twice) * np.cos(delta), np.sin(twice) * np.sin(delta)], 1),
-        atol=1e-13,
-    )  # fmt: skip
+    np.testing.assert_allclose(found, ncs(NM[AT], INDICES, DEPTHS, 50.0), atol=1e-13)
 
 
 @pytest.mark.parametrize("kind", ["R", "T"])
@@ -51,8 +39,7 @@ def test_a_plate_adds_intensities(kind):
     glass = pl.Substrate(pl.dispersion.Constant(1.5, 1e-5), back=1.0, plate_mm=0.5)
     found = seen(pl.Light(angle=50.0, signal=kind, polarisation="p"), substrate=glass)[:, 0]
     indices = [*INDICES[:3], 1.5 + 1e-5j, 1.0]
-    depths = [*DEPTHS[:3], 5e5, np.inf]
-    truth = [tmm.inc_tmm("p", indices, depths, ["i", "c", "c", "i", "i"], THETA, nm)[kind] for nm in NM[AT]]
+    truth = films("p", NM[AT], indices, [*DEPTHS, 5e5], 50.0, kind, "iccii")
     np.testing.assert_allclose(found, truth, atol=1e-8)  # tmm leaves the plate's k out at its faces
 
 

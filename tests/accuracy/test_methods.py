@@ -6,7 +6,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.case import compiled
-from pellicle.accuracy.film_methods import METHODS
+from pellicle.accuracy.film_methods import METHODS, reference_signal
+from pellicle.effects.film_plan import alternatives
+from pellicle.errors import UsageError
 from pellicle.scene.instrument import Instrument
 
 from .conftest import NM, few
@@ -27,16 +29,12 @@ def reason(case, name):
     return variant
 
 
-def by_library(case, thickness=None, **changes):
+def by_library(case, **changes):
     """Reflectance of the films by `pl.reflectance`, with something of the scene changed."""
-    given = {
-        "angle": 60.0,
-        "n": 1.9 + 12000.0 / NM**2,
-        "k": case.draws[:, :1],
-        "substrate": 1.5 + 0.4j,
-    } | changes
-    layer = given["n"] + 1j * given["k"]
-    return np.asarray(reflectance(case.draws[:, 1:], layer, given["substrate"], given["angle"]))
+    given = {"angle": 60.0, "n": 1.9 + 12000.0 / NM**2, "k": case.draws[:, :1]} | changes
+    return np.asarray(
+        reflectance(case.draws[:, 1:], given["n"] + 1j * given["k"], 1.5 + 0.4j, given["angle"])
+    )
 
 
 @pytest.mark.slow
@@ -123,15 +121,80 @@ def test_methods_that_do_not_apply_say_why():
     assert "s and p mix have no series" in reason(tilted, "1 order")
 
 
-@pytest.mark.parametrize("name", ["3 nodes", "smooth faces"])
-def test_averages_and_roughness(name):
+@pytest.mark.parametrize(("name", "roughness", "width"), [("3 nodes", 0.0, 6.0), ("smooth faces", 6.0, 0.0)])
+def test_averages_and_roughness(name, roughness, width):
     """Nodes are cut, faces made smooth: closer to the truth, and exactly smooth."""
-    rough = pl.Layer(2.2, 120.0, roughness=6.0 if name == "smooth faces" else 0.0)
-    width = 0.0 if name == "smooth faces" else 6.0
-    two = [rough, pl.Layer(1.46, 150.0)]
+    two = [pl.Layer(2.2, 120.0, roughness=roughness), pl.Layer(1.46, 150.0)]
     case = few(pl.Scene(two, 3.9, instrument=Instrument(bandwidth=width)), draws=1)
     full, cut = answer(case, "float64")[0], answer(case, name)[0]
-    if name == "smooth faces":
+    if roughness:
         smooth = np.asarray(pl.reflectance(NM, [120.0, 150.0], [2.2, 1.46], 3.9))
         np.testing.assert_allclose(cut, smooth, atol=1e-13)
     assert 1e-9 < np.abs(full - cut).max() < 0.1
+
+
+def film(material):
+    layer = pl.Layer(material, pl.Free(100.0, 300.0, start=150.0))
+    return few(pl.Scene(layer, 1.5, light=pl.Light(angle=60.0)))
+
+
+def aligned():
+    return film(pl.Anisotropic(1.8, 1.95))
+
+
+def graded():
+    return film(pl.Graded(1.5, 2.0, mix="linear"))
+
+
+def test_isotropic_average_has_the_mean_index():
+    case = aligned()
+    mean = reflectance(case.draws, (2 * 1.8 + 1.95) / 3, 1.5, 60.0)
+    np.testing.assert_allclose(answer(case, "isotropic average"), mean, atol=1e-14)
+
+
+def test_aligned_axes_are_at_the_next_right_angles():
+    tilted = film(pl.Anisotropic(1.8, 1.95, axis=(pl.Free(0.0, 90.0, start=30.0), 20.0)))
+    reference = aligned()._replace(draws=tilted.draws[:, 1:])
+    assert np.all(reference.draws >= 100)
+    np.testing.assert_allclose(answer(tilted, "aligned axes"), answer(reference, "float64"), atol=1e-14)
+    assert "the full plan has them" in str(BY_NAME["4×4 matrices"].apply(tilted))
+    assert "no optic axis is tilted" in str(BY_NAME["aligned axes"].apply(aligned()))
+
+
+def test_mean_of_the_depth_has_the_mean_permittivity():
+    case = graded()
+    mean = reflectance(case.draws, np.sqrt(0.5 * (1.5**2 + 2.0**2)), 1.5, 60.0)
+    np.testing.assert_allclose(answer(case, "mean of the depth"), mean, atol=1e-12)
+
+
+def test_high_precision_computes_aligned_axes():
+    """The principal indices reach other axes than for an isotropic film; a tilt is refused by name."""
+    case = film(pl.Anisotropic(x=1.8 + 0.1j, y=1.7, z=1.95, axis=(90.0, 0.0, 90.0)))
+    exact = reference_signal("mpmath", case)
+    assert exact.error(case, answer(case, "float64")) < 1e-14
+    assert exact.error(case, answer(film(pl.Anisotropic(1.8 + 0.1j, 1.95)), "float64")) > 0.01
+    with pytest.raises(UsageError, match="optic axis is tilted"):
+        reference_signal("mpmath", film(pl.Anisotropic(1.8, 1.95, axis=(20.0, 0.0))))
+
+
+@pytest.mark.slow  # compiles four programs of slices
+def test_slices_converge_as_their_orders():
+    """Homogeneous slices of a linear permittivity have second order, the others sixth."""
+    case = graded()
+    edges = np.arange(33) / 32
+    middle = np.sqrt(1.5**2 + (2.0**2 - 1.5**2) * 0.5 * (edges[1:] + edges[:-1]))
+    by_hand = [
+        np.asarray(pl.reflectance(NM, [d / 32] * 32, list(middle), 1.5, angle=60.0)) for d in case.draws[:, 0]
+    ]
+    np.testing.assert_allclose(answer(case, "32 homogeneous slices"), by_hand, atol=1e-13)
+    truth = answer(case, "float64")
+    coarse, fine = (np.abs(answer(case, f"{n} homogeneous slices") - truth).max() for n in (8, 32))
+    assert 12 < coarse / fine < 20
+    assert np.abs(answer(case, "4 slices") - truth).max() < fine
+
+
+def test_removal_counts_a_free_index_once():
+    """Without birefringence the angle of the axis has no gradient: the effect must stay."""
+    material = pl.Anisotropic(pl.dispersion.Constant(pl.Free(1.6, 1.9)), 1.95, axis=(pl.Free(0.0, 90.0), 0.0))
+    light = pl.Light(wavelength=NM, angle=60.0)
+    assert alternatives("anisotropy", pl.Scene(pl.Layer(material, 150.0), 1.5, light=light)) == []

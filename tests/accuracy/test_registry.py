@@ -24,13 +24,9 @@ def film():
     return few(pl.Scene(pl.Layer(2.2, pl.Free(50.0, 400.0, start=100.0)), substrate=3.9))
 
 
-def result(error, seconds):
-    return Result("", "", error, seconds, 0.0)
-
-
 def test_the_pareto_front_is_unbeaten():
     pairs = [(1e-3, 1.0), (1e-6, 2.0), (1e-4, 3.0), (0.0, 4.0), (0.0, 5.0), (np.inf, 9.0)]
-    results = [result(*pair) for pair in pairs]
+    results = [Result("", "", *pair, 0.0) for pair in pairs]
     mark_pareto(results)
     assert [r.pareto for r in results] == [True, True, False, True, False, False]
 
@@ -68,16 +64,14 @@ def test_the_median_time_of_all_rounds_counts():
     """A method that is slow once, at its first call, is still the fastest."""
     times = {"steady": [3.0], "slow once": [9.0, 2.0], "slowest": [4.0, 5.0]}
     methods = [Method(name, "", lambda case: "unused") for name in times]
-    compared = measure(
-        Comparison("forward", "float64", 1e-3, "R", 1, 1),
-        methods,
-        lambda method: Timed(None, None, (times[method.name],), True, 1, 7.0, 40.0),
-        lambda signal: 1e-6,
-        quiet,
-    )
-    assert [(r.name, r.seconds) for r in compared.results] == [
-        *(("slow once", 2.0), ("steady", 3.0), ("slowest", 5.0))
-    ]
+    empty = Comparison("forward", "float64", 1e-3, "R", 1, 1)
+
+    def program(method):
+        return Timed(None, None, (times[method.name],), True, 1, 7.0, 40.0)
+
+    compared = measure(empty, methods, program, lambda signal: 1e-6, quiet)
+    expected = [("slow once", 2.0), ("steady", 3.0), ("slowest", 5.0)]
+    assert [(r.name, r.seconds) for r in compared.results] == expected
     assert [r.pareto for r in compared.results] == [True, False, False]
     assert {(r.error, r.compile_seconds, r.details["flops"]) for r in compared.results} == {(1e-6, 7.0, 40.0)}
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-import tmm
 
 from pellicle.brdf.sensor_bands import ERROR, quadrature
 from pellicle.colour import sensor
+
+from ..by_tmm import films
 
 CIE = sensor("1931", "D65")
 CAMERA_NM = np.arange(400.0, 721.0)
@@ -14,12 +15,6 @@ CAMERA = np.stack(
     [np.interp(CAMERA_NM, _STEPS, np.exp(-(((_STEPS - peak) / 35) ** 2))) for peak in (600, 540, 460)], axis=1
 )
 """A camera tabulated in steps of 10 nm, which still sees light at 400 nm, where its table ends."""
-
-
-def _reflectance(nm, film, base, thickness, angle):
-    return np.array(
-        [tmm.unpolarized_RT([1, film, base], [np.inf, thickness, np.inf], angle, x)["R"] for x in nm]
-    )
 
 
 @pytest.mark.parametrize("table", [(CIE.wavelength, CIE.weights), (CAMERA_NM, CAMERA)], ids=["CIE", "camera"])
@@ -31,8 +26,9 @@ def test_few_wavelengths_integrate_like_the_whole_table(table, film, base, thick
     nm, weights = table
     few = quadrature(nm, weights, np.real(film) * thickness)
     assert len(few.wavelength) < len(nm) / 2
-    truth = _reflectance(nm, film, base, thickness, angle) @ (weights / weights.sum(axis=0))
-    found = _reflectance(few.wavelength, film, base, thickness, angle) @ few.weights
+    layer = [1, film, base], [thickness], np.rad2deg(angle)
+    truth = films("sp", nm, *layer) @ (weights / weights.sum(axis=0))
+    found = films("sp", few.wavelength, *layer) @ few.weights
     np.testing.assert_allclose(found, truth, rtol=0, atol=ERROR)
 
 

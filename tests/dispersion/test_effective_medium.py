@@ -96,14 +96,9 @@ def test_gradients(rule, f, inclusion):
 
     at = np.array([1.46, 0.0, *inclusion, f])
     slope = np.asarray(jax.jit(jax.jacrev(value))(at))
-    assert np.all(np.isfinite(slope))
-    for i, x in enumerate(at):
-        h = 1e-6
-        low, high = (0.0 if i in (1, 3) else -np.inf), np.inf
-        up, down = at.copy(), at.copy()
-        up[i], down[i] = x + h, max(x - h, low) if high > low else x
-        if i == 4:
-            up[i], down[i] = min(f + h, 1.0), max(f - h, 0.0)
+    least, most = [-np.inf, 0.0, -np.inf, 0.0, 0.0], [np.inf, np.inf, np.inf, np.inf, 1.0]
+    for i, step in enumerate(1e-6 * np.eye(5)):
+        up, down = (np.clip(at + way * step, least, most) for way in (1, -1))
         numeric = (np.asarray(value(up)) - np.asarray(value(down))) / (up[i] - down[i])
         np.testing.assert_allclose(slope[:, i], numeric, rtol=2e-5, atol=2e-5)
 
@@ -131,23 +126,14 @@ def test_fractions_outside_0_to_1(rule, fraction):
         rule(Constant(1.46), Constant(1.0), fraction)
 
 
-def _fit(tmp_path, truth, layer):
-    wavelength = np.linspace(300, 900, 121)
-    measured = simulate_signal(pl.Scene(truth, "Si"), wavelength, 0.001, 1)
-    path = tmp_path / "data.csv"
-    np.savetxt(path, np.c_[wavelength, measured.values], delimiter=",", header="wavelength_nm,R", comments="")
-    return pl.fit(pl.read_spectrum(path, noise=0.001), pl.Scene(layer, "Si"))
-
-
 @pytest.mark.slow
-def test_a_fit_finds_a_tauc_lorentz_layer(tmp_path):
+def test_a_fit_finds_a_tauc_lorentz_layer():
     """All six numbers at once, from the default bounds."""
     truth = {"eps_inf": 1.5, "A": 120.0, "E0": 4.1, "C": 2.3, "Eg": 2.2, "thickness": 120.0}
-    fit = _fit(
-        tmp_path,
-        pl.Layer(media.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)"), 120.0),
-        pl.Layer(media.medium("tauc-lorentz"), pl.Free(50, 300)),
-    )
+    film = pl.Layer(media.medium("tauc-lorentz(120,4.1,2.3,2.2,1.5)"), 120.0)
+    data = pl.simulate(pl.Scene(film, "Si"), np.linspace(300, 900, 121), noise=0.001, seed=1)
+    free = pl.Layer(media.medium("tauc-lorentz"), pl.Free(50, 300))
+    fit = pl.fit(data, pl.Scene(free, "Si"))
     assert fit.status.value == "converged"
     for name, value in truth.items():
         found = fit.parameters[name]

@@ -7,6 +7,8 @@ import pytest
 
 from pellicle.dispersion.refractiveindex_info import Formula
 
+from ..differences import derivative
+
 FUSED_SILICA = Formula(1, (0.0, 0.6961663, 0.0684043, 0.4079426, 0.1162414, 0.8974794, 9.896161))
 BK7 = Formula(2, (0.0, 1.03961212, 0.00600069867, 0.231792344, 0.0200179144, 1.01046945, 103.560653))
 
@@ -114,10 +116,7 @@ def test_slope_agrees_with_differences_under_jit(number):
     low, high = (1e3 * edge for edge in model.wavelength_range)
     nm = jnp.linspace(low + 0.05 * (high - low), high - 0.05 * (high - low), 23)
     slope = jax.jit(jax.vmap(jax.grad(formula.index)))(nm)
-    step = 1e-4 * nm
-    differences = (formula.index(nm + step) - formula.index(nm - step)) / (2 * step)
-    assert jnp.isfinite(slope).all()
-    np.testing.assert_allclose(slope, differences, rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(slope, derivative(formula.index, nm, 1e-4 * nm), rtol=1e-4, atol=1e-12)
 
 
 @pytest.mark.parametrize("number", EXAMPLES)
@@ -134,15 +133,13 @@ def test_shape_follows_the_wavelength():
     assert constant.index(jnp.ones((2, 3))).shape == (2, 3)
     assert constant.index(500).shape == ()
     assert float(FUSED_SILICA.index(500)) == float(FUSED_SILICA.index(500.0))
+    assert jnp.iscomplexobj(BK7(500.0))
 
 
 def test_left_out_coefficients_are_zero():
     assert float(Formula(4, (2.25,)).index(500.0)) == 1.5
     assert float(Formula(7, (1.5,)).index(500.0)) == 1.5
     assert float(Formula(1, (1.25, 0.3)).index(500.0)) == pytest.approx(np.sqrt(2.55))
-
-
-def test_negative_square_is_nan():
     assert np.isnan(Formula(3, (-1.0,)).index(500.0))
 
 
@@ -153,7 +150,3 @@ def test_negative_square_is_nan():
 def test_impossible_formulas_are_refused(number, coefficients, sentence):
     with pytest.raises(ValueError, match=sentence):
         Formula(number, coefficients)
-
-
-def test_calling_gives_complex():
-    assert jnp.iscomplexobj(BK7(500.0))

@@ -25,21 +25,10 @@ def candidate(
     size = 0 if delta is None else 2 if angles is None else 4
     plan = Plan((Row("anisotropy", delta is not None, "", count=size),), "psi-delta", "unpolarised")
     curve = Curve(nm, zero, zero + 1, zero, zero, zero, zero, zero, principal=principal)
-    fit = Fit(
-        parts=(Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0),),
-        status=Status.CONVERGED,
-        verdict="",
-        parameters={word: Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free)},
-        rivals=(),
-        chi2_reduced=1.0,
-        rms=0.0,
-        effective_points=2.0,
-        correlation_names=(),
-        correlation=np.zeros((0, 0)),
-        warnings=(),
-        profile=None,
-        seconds=0.0,
-    )
+    part = Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0)
+    parameters = {word: Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free)}
+    empty = np.zeros((0, 0))
+    fit = Fit((part,), Status.CONVERGED, "", parameters, (), 1.0, 0.0, 2.0, (), empty, (), None, 0.0)
     return Candidate(name, fit, 1 + len(free), 0.0, 0.0, bic)
 
 

@@ -3,15 +3,13 @@
 from dataclasses import replace
 
 import jax
-import jax.numpy as jnp
 import lmfit
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.optimize import curve_fit
 
 import pellicle as pl
-from pellicle.fitting.covariance import errors, scaled
+from pellicle.fitting.covariance import Scaled, errors, scaled
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured as as_numbers
 from pellicle.simulation.functions import reflectance
@@ -19,15 +17,6 @@ from pellicle.simulation.spectra import simulate_signal
 
 CAUCHY = (pl.Free(1.3, 1.7), pl.Free(0.0, 2e4))
 TRUTH = (1.45, 4000.0, 480.0)  # A, B, thickness
-
-
-@pytest.fixture(scope="module")
-def model():
-    @jax.jit
-    def model(nm, d, a, b):
-        return reflectance(nm, d, a + b / nm**2, 3.9 + 0.02j)
-
-    return lambda nm, *p: np.asarray(model(jnp.asarray(nm), *map(jnp.asarray, p)))
 
 
 @pytest.fixture
@@ -41,55 +30,37 @@ def covariance(fit):
     return fit.correlation_names, fit.correlation * np.outer(stderr, stderr)
 
 
-def ordered(names):
-    return [names.index(name) for name in ("thickness", "A", "B")]
+UNITS = {"thickness": 100, "A": 1, "B": 1e4}
+"""Steps of lmfit's finite differences would cost three digits: they are of numbers of order one."""
 
 
-@pytest.mark.slow  # compiles for 3 s; tests/fitting/test_nist.py has certified deviations
-def test_absolute_sigma_against_scipy(scene, measured, model):
-    data = measured(scene, *TRUTH, sigma=True)
+@pytest.mark.parametrize("given", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_errors_against_lmfit(scene, measured, given):
+    """σ given, or from residuals, whose correlation widens errors by its root, and Student's t has them."""
+    data = measured(scene, *TRUTH, sigma=given)
     fit = pl.fit(data, scene)
-    p0 = [fit[name].value for name in ("thickness", "A", "B")]
-    # steps of its own finite differences would cost three digits: give it units of order one
-    best, theirs = curve_fit(
-        lambda nm, d, a, b: model(nm, 100 * d, a, 1e4 * b),
-        data.wavelength,
-        data.values,
-        [p0[0] / 100, p0[1], p0[2] / 1e4],
-        sigma=data.sigma,
-        absolute_sigma=True,
-        xtol=1e-12,
-        ftol=1e-12,
-    )
-    unit = np.array([100, 1, 1e4])
-    names, ours = covariance(fit)
-    take = ordered(names)
-    np.testing.assert_allclose(ours[np.ix_(take, take)], theirs * np.outer(unit, unit), rtol=1e-3)
-    np.testing.assert_allclose(best * unit, p0, rtol=1e-5)
-    assert fit.status == "converged"
-    assert fit.chi2_reduced == pytest.approx(1, abs=0.3)
-
-
-def test_relative_sigma_against_lmfit(scene, measured, model):
-    """σ from the residuals; where correlation counts, errors grow by its root, and Student's t has them."""
-    data = measured(scene, *TRUTH)
-    fit = pl.fit(data, scene)
-    start = lmfit.Parameters()
-    for name, unit in (("thickness", 100), ("A", 1), ("B", 1e4)):
+    model = jax.jit(lambda d, a, b: reflectance(data.wavelength, d, a + b / data.wavelength**2, 3.9 + 0.02j))
+    start, sigma = lmfit.Parameters(), data.sigma if given else 1.0
+    for name, unit in UNITS.items():
         start.add(name, fit[name].value / unit)
     theirs = lmfit.minimize(
-        lambda p: model(data.wavelength, 100 * p["thickness"], p["A"] + 0, 1e4 * p["B"]) - data.values, start
+        lambda p: (np.asarray(model(*(p[x] * unit for x, unit in UNITS.items()))) - data.values) / sigma,
+        start,
+        scale_covar=not given,
     )
-    share = fit.effective_points / len(data)
+    share = 1.0 if given else fit.effective_points / len(data)
     assert share > 0.7  # white noise, as far as 128 points can tell
-    widened = stats.t.isf(0.025, (len(data) - 3) * share) / stats.norm.isf(0.025)
-    for name, unit in (("thickness", 100), ("A", 1), ("B", 1e4)):
+    z = stats.norm.isf(0.025)
+    coverage = z if given else stats.t.isf(0.025, (len(data) - 3) * share)
+    for name, unit in UNITS.items():
+        assert fit[name].value == pytest.approx(theirs.params[name].value * unit, rel=1e-5)
         expected = theirs.params[name].stderr * unit / np.sqrt(share)
         assert fit[name].stderr_noise == pytest.approx(expected, rel=1e-3), name
-        assert fit[name].coverage_factor == pytest.approx(stats.norm.isf(0.025) * widened, rel=1e-3)
+        assert fit[name].coverage_factor == pytest.approx(coverage, rel=1e-3)
     names = list(fit.correlation_names)
     found = fit.correlation[names.index("thickness"), names.index("A")]
     assert found == pytest.approx(theirs.params["thickness"].correl["A"], abs=1e-3)
+    assert fit.status == "converged"
 
 
 def test_a_film_that_is_everywhere_opaque(film, measured):
@@ -145,3 +116,60 @@ def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
     limit = fit["thickness"].lower_limit
     assert rise(limit) == pytest.approx(2.71, abs=0.05)
     assert rise(limit / 2) > 30
+
+
+# residuals that stand for the noise of their points: the sandwich estimator
+X = np.linspace(0.0, 1.0, 40)
+
+
+DESIGN = np.stack([np.ones(40), X, np.exp(-((X - 0.5) ** 2) / 0.05)], axis=1)
+
+
+def _scaled(design):
+    """A Jacobian with rows of priors that say nothing."""
+    return Scaled(np.vstack([design, 1e-9 * np.eye(3)]), np.eye(3), ("a", "b", "c"))
+
+
+def test_one_channel_agrees_with_hc3_written_out():
+    residual = np.random.default_rng(0).standard_normal(40) * (1 + 5 * X)
+    bread = np.linalg.inv(DESIGN.T @ DESIGN)
+    leverage = np.diag(DESIGN @ bread @ DESIGN.T)
+    expected = bread @ DESIGN.T @ np.diag((residual / (1 - leverage)) ** 2) @ DESIGN @ bread
+    influence = (bread @ DESIGN.T) ** 2
+    freedom = influence.sum(axis=1) ** 2 / (influence**2).sum(axis=1)  # Satterthwaite's
+    wider = stats.t.ppf(stats.norm.cdf(1), freedom)
+    found = errors(_scaled(DESIGN), {0: residual[:, None]})
+    np.testing.assert_allclose(found.covariance, expected * np.outer(wider, wider), rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(found.by_curvature, bread, rtol=1e-9, atol=1e-12)
+
+
+def test_correlated_channels_count_together():
+    """The same samples three times over in channels that err alike are no more than once."""
+    residual = np.random.default_rng(0).standard_normal(40)[:, None]
+    once = errors(_scaled(DESIGN), {0: residual})
+    thrice = errors(_scaled(np.repeat(DESIGN, 3, axis=0)), {0: np.repeat(residual, 3, axis=1)})
+    np.testing.assert_allclose(thrice.covariance, once.covariance, rtol=1e-6)
+
+
+def test_z_under_uneven_noise_is_that_of_a_normal_distribution():
+    """2000 data sets whose noise is ten times larger in the peak; with one noise for all, z of c is 1.4."""
+    rng = np.random.default_rng(0)
+    sigma, pinv, z, plain = 0.1 + DESIGN[:, 2], np.linalg.pinv(DESIGN), [], []
+    for _ in range(2000):
+        noise = sigma * rng.standard_normal(40)
+        found = pinv @ noise
+        residual = noise - DESIGN @ found
+        scale = np.sqrt(np.sum(residual**2) / 37)
+        result = errors(_scaled(DESIGN / scale), {0: residual[:, None] / scale})
+        z.append(found / result.stderr)
+        plain.append(found / np.sqrt(np.diag(result.by_curvature)))
+    assert np.sqrt(np.mean(np.square(plain), axis=0))[2] > 1.25
+    np.testing.assert_allclose(np.sqrt(np.mean(np.square(z), axis=0)), 1.0, atol=0.15)
+
+
+def test_only_views_without_a_noise_of_their_own_are_changed():
+    """Rows of a second view keep their weights."""
+    design = np.vstack([DESIGN, 100 * DESIGN])
+    found = errors(_scaled(design), {0: 3 * np.random.default_rng(0).standard_normal((40, 1))})
+    expected = np.linalg.inv(DESIGN.T @ DESIGN) / 10001
+    assert np.diag(found.covariance) == pytest.approx(np.diag(expected), rel=0.01)

@@ -16,6 +16,7 @@ SIGMA = 0.01
 LINE = np.stack([np.ones_like(X), X], axis=1)
 """Slopes of a straight line, (points, 2)."""
 NAMES = ("level", "slope")
+BEND = 0.05 * (2 * X**2 - 1)
 
 
 def evidence(residual, *effects, least=1.0, correlation=lambda rest: 1.0):
@@ -36,15 +37,18 @@ def effect(change, size=1.0, **more):
     return Effect("effect", size, "nm", change[:, None], **more)
 
 
-def noise(seed=0):
-    """Residuals of a best fit: without the line."""
-    rest = np.random.default_rng(seed).normal(0, SIGMA, X.size)
+def without_line(rest):
+    """As the residuals of a best fit are."""
     return rest - np.polyval(np.polyfit(X, rest, 1), X)
+
+
+def noise(seed=0):
+    return without_line(np.random.default_rng(seed).normal(0, SIGMA, X.size))
 
 
 def test_generalised_least_squares_with_the_effect_in_the_covariance():
     change = 0.03 * np.exp(X)
-    residual = noise() + 0.8 * (change - np.polyval(np.polyfit(X, change, 1), X))
+    residual = noise() + 0.8 * without_line(change)
     found, jacobian = problem(residual, effect(change))
     inverse = np.linalg.inv(SIGMA**2 * np.eye(X.size) + np.outer(change, change))
     covariance = np.linalg.inv(jacobian.T @ inverse @ jacobian)
@@ -75,9 +79,8 @@ def test_an_effect_that_nobody_allows_for_moves_the_parameters():
 
 
 def test_an_effect_is_found_at_its_size_and_share():
-    change = 0.05 * (2 * X**2 - 1)
-    structure = change - np.polyval(np.polyfit(X, change, 1), X)
-    found, _ = problem(noise() + 2 * structure, effect(change, size=3.0))
+    structure = without_line(BEND)
+    found, _ = problem(noise() + 2 * structure, effect(BEND, size=3.0))
     [row] = found.contributions
     assert row.alone == pytest.approx(6.0, rel=0.05)
     total = np.sum((noise() + 2 * structure) ** 2)
@@ -87,15 +90,13 @@ def test_an_effect_is_found_at_its_size_and_share():
 
 
 def test_effects_far_beyond_their_sizes_are_implausible():
-    change = 0.05 * (2 * X**2 - 1)
-    found, _ = problem(noise() + 10 * change, effect(change))
+    found, _ = problem(noise() + 10 * BEND, effect(BEND))
     assert found.implausible
 
 
 def test_a_width_cannot_be_negative():
-    change = 0.05 * (2 * X**2 - 1)
     for kind in ({"power": 2}, {"positive": True}):
-        found, _ = problem(noise() - change, effect(change, **kind))
+        found, _ = problem(noise() - BEND, effect(BEND, **kind))
         assert found.contributions[0].amount == 0.0
         assert found.remaining[0].ratio > 2
 
@@ -110,8 +111,7 @@ def test_what_remains_widens_the_error_by_its_size_and_correlation():
     plain, _ = problem(noise())
     assert plain.remaining[0].variance == 1.0  # noise by chance
     wave = 3 * SIGMA * np.sqrt(2) * np.cos(8 * np.pi * X)
-    rest = wave - np.polyval(np.polyfit(X, wave, 1), X)
-    wide, _ = problem(rest, correlation=lambda rest: 7.0)
+    wide, _ = problem(without_line(wave), correlation=lambda rest: 7.0)
     assert wide.remaining[0].variance == pytest.approx(9 * 7, rel=0.05)
     ratio = wide.errors.stderr / plain.errors.stderr
     np.testing.assert_allclose(ratio, np.sqrt(wide.remaining[0].variance), rtol=1e-6)

@@ -13,7 +13,8 @@ NM = np.linspace(400.0, 800.0, 128)
 
 
 def part(model, sweeps) -> Part:
-    mean = mean_spectrum([pl.Spectrum(NM, values, "R") for values in sweeps])
+    spectra = [pl.Spectrum(NM, values, "R") for values in sweeps]
+    mean = mean_spectrum(spectra) if len(spectra) > 1 else spectra[0]
     curve = Curve(NM, mean.values, NM, model, NM, NM, NM, NM)
     rms = float(np.sqrt(np.mean((mean.values - model) ** 2)))
     plan = pl.plan(pl.Scene(pl.Layer(1.46, 100.0), 3.9))
@@ -32,6 +33,7 @@ def test_sums_of_squares_of_all_sweeps():
     assert found.freedom == (126, 256)
     assert found.ratio == pytest.approx(expected)
     assert found.repeatability == pytest.approx(np.sqrt(within / 256))
+    assert lack_of_fit(part(model, sweeps[:1]), 2) is None
 
 
 def test_probability_from_a_table():
@@ -58,17 +60,9 @@ def test_verdicts(error, drift, words):
     assert words in found.verdict
 
 
-def test_one_sweep_has_none():
-    single = pl.Spectrum(NM, np.full(128, 0.3), "R")
-    curve = Curve(*[NM] * 8)
-    plan = pl.plan(pl.Scene(pl.Layer(1.46, 100.0), 3.9))
-    assert lack_of_fit(Part("", single, curve, plan, 0.1, 1.0, 128.0), 1) is None
-
-
 def test_a_fit_reports_it():
     """A fit of sweeps is the fit of their mean, and says how they scatter."""
-    scene = pl.Scene(pl.Layer(1.46, pl.Free(250, 350)), "Si")
-    truth = pl.Scene(pl.Layer(1.46, 300.0), "Si")
+    scene, truth = (pl.Scene(pl.Layer(1.46, d), "Si") for d in (pl.Free(250, 350), 300.0))
     sweeps = [pl.simulate(truth, NM, noise=0.002, seed=seed) for seed in range(3)]
     fit = pl.fit(mean_spectrum(sweeps), scene)
     assert fit.chi2_reduced == pytest.approx(1.0, abs=0.4)  # 127 degrees of freedom: 0.13

@@ -61,17 +61,12 @@ def test_the_best_is_polished_until_it_has_settled(solver):
     assert len(third.calls) == 8  # 3 nm / 3⁸ < 1e-3 nm
 
 
-def test_a_best_that_creeps_is_given_up_unsettled(solver):
-    creeping = solver(0.9)
-    result = minima(problem(), unit(20.0))
-    assert not result.converged[0]  # 680 nm · 0.9⁵¹ = 3.2 nm
-    assert len(creeping.calls) == 1 + 50
-
-
-def test_a_best_that_does_not_improve_is_given_up_at_once(solver):
-    stuck = solver(1.0)
+@pytest.mark.parametrize(("left", "calls"), [(0.9, 1 + 50), (1.0, 2)])
+def test_a_best_that_creeps_is_given_up_and_one_that_is_stuck_at_once(solver, left, calls):
+    """680 nm · 0.9⁵¹ = 3.2 nm."""
+    creeping = solver(left)
     assert not minima(problem(), unit(20.0)).converged[0]
-    assert len(stuck.calls) == 2
+    assert len(creeping.calls) == calls
 
 
 def test_only_as_many_as_are_followed_are_polished_again(solver):
@@ -86,11 +81,9 @@ def test_only_as_many_as_are_followed_are_polished_again(solver):
     minima(problem(), unit(703.0), followed=0)
     assert len(third.calls) == calls + 1
 
-
-def test_a_best_that_has_settled_is_not_polished_again(solver):
-    third = solver(1 / 3)
-    minima(problem(), unit(700.001), followed=1)
-    assert len(third.calls) == 1
+    # a best that has settled is not polished again
+    assert minima(problem(), unit(700.001), followed=1).converged[0]
+    assert len(third.calls) == calls + 2
 
 
 def test_starts_go_in_calls_of_one_size_and_come_back_in_their_order(solver, monkeypatch):

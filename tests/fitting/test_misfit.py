@@ -14,61 +14,39 @@ ONE = Effect("index", 0.005, "", np.zeros((1, 1)), material=True)
 NOTHING = np.zeros(1)
 
 
-def found(explains=0.0, alone=0.0, implausible=False):
-    row = Contribution(ONE, NOTHING, 0.0, explains, alone, NOTHING)
-    return Discrepancy(Errors(("d",), np.eye(1)), NOTHING, (), (row,), implausible, (1.0,), 1.0)
+def row(explains=0.0, alone=0.0, effect=ONE):
+    return Contribution(effect, NOTHING, 0.0, explains, alone, NOTHING)
+
+
+SCALE = row(0.85, 0.012, Effect("scale", 0.01, "", np.zeros((1, 1))))
+SLIT = row(0.9, 10.0, dataclasses.replace(ONE, material=False))
+FILM = Accuracy(0.02, 1.0)
+LAMP = Accuracy(weighted=0.6)
 
 
 @pytest.mark.parametrize(
-    ("ratio", "typical", "span", "expected"),
+    ("rows", "remaining", "accuracy", "expected"),
     [
-        (2.4, 0.1, 1.0, False),  # noise
-        (40.0, 0.01, 1.0, False),  # structured, but small: below 1.5 % of the range
-        (2.6, 0.016, 1.0, True),
-        (2.6, 0.016, 2.0, False),
-        (2.6, 0.021, 2.0, True),  # larger than any instrument makes
-        (2.6, 0.021, math.inf, True),
+        ([row()], (2.4, 0.1, 1.0), FILM, False),  # noise
+        ([row()], (40.0, 0.01, 1.0), FILM, False),  # structured, but small: below 1.5 % of the range
+        ([row()], (2.6, 0.016, 1.0), FILM, True),
+        ([row()], (2.6, 0.016, 1.0), Accuracy(0.02, 2.0), False),
+        ([row()], (2.6, 0.021, 1.0), Accuracy(0.02, 2.0), True),  # larger than any instrument makes
+        ([row()], (2.6, 0.021, 1.0), Accuracy(0.02, math.inf), True),
+        # an index 25 % lower explains what usual effects do not
+        ([row(0.9, -0.25)], (2.0, 1e-4, 1.0), FILM, True),
+        ([row(0.5, -0.25)], (2.0, 1e-4, 1.0), FILM, False),
+        ([row(0.9, -0.02)], (2.0, 1e-4, 1.0), FILM, False),  # four of its standard uncertainties
+        ([row(0.9, -0.25)], (1.4, 1e-4, 1.0), FILM, False),
+        ([row(0.9, -0.25), SCALE], (2.0, 1e-4, 1.0), FILM, False),  # a scale explains as much
+        ([SLIT], (2.0, 1e-4, 1.0), FILM, False),  # of any size, but no wrong material
+        # a drifting lamp is judged by the error that it is allowed
+        ([row()], (20.0, 1.0, 0.5), LAMP, False),
+        ([row()], (20.0, 1.0, 0.7), LAMP, True),
     ],
 )
-def test_what_is_left(ratio, typical, span, expected):
-    assert bool(misfit(found(), Remaining(ratio, typical, 1.0, 1.0), Accuracy(0.02, span))) is expected
-
-
-def test_implausible_effects():
-    small = Remaining(1.0, 1e-4, 1.0, 1.0)
-    assert misfit(found(implausible=True), small, Accuracy(0.02, 1.0))
-    assert not misfit(found(), small, Accuracy(0.02, 1.0))
-
-
-@pytest.mark.parametrize(
-    ("explains", "alone", "ratio", "expected"),
-    [
-        (0.9, -0.25, 2.0, True),  # an index 25 % lower explains what usual effects do not
-        (0.5, -0.25, 2.0, False),
-        (0.9, -0.02, 2.0, False),  # four of its standard uncertainties
-        (0.9, -0.25, 1.4, False),
-    ],
-)
-def test_an_effect_beyond_its_size(explains, alone, ratio, expected):
-    assert (
-        bool(misfit(found(explains, alone), Remaining(ratio, 1e-4, 1.0, 1.0), Accuracy(0.02, 1.0)))
-        is expected
-    )
-
-
-def test_a_scale_that_explains_as_much_is_no_wrong_material():
-    scale = Contribution(Effect("scale", 0.01, "", np.zeros((1, 1))), NOTHING, 0.0, 0.85, 0.012, NOTHING)
-    index = found(0.9, -0.25)
-    both = dataclasses.replace(index, contributions=(*index.contributions, scale))
-    assert not misfit(both, Remaining(2.0, 1e-4, 1.0, 1.0), Accuracy(0.02, 1.0))
-
-
-def test_a_slit_of_any_size_is_no_wrong_material():
-    slit = Contribution(dataclasses.replace(ONE, material=False), NOTHING, 0.0, 0.9, 10.0, NOTHING)
-    other = dataclasses.replace(found(), contributions=(slit,))
-    assert not misfit(other, Remaining(2.0, 1e-4, 1.0, 1.0), Accuracy(0.02, 1.0))
-
-
-@pytest.mark.parametrize(("weighted", "expected"), [(0.5, False), (0.7, True)])
-def test_a_drifting_lamp_is_judged_by_the_error_that_it_is_allowed(weighted, expected):
-    assert bool(misfit(found(), Remaining(20.0, 1.0, weighted, 1.0), Accuracy(weighted=0.6))) is expected
+def test_what_is_a_misfit(rows, remaining, accuracy, expected):
+    errors, left = Errors(("d",), np.eye(1)), Remaining(*remaining, 1.0)
+    found = Discrepancy(errors, NOTHING, (), tuple(rows), False, (1.0,), 1.0)
+    assert bool(misfit(found, left, accuracy)) is expected
+    assert misfit(dataclasses.replace(found, implausible=True), left, accuracy)

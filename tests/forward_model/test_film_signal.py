@@ -59,15 +59,9 @@ def test_a_model_is_the_front_door(name):
     """The same film through `pl.reflectance` and `pl.transmittance`."""
     thing = SCENES[name]
     function = pl.reflectance if thing.light.signal == "R" else pl.transmittance
-    direct = function(
-        WAVELENGTH,
-        thing.layers[0].thickness,
-        thing.layers[0].material,
-        thing.substrate.material,
-        ambient=thing.ambient,
-        angle=thing.light.angle,
-        polarisation=thing.light.polarisation,
-    )
+    film = thing.layers[0].thickness, thing.layers[0].material, thing.substrate.material
+    light = {"angle": thing.light.angle, "polarisation": thing.light.polarisation}
+    direct = function(WAVELENGTH, *film, ambient=thing.ambient, **light)
     np.testing.assert_allclose(predict(thing), direct, rtol=1e-12, atol=1e-15)
 
 
@@ -135,6 +129,3 @@ def test_an_absent_effect_leaves_no_trace(name):
 def test_k_fixed_at_zero_costs_what_no_k_costs():
     plain, fixed = scene(angle=30.0), scene(Constant(1.46, 0.0), angle=30.0)
     assert primitives(fixed) <= primitives(plain) + 2  # the constant itself
-
-
-# the back face

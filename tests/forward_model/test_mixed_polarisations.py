@@ -6,39 +6,19 @@ import jax
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from scipy.spatial.transform import Rotation
 
 import pellicle as pl
 from pellicle.forward_model.film_signal import build
 from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import insert, start_values
 
+from ..optics.lens_reference import TO_STOKES, berreman, permittivity
+
 NM = np.array([450.0, 600.0, 800.0])
 ANGLE = 65.0
 GLASS, K, MM = 1.52, 4e-6, 0.01
 ORDINARY, EXTRAORDINARY, DEPTH = 1.62, 1.78 + 0.03j, 180.0
 TILT, AZIMUTH = 40.0, 25.0
-TO_STOKES = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
-"""From the coherency vector (p p*, p s*, s p*, s s*); S₃ is 2 Im p s*."""
-
-
-def permittivity(no: complex, ne: complex, theta: float, phi: float) -> np.ndarray:
-    theta, phi = np.deg2rad([theta, phi])
-    c = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
-    return no**2 * np.eye(3) + (ne**2 - no**2) * np.outer(c, c)
-
-
-def euler(indices: tuple[complex, ...], theta: float, phi: float, psi: float) -> np.ndarray:
-    rotation = Rotation.from_euler("ZYZ", [phi, theta, psi], degrees=True).as_matrix()
-    return rotation @ np.diag(np.square(indices)) @ rotation.T
-
-
-def berreman(e: np.ndarray, a: float) -> np.ndarray:
-    """Δ of the fields (Ex, Hy, Ey, −Hx), by elimination of Ez."""
-    z = np.array([-e[2, 0], -a, -e[2, 1], 0]) / e[2, 2]
-    unit = np.eye(4)
-    displacement = [e[i, 0] * unit[0] + e[i, 1] * unit[2] + e[i, 2] * z for i in range(2)]
-    return np.array([unit[1] + a * z, displacement[0], unit[3], displacement[1] - a * a * unit[2]])
 
 
 def waves(n: complex, a: float) -> np.ndarray:
@@ -83,7 +63,7 @@ def averaged(nm: float, front: list[Any], back: list[Any], foot: complex, k: flo
     return list(np.mean(found, axis=0))
 
 
-FRONT = [(permittivity(ORDINARY, EXTRAORDINARY, TILT, AZIMUTH), DEPTH)]
+FRONT = [(permittivity((ORDINARY, EXTRAORDINARY), TILT, AZIMUTH), DEPTH)]
 TILTED = pl.Anisotropic(ORDINARY, EXTRAORDINARY, axis=(TILT, AZIMUTH))
 PLATE = pl.Substrate(pl.dispersion.Constant(GLASS, K), back=1.0, plate_mm=MM)
 
@@ -135,7 +115,7 @@ def test_films_on_both_faces(signal):
     turned = pl.Anisotropic(x=x, y=y, z=z, axis=(30.0, 60.0, 20.0))
     layers = [pl.Layer(TILTED, DEPTH), pl.Layer(1.46, 95.0), pl.Plate(pl.dispersion.Constant(GLASS, K), MM)]
     found = simulated(pl.Scene([*layers, pl.Layer(turned, 70.0)], 3.9 + 0.02j, light=light(signal)))
-    front, back = [*FRONT, (np.eye(3) * 1.46**2, 95.0)], [(euler((x, y, z), 30.0, 60.0, 20.0), 70.0)]
+    front, back = [*FRONT, (np.eye(3) * 1.46**2, 95.0)], [(permittivity((x, y, z), 30.0, 60.0, 20.0), 70.0)]
     exact = expected(signal, [averaged(nm, front, back, 3.9 + 0.02j) for nm in NM])
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
 
@@ -153,7 +133,7 @@ def test_slope_is_that_of_differences():
 
     def signal(x: np.ndarray) -> np.ndarray:
         n, k, theta, phi, depth = x
-        front = [(permittivity(ORDINARY, n + 1j * k, theta, phi), depth)]
+        front = [(permittivity((ORDINARY, n + 1j * k), theta, phi), depth)]
         return expected("mueller", [averaged(nm, front, [], 1.0) for nm in NM])
 
     for i, step in enumerate(np.diag([1e-4, 1e-4, 1e-2, 1e-2, 1e-2])):
@@ -170,7 +150,7 @@ def test_aligned_absorbing_film_on_a_plate(theta):
     """Ψ and Δ contain the phase between s and p of the light that crossed the film."""
     film = pl.Anisotropic(ORDINARY, EXTRAORDINARY, axis=(theta, 0))
     found = simulated(pl.Scene(pl.Layer(film, DEPTH), PLATE, light=light("psi-delta")))
-    front = [(permittivity(ORDINARY, EXTRAORDINARY, theta, 0.0), DEPTH)]
+    front = [(permittivity((ORDINARY, EXTRAORDINARY), theta, 0.0), DEPTH)]
     exact = expected("psi-delta", [averaged(nm, front, [], 1.0) for nm in NM])
     np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
 

@@ -1,38 +1,30 @@
-"""Stacks in full: plates anywhere, uneven layers, rough and graded interfaces, against independent codes."""
+"""Stacks in full, against independent codes: plates, uneven layers, interfaces, windows of instruments."""
 
 import math
 
 import jax
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.dispersion.empirical import Cauchy
 from pellicle.fitting.film.parameters import parameters
-from pellicle.forward_model.film_signal import build
+from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.scene.free import insert
 from pellicle.scene.layers import medium
 
-from ..films import WAVELENGTH, predict, scene
-
-NODES = np.linspace(-8.0, 8.0, 161)
-WEIGHTS = np.exp(-0.5 * NODES**2) / np.sum(np.exp(-0.5 * NODES**2))
-
+from ..by_tmm import films
+from ..differences import derivative, jacobian
+from ..films import NODES, WAVELENGTH, WEIGHTS, predict, scene
 
 reflected_at = jax.jit(pl.reflectance, static_argnames="polarisation")
 
 
 # plates anywhere
 
-SANDWICH = [
-    pl.Layer(2.1 + 0.01j, 80.0),
-    pl.Plate(1.52 + 1e-7j, 2.0),
-    pl.Layer(1.38, 120.0),
-    pl.Layer(2.3, 60.0),
-]
-COHERENCE = ["i", "c", "i", "c", "c", "i"]
+BELOW = [pl.Layer(1.38, 120.0), pl.Layer(2.3, 60.0)]
+SANDWICH = [pl.Layer(2.1 + 0.01j, 80.0), pl.Plate(1.52 + 1e-7j, 2.0), *BELOW]
 
 
 @pytest.mark.slow
@@ -40,11 +32,8 @@ COHERENCE = ["i", "c", "i", "c", "c", "i"]
 @pytest.mark.parametrize(("angle", "polarisation"), [(0.0, "s"), (50.0, "s"), (50.0, "p")])
 def test_layers_on_both_faces_of_a_plate(signal, angle, polarisation):
     thing = scene(SANDWICH, 1.33, signal=signal, angle=angle, polarisation=polarisation)
-    indices, depths = [1, 2.1 + 0.01j, 1.52 + 1e-7j, 1.38, 2.3, 1.33], [np.inf, 80, 2e6, 120, 60, np.inf]
-    truth = [
-        tmm.inc_tmm(polarisation, indices, depths, COHERENCE, np.deg2rad(angle), w)[signal]
-        for w in WAVELENGTH
-    ]
+    indices, depths = [1, 2.1 + 0.01j, 1.52 + 1e-7j, 1.38, 2.3, 1.33], [80, 2e6, 120, 60]
+    truth = films(polarisation, WAVELENGTH, indices, depths, angle, signal, "icicci")
     # what tmm takes as the coherent part's transmittance both ways differs by k/n of the plate
     np.testing.assert_allclose(predict(thing), truth, atol=1e-9)
 
@@ -104,9 +93,8 @@ def test_small_roughness_is_a_graded_interface():
     z = (np.arange(200) + 0.5) / 200 * 48.0 - 24.0
     share = np.array([0.5 * (1 + math.erf(x / sigma / math.sqrt(2))) for x in z])
     slices = list(np.sqrt(1 + share * (1.5**2 - 1)))
-    truth = [tmm.coh_tmm("s", [1, *slices, 1.5], [np.inf, *[0.24] * 200, np.inf], 0, x)["R"] for x in w]
     rough = predict(scene(pl.Layer(1.5, 0.0, roughness=sigma), 1.5))
-    loss = 0.04 - np.array(truth)
+    loss = 0.04 - films("s", w, [1, *slices, 1.5], [0.24] * 200)
     np.testing.assert_allclose(0.04 - rough, loss, rtol=0.03)  # the second order is left out
     passed = predict(scene(pl.Layer(1.5, 0.0, roughness=sigma), 1.5, signal="T"))
     # R + T is 1 but for the square of what the roughness takes away
@@ -135,8 +123,7 @@ def test_a_graded_interface_converges():
 
     share = (np.arange(400) + 0.5) / 400
     slices = list(np.sqrt(1 + share * (2.1**2 - 1)))
-    depths = [np.inf, *[0.5] * 400, np.inf]
-    truth = [tmm.coh_tmm("s", [1, *slices, 2.1], depths, 0, w)["R"] for w in WAVELENGTH]
+    truth = films("s", WAVELENGTH, [1, *slices, 2.1], [0.5] * 400)
     assert np.max(np.abs(reflected(40) - truth)) < 2e-4
     assert np.max(np.abs(reflected(40) - truth)) < 0.2 * np.max(np.abs(reflected(8) - truth))
 
@@ -163,8 +150,7 @@ def test_a_free_cone_has_a_finite_slope_at_zero(angle):
     predict = jax.jit(lambda x: model(insert(thing, [x])))
     slope = jax.jacfwd(predict)
     assert np.max(np.abs(slope(0.0))) < 1e-10  # even in the half angle
-    numeric = (predict(6.001) - predict(5.999)) / 2e-3
-    np.testing.assert_allclose(slope(6.0), numeric, rtol=1e-5, atol=1e-9)
+    np.testing.assert_allclose(slope(6.0), derivative(predict, 6.0, 1e-3), rtol=1e-5, atol=1e-9)
 
 
 REFUSED = [
@@ -187,3 +173,67 @@ REFUSED = [
 def test_what_makes_no_sense_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+PLATE = pl.Substrate(1.52, back=1.0)
+
+
+@pytest.mark.parametrize("which", ["bandwidth", "thickness_spread"])
+def test_a_free_window_has_a_finite_slope_at_zero(which):
+    thing = scene(thickness=2000.0, instrument=pl.Instrument(**{which: pl.Free(0, 9, start=0.0)}))
+    model = build(pl.plan(thing))
+
+    @jax.jit
+    def predict(values):
+        return model(insert(thing, values))
+
+    slope, curve = jax.jacfwd(predict)(np.zeros(1)), jax.jacfwd(jax.jacfwd(predict))(np.zeros(1))
+    np.testing.assert_array_equal(slope, 0)  # even in the width
+    assert np.all(np.isfinite(curve))
+    assert np.max(np.abs(curve)) > 1e-4
+    at = np.array([2.0])
+    numeric = jacobian(predict, at, 1e-3)
+    np.testing.assert_allclose(jax.jacfwd(predict)(at), numeric, rtol=1e-4, atol=1e-8)
+
+
+@pytest.mark.parametrize("layer", [1.46, 2.1 + 0.002j], ids=["transparent", "absorbing"])
+@pytest.mark.parametrize("signal", "RT")
+def test_uneven_thickness_is_an_average_over_thickness(layer, signal):
+    """By orders where the layer is transparent; else by nodes, which know how its damping varies."""
+    blurred = predict(scene(layer, angle=30.0, signal=signal, instrument=pl.Instrument(thickness_spread=8.0)))
+    function = pl.reflectance if signal == "R" else pl.transmittance
+    each = function(WAVELENGTH, 300.0 + 8.0 * NODES[:, None], layer, 3.9 + 0.02j, angle=30.0)
+    np.testing.assert_allclose(blurred, WEIGHTS @ each, atol=3e-6)
+
+
+def test_bandwidth_is_an_average_over_wavelength():
+    """With the dispersion of the layer in it, from a catalogue's formula sampled before."""
+    layer, sigma = pl.dispersion.Cauchy(2.1, 8e4), 4.0 / 2.3548200450309493
+    thing = scene(layer, 1.52, thickness=2000.0, instrument=pl.Instrument(bandwidth=4.0))
+    spread = pl.reflectance(WAVELENGTH + sigma * NODES[:, None], 2000.0, layer, 1.52)
+    for model_of in (thing, tabulated(thing)):
+        assert np.max(np.abs(predict(model_of) - WEIGHTS @ spread)) < 1e-3
+    assert np.max(np.abs(predict(tabulated(thing, slope=False)) - WEIGHTS @ spread)) > 2e-3
+
+
+def test_a_window_under_a_plate():
+    """Both faces: the front one, seen from either side, goes through the window."""
+    thing = scene(2.1, PLATE, thickness=800.0, instrument=pl.Instrument(thickness_spread=400.0))
+    average = predict(thing)  # so uneven that only the mean is left
+    reflected = predict(scene(2.1, 1.52, thickness=800.0, instrument=pl.Instrument(thickness_spread=400.0)))
+    r = (0.52 / 2.52) ** 2
+    truth = reflected + (1 - reflected) ** 2 * r / (1 - reflected * r)
+    np.testing.assert_allclose(average, truth, rtol=1e-6)
+
+
+@pytest.mark.parametrize("layer", [1.46, 2.1 + 2e-5j], ids=["transparent", "absorbing"])
+@pytest.mark.parametrize("signal", "RT")
+def test_fringes_narrower_than_the_sampling_are_averaged(layer, signal):
+    """A quarter of a millimetre, as in figure 5 of the thin conductors paper: the mean over some fringes."""
+    thing = scene(layer, thickness=2.5e5, angle=30.0, signal=signal)
+    assert "narrower than the sampling" in pl.plan(thing).row("coherence").why
+    function = pl.reflectance if signal == "R" else pl.transmittance
+    cosine_index = np.sqrt(np.real(layer) ** 2 - np.sin(np.deg2rad(30.0)) ** 2)
+    fringes = WAVELENGTH / (2 * cosine_index) * NODES[:, None]
+    each = function(WAVELENGTH, 2.5e5 + fringes, layer, 3.9 + 0.02j, angle=30.0)
+    np.testing.assert_allclose(predict(thing), WEIGHTS @ each, rtol=2e-6)

@@ -10,9 +10,8 @@ import json
 from pathlib import Path
 
 from mpmath import mp, mpc, mpf
+from stack_truth import differences
 
-mp.dps = 160
-STEP = mpf(10) ** -40
 NUDGE = mpf(10) ** -50
 
 PARAMETERS = (
@@ -177,12 +176,7 @@ def row(given):
     p = [mpf(x) for x in given["at"]]
     out = {"at": given["at"], "smooth": given["smooth"], "value": [float(x) for x in outputs(p)]}
     if given["smooth"]:
-        out["slope"] = []
-        for i in range(len(p)):
-            up, down = list(p), list(p)
-            up[i], down[i] = p[i] + STEP, p[i] - STEP
-            pairs = zip(outputs(up), outputs(down), strict=True)
-            out["slope"].append([float((x - y) / (2 * STEP)) for x, y in pairs])
+        out["slope"] = [[float(x) for x in column] for column in differences(outputs, p)]
     return out
 
 

@@ -10,7 +10,6 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from make_table import CASES
 from mpmath import mp, mpc, mpf
 from stack_truth import agree, by_matrix, by_recursion, conditions, differences, unpack
 
@@ -82,13 +81,57 @@ STACKS = {
         substrate=0.999 + 1e-4j,
     ),
 }
-# the cases of table.json, one layer each, at float32's nearest numbers; k = 1e-300 is 0 there
-FILMS = {}
-for _name, _case in CASES.items():
-    d, n, k, n2, k2, n0, angle, wavelength = _case["at"]
-    film = ((d, complex(n, k)),)
-    light = {"substrate": complex(n2, k2), "ambient": n0, "angle": angle, "wavelength": wavelength}
-    FILMS[_name] = case(*film, **light, smooth=_case["smooth"], dark=_name == "film matched to both")
+
+
+def film(thickness=137.0, layer=1.46, **more):
+    """A row of one layer."""
+    return case((thickness, layer), **more)
+
+
+FILMS = {
+    "ordinary, absorbing film": film(layer=2.1 + 0.3j),
+    "ordinary, transparent": film(substrate=1.52),
+    "ordinary, normal incidence": film(angle=0.0),
+    "zero thickness": film(thickness=0.0, layer=2.1 + 0.3j),
+    "zero thickness, transparent": film(thickness=0.0),
+    "thickness 1e-6 nm": film(thickness=1e-6, layer=2.1 + 0.3j),
+    "thickness 3 nm of metal": film(thickness=3.0, layer=0.05 + 4j),
+    "thickness 10 nm, weakly absorbing": film(thickness=10.0, layer=1.3 + 0.4j),
+    "1 mm of k = 3": film(thickness=1e6, layer=2.9 + 3j),
+    "1 mm transparent": film(thickness=1e6),
+    "k = -0.0": film(layer=complex(1.46, -0.0)),
+    "k = 1e-12": film(layer=1.46 + 1e-12j),
+    "k = 1e-300": film(layer=1.46 + 1e-300j),
+    "k = 1e-300, substrate too": film(layer=1.46 + 1e-300j, substrate=1.52 + 1e-300j),
+    "89.999 degrees": film(layer=2.1 + 0.3j, angle=89.999),
+    "89.999 degrees, transparent": film(substrate=1.52, angle=89.999),
+    "exactly 90 degrees": film(layer=2.1 + 0.3j, angle=90.0),
+    "exactly 90 degrees, transparent": film(substrate=1.52, angle=90.0),
+    "film exactly critical": film(ambient=1.5, angle=30.0, layer=0.75, substrate=1.52),
+    "film exactly critical, thick": film(
+        ambient=1.5, angle=30.0, layer=0.75, substrate=1.52, thickness=2000.0
+    ),
+    "film nearly critical": film(ambient=1.5, angle=30.0, layer=0.7500001, substrate=1.52),
+    "substrate exactly critical": film(ambient=1.5, angle=30.0, layer=1.46, substrate=0.75, smooth=False),
+    "total reflection, 20 nm gap": film(ambient=1.52, layer=1.0, substrate=1.52, thickness=20.0),
+    "total reflection, 200 nm gap": film(ambient=1.52, layer=1.0, substrate=1.52, thickness=200.0),
+    "total reflection, 20 µm gap": film(ambient=1.52, layer=1.0, substrate=1.52, thickness=2e4),
+    "total reflection in the substrate": film(ambient=1.52, layer=2.1, substrate=1.0),
+    "total reflection under an absorbing film": film(ambient=1.52, layer=2.1 + 0.05j, substrate=1.0),
+    "Kretschmann plasmon": film(
+        ambient=1.515, layer=0.135 + 4.0j, substrate=1.0, thickness=48.0, angle=43.2, wavelength=633.0
+    ),
+    "film matched to the ambient": film(layer=1.0, substrate=1.52),
+    "film matched to the substrate": film(layer=1.52, substrate=1.52),
+    "film matched to both": film(layer=1.0, substrate=1.0, dark=True),
+    "film matched to an absorbing substrate": film(layer=2.1 + 0.3j, substrate=2.1 + 0.3j),
+    "n = 0.05 + 4i": film(layer=0.05 + 4j, thickness=40.0),
+    "absorbing substrate": film(substrate=2 + 0.1j),
+    "metal substrate": film(substrate=0.2 + 3.4j, thickness=100.0, angle=60.0),
+    "ambient denser than the film": film(ambient=1.52, layer=1.33, substrate=1.7, angle=40.0),
+    "wavelength 1e7 nm": film(layer=2.1 + 0.3j, wavelength=1e7),
+    "wavelength 1 nm": film(layer=1.0 - 1e-3 + 1e-4j, substrate=0.999 + 1e-4j, wavelength=1.0, angle=20.0),
+}
 
 
 def signals(formula, p, dark, near=None):

@@ -1,7 +1,5 @@
 """R, T and their slopes for media with principal axes along the laboratory's, against 50 digits."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import mpmath as mp
@@ -55,7 +53,7 @@ def truth(numbers: list[mp.mpf]) -> list[mp.mpf]:
 
 
 @jax.jit
-@partial(jax.vmap)
+@jax.vmap
 def values_and_slopes(numbers):
     def powers(numbers):
         phase, angle, *parts = numbers
@@ -88,8 +86,7 @@ def test_value_and_slope_in_every_number(name, computed):
         exact = [mp.mpf(x) for x in numbers]
         np.testing.assert_allclose(values, [float(x) for x in truth(exact)], rtol=2e-12, atol=1e-15)
         for i in range(len(exact)):
-            one = [x + step if j == i else x for j, x in enumerate(exact)]
-            other = [x - step if j == i else x for j, x in enumerate(exact)]
+            one, other = ([x + way * step * (j == i) for j, x in enumerate(exact)] for way in (1, -1))
             slope = [float((u - v) / (2 * step)) for u, v in zip(truth(one), truth(other), strict=True)]
             if name == "p at its critical angle" and i == 1:  # the numbers round to either side of 0.5
                 continue

@@ -16,16 +16,11 @@ NOISE = 0.4
 
 def series(value, time, *, stderr=None, noise: Any = NOISE, units: str | None = "s", dims=("time", "site")):
     """A map of these thicknesses (times, ...), all converged."""
-    shape = value.shape
-    return xr.Dataset(
-        {
-            "status": (dims, np.full(shape, CODES["converged"], np.uint8)),
-            "thickness": (dims, value, {"units": "nm"}),
-            "thickness_stderr": (dims, np.broadcast_to(noise if stderr is None else stderr, shape).copy()),
-            "thickness_stderr_noise": (dims, np.broadcast_to(noise, shape).copy()),
-        },
-        coords={"time": ("time", time, {"units": units} if units else {})},
-    )
+    errors = {"": noise if stderr is None else stderr, "_noise": noise}
+    variables = {"status": (dims, np.full(value.shape, CODES["converged"], np.uint8))}
+    variables |= {"thickness": (dims, value, {"units": "nm"})}
+    variables |= {f"thickness_stderr{x}": (dims, 0.0 * value + error) for x, error in errors.items()}
+    return xr.Dataset(variables, coords={"time": ("time", time, {"units": units} if units else {})})
 
 
 def noisy(truth, seed=0):
@@ -104,36 +99,32 @@ def test_rates_in_a_window_follow_the_truth():
     assert np.std(pull) == pytest.approx(1.0, abs=0.15)
 
 
-def test_a_series_of_one_spectrum():
-    made = growth(series(100 + 3.0 * np.arange(5.0), np.arange(5.0), dims=("time",)))
-    assert made["thickness_rate"].dims == ()
-    assert made["thickness_rate"].item() == pytest.approx(3.0)
-
-
 def test_units_of_time():
-    minutes = np.arange(5.0)
-    value = (100 + 3.0 * minutes)[:, None]
+    """Of a series of one spectrum."""
+    minutes, value = np.arange(5.0), 100 + 3.0 * np.arange(5.0)
     dates = np.datetime64("2024-05-01T12:00", "ns") + (60e9 * minutes).astype("timedelta64[ns]")
-    for time, units in ((dates, None), (dates - dates[0], None), (60 * minutes, "s"), (minutes, "minutes")):
-        made = growth(series(value, time, units=units))
-        assert made["thickness_rate"].attrs["units"] == "nm/min"
-        assert made["thickness_rate"].item() == pytest.approx(3.0)
-    assert growth(series(value, dates, units=None), unit="s")["thickness_rate"].item() == pytest.approx(0.05)
-    cycles = growth(series(value, minutes, units="cycles"))
-    assert cycles["thickness_rate"].attrs["units"] == "nm/cycles"
+    for time, units, asked, rate, unit in (
+        (dates, None, {}, 3.0, "nm/min"),
+        (dates - dates[0], None, {}, 3.0, "nm/min"),
+        (60 * minutes, "s", {}, 3.0, "nm/min"),
+        (minutes, "minutes", {}, 3.0, "nm/min"),
+        (minutes, "cycles", {}, 3.0, "nm/cycles"),
+        (dates, None, {"unit": "s"}, 0.05, "nm/s"),
+    ):
+        made = growth(series(value, time, units=units, dims=("time",)), **asked)["thickness_rate"]
+        assert (made.dims, made.attrs["units"]) == ((), unit)
+        assert made.item() == pytest.approx(rate)
 
 
 def test_maps_that_have_no_rates_are_refused():
-    time = np.arange(4.0)
-    value = np.ones((4, 1))
-    for dataset, words in (
-        (series(value, time).isel(time=slice(2)), "three times"),
-        (series(value, time).isel(time=0), "axis `time`"),
-        (series(value, time, units=None), "without a unit"),
-        (series(value, np.zeros(4)), "different times"),
-        (series(value, time).drop_vars("thickness_stderr_noise"), "standard error"),
+    time, value = np.arange(4.0), np.ones((4, 1))
+    for dataset, words, options in (
+        (series(value, time).isel(time=slice(2)), "three times", {}),
+        (series(value, time).isel(time=0), "axis `time`", {}),
+        (series(value, time, units=None), "without a unit", {}),
+        (series(value, np.zeros(4)), "different times", {}),
+        (series(value, time).drop_vars("thickness_stderr_noise"), "standard error", {}),
+        (series(value, time), "window", {"window": 2}),
     ):
         with pytest.raises(UsageError, match=words):
-            growth(dataset)
-    with pytest.raises(UsageError, match="window"):
-        growth(series(value, time), window=2)
+            growth(dataset, **options)

@@ -123,19 +123,17 @@ def test_a_cube_is_divided_as_it_is_read():
 
 
 def test_lamp_curves_that_cannot_be_had_are_refused(wedge):
-    cube = lit(wedge)
-    for region, words in (("15,0,10,3", "leaves the image"), ("0,0,4,4;1,1,2,2", "one rectangle")):
-        with pytest.raises(UsageError, match=words):
-            lamp_curve(cube, SCENE, region)
-    with pytest.raises(UsageError, match="known"):
-        lamp_curve(cube, SCENE, "0,0,4,4", reference=SCENE)
-    with pytest.raises(DataError, match="fewer than four"):
-        lamp_curve(cube, SCENE, "0,0,1,2")
-    ellipsometry = Cube(
-        {"values": np.ones((2, 2, 60)), "delta": np.ones((2, 2, 60))}, WAVELENGTH, "psi-delta"
-    )
-    with pytest.raises(UsageError, match="ellipsometry"):
-        lamp_curve(ellipsometry, SCENE)
-    cube.arrays["values"][:, 1:] = np.nan
-    with pytest.raises(DataError, match="too few"):
-        lamp_curve(cube, SCENE)
+    cube, ones = lit(wedge), np.ones((2, 2, 60))
+    dark = lit(wedge)
+    dark.arrays["values"][:, 1:] = np.nan
+    angles = Cube({"values": ones, "delta": ones}, WAVELENGTH, "psi-delta")
+    for the_cube, region, options, error, words in (
+        (cube, "15,0,10,3", {}, UsageError, "leaves the image"),
+        (cube, "0,0,4,4;1,1,2,2", {}, UsageError, "one rectangle"),
+        (cube, "0,0,4,4", {"reference": SCENE}, UsageError, "known"),
+        (cube, "0,0,1,2", {}, DataError, "fewer than four"),
+        (angles, None, {}, UsageError, "ellipsometry"),
+        (dark, None, {}, DataError, "too few"),
+    ):
+        with pytest.raises(error, match=words):
+            lamp_curve(the_cube, SCENE, region, **options)

@@ -1,4 +1,6 @@
-"""Minima of pixels against `pellicle.fit`, pixel by pixel."""
+"""Pixels of cubes beside `pellicle.fit` of each: minima, errors and status."""
+
+from typing import Any
 
 import jax
 import numpy as np
@@ -7,76 +9,152 @@ import pytest
 import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError
+from pellicle.fitting.film.extended_scene import Number, Program
+from pellicle.fitting.film.systematic_effects import SimulatedEffect
 from pellicle.mapping.pixels.data import pixel_data
+from pellicle.mapping.pixels.effects import _simulation
 from pellicle.mapping.pixels.fit import fit_pixels, prepare, spectrum
-from pellicle.mapping.pixels.results import CODES
+from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.mapping.pixels.search import minima
-from pellicle.scene.priors import Normal
 
-NM, SIGMA = np.linspace(420.0, 780.0, 48), 0.002
-FREE = pl.Free(20, 900)
-ALL = (slice(None), slice(None))
-
-
-def cube_of(thickness, index=1.46, scale=1.0, offset=0.0, **arrays) -> Cube:
-    """A row of pixels of a layer on a substrate of index 3.9, with noise."""
-    clean = np.stack([np.asarray(pl.reflectance(NM, d, index, 3.9)) for d in thickness])
-    noise = np.random.default_rng(0).normal(0, SIGMA, clean.shape)
-    values = np.reshape(scale, (-1, 1)) * clean + offset + noise
-    return Cube({"values": values[None], **arrays}, NM)
+NM, SIGMA = np.linspace(400, 900, 100), 0.003
+FREE = pl.Free(0, 1600)
+OXIDE = pl.Scene(pl.Layer(1.46, FREE), "Si")
 
 
-def found(cube, scene):
-    """The model of a cube, and the minima of its pixels."""
-    model = prepare(cube, scene)
-    with jax.enable_x64(True):
-        return model, minima(model.search, pixel_data(cube.pixels(ALL), model.problem.views[0].noise))
+def films(*films: Any, seed: int = 0, size: float = SIGMA, **layer: Any) -> np.ndarray:
+    """Noisy reflectances of layers on silicon, each a thickness or (thickness, n)."""
+    each = [film if isinstance(film, tuple) else (film, 1.46) for film in films]
+    scenes = [pl.Scene(pl.Layer(n, float(d), **layer), "Si") for d, n in each]
+    clean = np.array([pl.simulate(scene, wavelength=NM).values for scene in scenes])
+    return np.clip(clean + size * np.random.default_rng(seed).normal(size=clean.shape), 0, None)
 
 
-def fit_of(cube, scene, pixel):
-    block = cube.pixels((slice(0, 1), slice(pixel, pixel + 1)))
-    return pl.fit(spectrum(cube, {name: rows[0] for name, rows in block.items()}), scene)
+def cube_of(values: np.ndarray, sigma: float | None = SIGMA) -> Cube:
+    known = {} if sigma is None else {"sigma": np.full(values.shape, sigma)}
+    return Cube({"values": values, **known}, NM, dims=("site",))
 
 
-def check(cube, scene, pixels, share=1e-3, best=None):
-    """The best minimum is that of `fit`, within a `share` of its standard error by noise."""
-    model, best = best or found(cube, scene)
-    for pixel in pixels:
-        fit = fit_of(cube, scene, pixel)
+def every_kind() -> Cube:
+    """Thin and thick, of another index, with outliers and missing points, uneven, and with more noise."""
+    values = films(3, 12, 90, 200, 700, 1400, (500, 1.48), (300, 1.6), (900, 2.0), 550, 650)
+    values[9, ::20] += 0.1
+    values[10, [3, 4, 50]] = np.nan
+    uneven = films(600, thickness_spread=20.0)
+    return cube_of(np.concatenate([values, uneven, films(400, 800, size=5 * SIGMA)]))
+
+
+def drifting() -> Cube:
+    tilt = 1 + 0.1 * np.linspace(-1, 1, 100)
+    return cube_of(0.8 * tilt * films(60, 250, 600, 1000, 1400, seed=2) + 0.02, None)
+
+
+def angles(given: bool) -> Cube:
+    """Ψ and Δ at two angles."""
+    rng, nm, angles = np.random.default_rng(5), np.linspace(400, 900, 40), np.array([65.0, 75.0])
+    light = pl.Light(np.repeat(nm, 2), np.tile(angles, 40), "psi-delta")
+    scenes = [pl.Scene(pl.Layer(1.46, d), "Si", light=light) for d in (20.0, 110.0, 400.0, 800.0)]
+    seen = [pl.simulate(scene, light.wavelength) for scene in scenes]
+    psi, delta = (np.reshape([getattr(s, name) for s in seen], (4, 40, 2)) for name in ("values", "delta"))
+    psi, delta = psi + 0.05 * rng.normal(size=psi.shape), delta + 0.1 * rng.normal(size=psi.shape)
+    arrays = {"values": psi, "delta": (delta + 180) % 360 - 180}
+    if given:
+        arrays |= {"sigma": np.full(psi.shape, 0.05), "delta_sigma": np.full(psi.shape, 0.1)}
+    return Cube(arrays, nm, "psi-delta", ("site",), angles)
+
+
+def index(prior: Any = None) -> pl.Scene:
+    return pl.Scene(pl.Layer(pl.Free(1.3, 2.3, prior=prior), FREE), "Si")
+
+
+SLOW = pl.Instrument(scale="slow", offset="slow")
+CASES = {
+    "every kind": (every_kind, OXIDE, {"converged", "misfit", "not-identifiable"}),
+    "noise that is not given": (
+        lambda: cube_of(films(60, 400, (900, 1.47), (700, 1.6), seed=1), None),
+        OXIDE,
+        {"converged"},
+    ),
+    # fewer fringes than a drift can imitate
+    "drifting scale and offset": (
+        drifting,
+        pl.Scene(OXIDE.layers, "Si", instrument=SLOW),
+        {"not-identifiable"},
+    ),
+    "opaque": (
+        lambda: cube_of(films(*((d, 1.8 + 0.3j) for d in (100, 400, 700, 900, 1200, 1500)), seed=3)),
+        pl.Scene(pl.Layer(1.8 + 0.3j, FREE), "Si"),
+        {"not-identifiable"},
+    ),
+    "thickness and index": (
+        lambda: cube_of(films((30, 1.5), (200, 1.4), (600, 1.9), (1200, 1.6), seed=4)),
+        index(),
+        {"converged"},
+    ),
+    "prior and noise of the residuals": (
+        lambda: cube_of(films((350, 1.62), (420, 1.62)), None),
+        index(pl.priors.Normal(1.60, 0.004)),
+        {"converged"},
+    ),
+    "psi and delta": (lambda: angles(True), OXIDE, {"converged"}),
+    "psi and delta without sigma": (lambda: angles(False), OXIDE, {"converged"}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_pixels_are_those_of_fit(name):
+    make, scene, words = CASES[name]
+    cube = make()
+    model, where = prepare(cube, scene), tuple(slice(None) for _ in cube.shape)
+    found, block = fit_pixels(model, cube, where), cube.pixels(where)
+    fits = [
+        pl.fit(spectrum(cube, {key: rows[i] for key, rows in block.items()}), scene)
+        for i in range(len(found.status))
+    ]
+    assert [STATUSES[code] for code in found.status] == [str(fit.status) for fit in fits]
+    assert words <= {str(fit.status) for fit in fits}
+    for i, fit in enumerate(fits):
         for j, p in enumerate(model.parameters):
-            assert best.values[pixel, 0, j] == pytest.approx(
-                fit[p.name].value, abs=share * fit[p.name].stderr_noise
-            )
-    assert best.converged[list(pixels), 0].all()
-    return best
+            own = fit[p.name]
+            # effects are interpolated between thicknesses 1/48 of a fringe apart: within 10 %
+            assert found.stderr[i, j] == pytest.approx(own.stderr, rel=0.1), (i, p.name)
+            assert found.stderr_noise[i, j] == pytest.approx(own.stderr_noise, rel=0.1), (i, p.name)
+            if np.isfinite(own.stderr):
+                assert found.values[i, j] == pytest.approx(own.value, abs=1e-2 * own.stderr_noise)
+                assert found.chi2_reduced[i] == pytest.approx(fit.chi2_reduced, rel=1e-4)
+                assert found.rms[i] == pytest.approx(fit.rms, rel=1e-4)
+        thickness = found.minima[i, :, model.problem.thickness_axis]
+        determined = all(np.isfinite(p.stderr) for p in fit.free)
+        for rival in fit.rivals if determined else ():  # those that both have polished
+            away = np.abs(thickness - rival.parameters["thickness"])
+            order = np.nanargmin(away)
+            if away[order] < 0.01 and rival.delta_chi2 < 20:
+                assert found.delta_chi2[i, order] == pytest.approx(rival.delta_chi2, rel=0.02), i
+
+
+TRUTH = np.linspace(30, 880, 60)
 
 
 @pytest.fixture(scope="module")
 def wedge():
-    """Pixels of every thickness, one without data, some without bands; σ is given."""
-    cube = cube_of(np.linspace(30, 880, 60), sigma=np.full(NM.size, SIGMA))
-    values = cube.arrays["values"]
-    values[0, 5], values[0, 6, 10:14], values[0, 7, ::2], values[:, :, 30] = np.nan, np.nan, np.nan, np.nan
-    scene = pl.Scene(pl.Layer(1.46, FREE), 3.9)
-    return cube, scene, *found(cube, scene)
-
-
-@pytest.mark.slow  # compiles for 7 s; test_pixel_errors.py compares the same fits
-def test_thickness_is_that_of_fit(wedge):
-    cube, scene, model, best = wedge
-    check(cube, scene, (6, 7, 59), best=(model, best))
-    known = np.arange(60) != 5
-    truth = np.linspace(30, 880, 60)
-    assert np.all(np.abs(best.values[known, 0, 0] - truth[known]) < 1.0)
+    """Pixels of every thickness, one without data, some without bands; and their minima."""
+    values = films(*TRUTH)
+    values[5], values[6, 10:14], values[7, ::2], values[:, 30] = np.nan, np.nan, np.nan, np.nan
+    cube = cube_of(values)
+    model = prepare(cube, OXIDE)
+    with jax.enable_x64(True):
+        data = pixel_data(cube.pixels((slice(None),)), model.problem.views[0].noise)
+        return cube, model, minima(model.search, data)
 
 
 @pytest.mark.slow
 def test_a_pixel_without_data_has_no_numbers(wedge):
-    cube, _, model, best = wedge
+    cube, model, best = wedge
     assert np.isnan(best.values[5]).all()
     assert np.isinf(best.deviance[5]).all()
     assert not best.converged[5].any()
-    fits = fit_pixels(model, cube, (slice(0, 1), slice(4, 7)))
+    fits = fit_pixels(model, cube, (slice(4, 7),))
     assert fits.status[1] == CODES["no-data"]
     assert np.isnan(fits.values[1]).all()
     assert fits.status[0] == fits.status[2] == CODES["converged"]
@@ -84,82 +162,66 @@ def test_a_pixel_without_data_has_no_numbers(wedge):
     assert fits.values[2] == pytest.approx(best.values[6, 0], abs=1e-6)
 
 
-def test_deviance_is_the_misfit_of_the_model(wedge):
-    cube, _, _, best = wedge
-    residual = (np.nan_to_num(cube.arrays["values"][0]) - best.model) / SIGMA
-    own = np.where(np.isfinite(cube.arrays["values"][0]), residual, 0.0)
-    known = np.arange(60) != 5
-    assert best.deviance[known, 0] == pytest.approx(np.sum(own[known] ** 2, axis=1), rel=1e-6)
+def test_the_deviance_is_the_misfit_of_the_model_at_the_truth(wedge):
+    cube, _, best = wedge
+    known, values = np.arange(60) != 5, cube.arrays["values"]
+    assert np.all(np.abs(best.values[known, 0, 0] - TRUTH[known]) < 2.0)
+    residual = np.where(np.isfinite(values), (np.nan_to_num(values) - best.model) / SIGMA, 0.0)
+    assert best.deviance[known, 0] == pytest.approx(np.sum(residual[known] ** 2, axis=1), rel=1e-6)
     assert np.all(np.diff(best.deviance[known], axis=1) >= 0)
 
 
 def test_slope_is_that_of_the_signal(wedge):
-    _, _, _, best = wedge
-    step = 1e-3
-    d = best.values[20, 0, 0]
-    moved = [np.asarray(pl.reflectance(NM, d + s, 1.46, 3.9)) for s in (-step, step)]
-    assert best.slope[20, :, 0] == pytest.approx((moved[1] - moved[0]) / (2 * step), abs=1e-7)
+    _, _, best = wedge
+    d, step = best.values[20, 0, 0], 1e-3
+    below, above = (np.asarray(pl.reflectance(NM, d + s, 1.46, "Si")) for s in (-step, step))
+    assert best.slope[20, :, 0] == pytest.approx((above - below) / (2 * step), abs=1e-7)
 
 
-@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
-def test_rivals_are_those_of_fit():
+@pytest.mark.slow  # compiles a scene of its own
+def test_rivals_are_all_minima_of_the_deviance():
     """Thin layers of unknown scale: several thicknesses explain them nearly as well."""
-    few = slice(None, None, 4)
-    thickness = np.linspace(100, 400, 12)
-    whole = cube_of(thickness, sigma=np.full(NM.size, 0.06), scale=0.9, offset=0.005)
-    arrays = {"values": whole.arrays["values"][..., few], "sigma": whole.arrays["sigma"][few]}
-    cube = Cube(arrays, NM[few])
-    scene = pl.Scene(pl.Layer(1.46, FREE), 3.9, instrument=pl.Instrument(scale="free", offset="free"))
-    best = check(cube, scene, (1,))
-    for pixel in (1, 3):
-        prepared = pl.fitting.prepare(
-            spectrum(cube, {k: x[pixel] for k, x in cube.pixels(ALL).items()}), scene
-        )
-        with jax.enable_x64(True):
-            starts = np.linspace(25, 895, 30)[:, None]
-            every = pl.fitting.solve(prepared, starts)
-        values, deviance = np.asarray(every.values)[:, 0], np.asarray(every.deviance)
-        listed = best.converged[pixel]
-        assert listed.sum() > 1
-        for value, own in zip(best.values[pixel, listed, 0], best.deviance[pixel, listed], strict=True):
-            nearest = np.argmin(np.abs(values - value))
-            # polished to 1e-3 of the distance to the best; with a σ of 0.06 minima are flat
-            assert value == pytest.approx(values[nearest], abs=3.0)
-            assert own == pytest.approx(deviance[nearest], rel=1e-3, abs=0.05)
-        assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
-
-
-@pytest.mark.slow  # compiles a search of its own
-def test_priors_weigh_against_the_noise_of_the_residuals():
-    prior = Normal(1.60, 0.004)
-    scene = pl.Scene(pl.Layer(pl.Free(1.3, 2.0, prior=prior), FREE), 3.9)
-    check(cube_of([350.0, 420.0], 1.62), scene, (1,), share=0.05)
-
-
-@pytest.mark.slow  # compiles a scene of its own; test_pixel_errors.py has one in every run
-def test_ellipsometry_is_that_of_fit():
-    """Ψ and Δ at two angles, with errors of their own."""
-    nm, angle = np.linspace(420.0, 780.0, 20), np.array([65.0, 72.0])
-    rng, thickness = np.random.default_rng(1), np.array([60.0, 210.0, 480.0])
-    light = pl.Light(np.repeat(nm, 2), np.tile(angle, nm.size), "psi-delta")
-    each = [
-        pl.simulate(pl.Scene(pl.Layer(1.46, d), 3.9, light=light), wavelength=light.wavelength)
-        for d in thickness
-    ]
-    psi, delta = (
-        np.stack(x).reshape(1, 3, nm.size, 2) for x in zip(*[(s.values, s.delta) for s in each], strict=True)
+    instrument = pl.Instrument(scale="free", offset="free")
+    scene = pl.Scene(pl.Layer(1.46, pl.Free(20, 900)), "Si", instrument=instrument)
+    cube = Cube(
+        {"values": 0.9 * films(127, 182)[:, ::8] + 0.005, "sigma": np.full((2, 13), 0.06)},
+        NM[::8],
+        dims=("site",),
     )
-    arrays = {
-        "values": psi + rng.normal(0, 0.05, psi.shape),
-        "delta": delta + rng.normal(0, 0.2, psi.shape),
-        "sigma": np.full(psi.shape, 0.05),
-        "delta_sigma": np.full(psi.shape, 0.2),
-    }
-    cube = Cube(arrays, nm, signal="psi-delta", angle=angle)
-    check(cube, pl.Scene(pl.Layer(1.46, FREE), 3.9), (0, 1, 2))
+    model, block = prepare(cube, scene), cube.pixels((slice(None),))
+    with jax.enable_x64(True):
+        best = minima(model.search, pixel_data(block, model.problem.views[0].noise))
+        for pixel in range(2):
+            prepared = pl.fitting.prepare(spectrum(cube, {key: x[pixel] for key, x in block.items()}), scene)
+            every = pl.fitting.solve(prepared, np.linspace(25, 895, 30)[:, None])
+            values, deviance = np.asarray(every.values)[:, 0], np.asarray(every.deviance)
+            listed = best.converged[pixel]
+            assert listed.sum() > 1
+            for value, own in zip(best.values[pixel, listed, 0], best.deviance[pixel, listed], strict=True):
+                nearest = np.argmin(np.abs(values - value))
+                # polished to 1e-3 of the distance to the best; with a σ of 0.06 minima are flat
+                assert value == pytest.approx(values[nearest], abs=3.0)
+                assert own == pytest.approx(deviance[nearest], rel=1e-3, abs=0.05)
+            assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
 
 
 def test_a_cube_without_data_is_refused():
-    cube = Cube({"values": np.full((2, 2, NM.size), np.nan)}, NM)
     with pytest.raises(DataError, match="no pixel has data"):
-        prepare(cube, pl.Scene(pl.Layer(1.46, FREE), 3.9))
+        prepare(cube_of(np.full((4, 100), np.nan), None), OXIDE)
+
+
+def test_effects_share_the_unchanged_signal():
+    narrow = SimulatedEffect("narrow", 2.0, "", Number(0), ((3.0, 0.4), (-3.0, 0.4), (0.0, -0.8)))
+    rough = SimulatedEffect("rough", 1.5, "nm", Number(1), ((1.5, 1.7), (0.0, -1.7)))
+    program = Program(None, OXIDE, [0, 1])
+    plain = _simulation(program, [narrow, rough], [True, False], unchanged=True)
+    face = _simulation(program, [narrow, rough], [False, True], unchanged=False)
+    assert (len(plain.terms), len(face.terms)) == (3, 1)
+    changes = np.zeros(2)
+    for part in (plain, face):
+        moved = [(effect.number.position, relative * effect.size) for effect, relative in part.terms]
+        changes += part.weights @ [
+            np.exp(by) * (5 if position else 1) if by else 7.0 for position, by in moved
+        ]
+    expected = 0.4 * (np.exp(3.0) + np.exp(-3.0)) - 0.8 * 7, 1.7 * (5 * np.exp(1.5) - 7)
+    assert changes == pytest.approx(expected)

@@ -1,7 +1,11 @@
-"""Maps by worker processes of a dask cluster: equal to maps of one process, whatever happens to them."""
+"""Maps by worker processes, and maps that are killed: equal to undisturbed maps of one process."""
 
 import dataclasses
 import os
+import pickle
+import subprocess
+import sys
+import time
 
 import dask.array
 import numpy as np
@@ -11,6 +15,7 @@ from distributed import Client, LocalCluster
 
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.cluster import local_cluster
+from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
 
 
@@ -24,21 +29,15 @@ def workers():
     assert not changed - {"PYTEST_CURRENT_TEST"}
 
 
-@pytest.mark.slow  # starts workers and kills one; test_killed_runs.py kills a run without workers
+@pytest.mark.slow  # starts workers and kills one
 @pytest.mark.usefixtures("small_blocks")
 def test_a_worker_that_dies_loses_nothing(workers, cube, scene, fake_fits, tmp_path):
     """The process that fits the brightest corner is killed; a cube in memory goes there by blocks."""
     whole = run_map(cube, scene, tmp_path / "whole.zarr", fit=fake_fits.fit)
     steps = []
     marked = dataclasses.replace(cube, path=str(tmp_path / "died"))
-    made = run_map(
-        marked,
-        scene,
-        tmp_path / "map.zarr",
-        scheduler=workers,
-        fit=fake_fits.dying,
-        progress=lambda stage, done, total: steps.append(done),
-    )
+    cluster = {"scheduler": workers, "progress": lambda stage, done, total: steps.append(done)}
+    made = run_map(marked, scene, tmp_path / "map.zarr", fit=fake_fits.dying, **cluster)
     assert (tmp_path / "died").exists()
     assert steps == sorted(steps)
     assert (steps[0], steps[-1]) == (0, 45 * 32)
@@ -101,3 +100,70 @@ def test_a_scheduler_that_is_not_there(cube, scene, tmp_path, monkeypatch):
     monkeypatch.setattr("pellicle.mapping.cluster.ANSWER", 0.2)
     with pytest.raises(UsageError, match="no dask scheduler answers at tcp://"):
         run_map(cube, scene, tmp_path / "map.zarr", scheduler="tcp://127.0.0.1:1")
+
+
+TIME_OUT = 120.0
+
+PROGRAM = """
+import sys
+import fake_fits
+from pellicle.mapping import store as stores
+from pellicle.mapping.run import run_map
+
+if __name__ == "__main__":
+    stores.PIXELS = 64
+    cube, scene, store, workers = fake_fits.load(sys.argv[1])
+    run_map(cube, scene, store, workers=workers, fit=fake_fits.slow)
+"""
+
+
+@pytest.fixture
+def start(cube, scene, fake_fits, tmp_path, write):
+    """Starts a process that maps the cube into a store, 20 ms a block."""
+    program = write(PROGRAM, "program.py")
+
+    def start(store, workers=1):
+        fake_fits.save(tmp_path / "job", (cube, scene, store, workers))
+        paths = [os.path.dirname(fake_fits.__file__), *sys.path]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+        return subprocess.Popen([sys.executable, program, tmp_path / "job"], env=environment)
+
+    return start
+
+
+def wait_for(condition):
+    end = time.monotonic() + TIME_OUT
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def finished_blocks(store):
+    return sum(len(files) for _, _, files in os.walk(store / "progress/done/c"))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("small_blocks")
+@pytest.mark.parametrize(("kills", "workers"), [(5, 1), (2, 2)])
+def test_kills_at_random_moments_change_nothing(
+    start, cube, scene, fake_fits, same_files, tmp_path, kills, workers
+):
+    scene = pickle.loads(
+        pickle.dumps(scene)
+    )  # as the process has it: a scene prints its defaults by identity
+    whole = run_map(cube, scene, tmp_path / "whole.zarr", fit=fake_fits.fit)
+    store, random = tmp_path / "map.zarr", np.random.default_rng(0)
+    for kill in range(kills):
+        before = finished_blocks(store)
+        process = start(store, workers)
+        # after the first block of this run, as the start takes most of the time, and before the last
+        wait_for(lambda: finished_blocks(store) > before or process.poll() is not None)  # noqa: B023
+        time.sleep(random.uniform(0, 0.5 * (24 - before) / (kills - kill) * 0.03))
+        process.kill()
+        process.wait()
+        done = finished_blocks(store)
+        assert before < done <= 24
+        assert Map(store).finished == (done == 24)
+    made = run_map(cube, scene, store, fit=fake_fits.fit)
+    assert made.finished
+    same_files(whole.path, made.path)

@@ -1,9 +1,11 @@
-"""The store of a map: its variables, killed runs, and what it refuses to continue."""
+"""The store of a map: its variables, killed runs, what it does not continue; and how maps show themselves."""
 
 import dataclasses
 import errno
+import gc
+import itertools
+import json
 import os
-import shutil
 import sys
 
 import numpy as np
@@ -14,7 +16,9 @@ import zarr
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.map_result import Map
+from pellicle.mapping.pixels.results import CODES
 from pellicle.mapping.run import run_map
+from pellicle.reporting.map_text import cube_report
 
 pytestmark = pytest.mark.usefixtures("small_blocks")
 
@@ -65,9 +69,6 @@ def test_values_and_attributes_of_every_pixel(mapped, cube):
     assert data.attrs["Conventions"].startswith("CF-1")
     assert (data.attrs["path"], data.attrs["notes"]) == ("wafer.npy", ["percent"])
 
-
-def test_the_result_summarises_the_map(mapped):
-    made = mapped()
     assert made.status == {"no-data": 2, "converged": 45 * 32 - 2}
     assert (made.shape, made.dims, made.parameters) == ((45, 32), ("y", "x"), {"thickness": "nm"})
     assert (made.converged, made.finished, made.thickness.dims) == (1.0, True, ("y", "x"))
@@ -124,6 +125,8 @@ def test_a_finished_map_is_not_fitted_again(mapped, fake_fits):
     made = mapped(fit=again)
     assert again.blocks == 0
     assert (made.run.pixels, made.run.earlier) == (0, 45 * 32)
+    with pytest.raises(UsageError, match="exists; leave `resume=False` out"):
+        mapped(resume=False)
 
 
 @pytest.mark.slow
@@ -143,12 +146,6 @@ def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube):
     assert mapped(the_cube=other, overwrite=True).run.pixels == 45 * 32
 
 
-def test_a_map_is_not_continued_unasked(mapped):
-    mapped()
-    with pytest.raises(UsageError, match="exists; leave `resume=False` out"):
-        mapped(resume=False)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="folders cannot be locked")
 def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
@@ -163,37 +160,30 @@ def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
     assert mapped(overwrite=True).finished
 
 
-def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, fake_fits, same_files, monkeypatch):
-    whole, write = mapped("whole.zarr"), zarr.Array.__setitem__
-    monkeypatch.setattr(zarr.Array, "__setitem__", _disk_full_after(5, write))
+def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, same_files, monkeypatch):
+    whole, write, blocks = mapped("whole.zarr"), zarr.Array.__setitem__, itertools.count()
+
+    def full(array, where, values):
+        if array.name == "/rms" and next(blocks) == 5:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "c/0/0")
+        write(array, where, values)
+
+    monkeypatch.setattr(zarr.Array, "__setitem__", full)
     with pytest.raises(DataError, match=r"map.zarr: cannot be written \(No space left.*make room"):
         mapped()
     monkeypatch.setattr(zarr.Array, "__setitem__", write)
     same_files(whole.path, mapped().path)
 
 
-def _disk_full_after(blocks, write):
-    def full(array, where, values):
-        if array.name == "/rms" and full.blocks == blocks:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "c/0/0")
-        full.blocks += array.name == "/rms"
-        write(array, where, values)
-
-    full.blocks = 0
-    return full
-
-
 def test_files_of_a_user_stay(mapped, tmp_path):
-    (tmp_path / "map.zarr").mkdir()
-    (tmp_path / "map.zarr/notes.txt").write_text("mine")
-    with pytest.raises(UsageError, match="is no map of pellicle"):
-        mapped(overwrite=True)
-    shutil.rmtree(tmp_path / "map.zarr")
-    zarr.create_group(tmp_path / "map.zarr", attributes={"title": "mine"})
-    with pytest.raises(UsageError, match="is no map of pellicle"):
-        mapped(overwrite=True)
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes/notes.txt").write_text("mine")
+    zarr.create_group(tmp_path / "group.zarr", attributes={"title": "mine"})
+    for name in ("notes", "group.zarr"):
+        with pytest.raises(UsageError, match="is no map of pellicle"):
+            mapped(name, overwrite=True)
     with pytest.raises(DataError, match="holds no map"):
-        Map(tmp_path / "map.zarr")
+        Map(tmp_path / "group.zarr")
 
 
 def test_a_cube_with_a_fingerprint_is_not_read_for_it(mapped, cube):
@@ -214,14 +204,9 @@ def test_a_cube_with_a_fingerprint_is_not_read_for_it(mapped, cube):
 
 
 def test_sites_of_a_table_have_their_coordinates(mapped, cube):
-    sites = dataclasses.replace(
-        cube,
-        arrays={"values": cube.arrays["values"][:, 0]},
-        dims=("site",),
-        coords={"site": np.array([f"die {i}" for i in range(45)]), "x": np.arange(45.0), "y": np.zeros(45)},
-        mask=None,
-    )
-    made = mapped(the_cube=sites)
+    coords = {"site": np.array([f"die {i}" for i in range(45)]), "x": np.arange(45.0), "y": np.zeros(45)}
+    line = {"values": cube.arrays["values"][:, 0]}
+    made = mapped(the_cube=dataclasses.replace(cube, arrays=line, dims=("site",), coords=coords, mask=None))
     assert set(made.dataset.coords) == {"site", "x", "y"}
     assert made.dataset.x.dims == ("site",)
     assert str(made.dataset.site.values[3]) == "die 3"
@@ -233,3 +218,32 @@ def test_without_zarr_the_message_names_the_extra(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "zarr", None)
     with pytest.raises(UsageError, match=r"need zarr: pip install 'pellicle\[maps\]'"):
         Map(tmp_path / "map.zarr")
+
+
+def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):
+    made = run_map(cube, scene, tmp_path / "map.zarr", fit=fake_fits.fit)
+    text = pl.report(made)
+    assert text == made.report() == cube_report(made)
+    assert "100 % converged." in text
+    assert "no data  2 pixels (0.1 %) at x = 5, y = 1.5 mm and at x = 7, y = 3.5 mm" in text
+    assert "read     percent" in text
+    assert "pixels/s" in text
+    assert "dispersion" not in text.split("left out")[0].split("[[Plan")[1]
+    assert len(made.plot().axes) >= 4
+    made.save(tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        *("result.json", "report.txt", "report.html", "map.png", "rival.png")
+    }
+    record = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert record["schema"] == "pellicle.cube-map/1"
+    assert record["status"] == {"converged": 45 * 32 - 2, "no-data": 2}
+    assert {row["effect"] for row in record["plan"]} > {"absorption", "dispersion"}
+
+
+@pytest.mark.slow
+def test_arrays_of_a_map_in_a_temporary_folder_outlive_it(cube, scene, fake_fits, monkeypatch):
+    """Zarr takes a chunk whose file is absent as one without values, and says nothing."""
+    monkeypatch.setattr("pellicle.mapping.pixels.fit.fit_pixels", fake_fits.fit)
+    dataset = pl.map(cube, scene).dataset
+    gc.collect()
+    assert int((dataset["status"] == CODES["converged"]).sum()) == 45 * 32 - 2

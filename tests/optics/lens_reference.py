@@ -124,3 +124,11 @@ def muellers(
 
 def _coherency(weight: np.ndarray, jones: np.ndarray) -> np.ndarray:
     return np.einsum("r,rij,rkl->ikjl", weight, jones, jones.conj()).reshape(4, 4)
+
+
+def berreman(e: np.ndarray, a: float) -> np.ndarray:
+    """Δ of the fields (Ex, Hy, Ey, −Hx) in the plane of incidence, by elimination of Ez."""
+    z = np.array([-e[2, 0], -a, -e[2, 1], 0]) / e[2, 2]
+    unit = np.eye(4)
+    displacement = [e[i, 0] * unit[0] + e[i, 1] * unit[2] + e[i, 2] * z for i in range(2)]
+    return np.array([unit[1] + a * z, displacement[0], unit[3], displacement[1] - a * a * unit[2]])

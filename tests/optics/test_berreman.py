@@ -5,49 +5,31 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pellicle.optics import coherent, response
-from pellicle.optics.anisotropy import Principal, axis_direction, permittivity, uniaxial
+from pellicle.optics import anisotropy, coherent, response
+from pellicle.optics.anisotropy import Principal, axis_direction, uniaxial
 from pellicle.optics.berreman.stack import polarised, transmittances
 from pellicle.optics.pair import to_complex, to_pair
 
+from .lens_reference import berreman, permittivity
+
 COUNT = 30
-
-
-def delta(e, a):
-    """Berreman's matrix by elimination of Ez, row by row."""
-    z = np.array([-e[2, 0], -a, -e[2, 1], 0]) / e[2, 2]
-    unit = np.eye(4)
-    displacement = [e[i, 0] * unit[0] + e[i, 1] * unit[2] + e[i, 2] * z for i in range(2)]
-    return np.array([unit[1] + a * z, displacement[0], unit[3], displacement[1] - a * a * unit[2]])
 
 
 def by_eigenvectors(n0, layers, substrate, phases, angle):
     """Jones matrix and T of p and s, by scipy's matrix exponential: for layers that are not opaque."""
     a, cosine = n0 * np.sin(angle), np.cos(angle)
-    q, waves = np.linalg.eig(delta(substrate, a))
+    q, waves = np.linalg.eig(berreman(substrate, a))
     flux = np.real(waves[0] * waves[1].conj() + waves[2] * waves[3].conj())
     below = waves[:, np.argsort(-np.where(abs(q.imag) > 1e-9, q.imag, flux))[:2]]
     fields = below
     for e, k in reversed(list(zip(layers, phases, strict=True))):
-        fields = expm(-1j * k * delta(e, a)) @ fields
+        fields = expm(-1j * k * berreman(e, a)) @ fields
     q0 = n0 * cosine
     p_s_down_up = np.array([[cosine, 0, -cosine, 0], [n0, 0, n0, 0], [0, 1, 0, 1], [0, q0, 0, -q0]])
     amplitudes = np.linalg.solve(p_s_down_up, fields)
     per_incident = np.linalg.inv(amplitudes[:2])
     Ex, Hy, Ey, Hx = below @ per_incident
     return amplitudes[2:] @ per_incident, np.real(Ex * Hy.conj() + Ey * Hx.conj()) / q0
-
-
-def turned(indices, theta, phi, psi=0.0):
-    """Permittivity by rotation matrices: about z by ψ, about y by θ, about z by φ."""
-
-    def about_z(angle):
-        c, s = np.cos(angle), np.sin(angle)
-        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-
-    c, s = np.cos(theta), np.sin(theta)
-    rotation = about_z(phi) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ about_z(psi)
-    return rotation @ np.diag(np.square(indices)) @ rotation.T
 
 
 @jax.jit
@@ -57,7 +39,7 @@ def computed(n, turns, k, n0, angle):
     layers = [
         uniaxial(n[0], n[1], turns[0], turns[1]),
         n[2],
-        permittivity(Principal(n[3], n[4], n[5]), turns[2], turns[3], turns[4]),
+        anisotropy.permittivity(Principal(n[3], n[4], n[5]), turns[2], turns[3], turns[4]),
     ]
     substrate = uniaxial(n[6], n[7], turns[5], turns[6])
     found = polarised(n0, layers, substrate, list(k), angle, dichroic=False)
@@ -77,13 +59,9 @@ def stacks():
 def compare(n, turns, k, n0, angle):
     jones, T = map(np.asarray, computed(n, turns, k, n0, angle))
     for i in range(COUNT):
-        t, m = turns[:, i], n[:, i]
-        layers = [
-            turned([m[0], m[0], m[1]], t[0], t[1]),
-            np.eye(3) * m[2] ** 2,
-            turned(m[3:6], t[2], t[3], t[4]),
-        ]
-        expected = by_eigenvectors(n0[i], layers, turned([m[6], m[6], m[7]], t[5], t[6]), k[:, i], angle[i])
+        t, m = np.rad2deg(turns[:, i]), n[:, i]
+        layers = [permittivity(m[:2], *t[:2]), np.eye(3) * m[2] ** 2, permittivity(m[3:6], *t[2:5])]
+        expected = by_eigenvectors(n0[i], layers, permittivity(m[6:], *t[5:]), k[:, i], angle[i])
         np.testing.assert_allclose(jones[i], expected[0], rtol=0, atol=1e-10)
         np.testing.assert_allclose(T[i], expected[1], rtol=0, atol=1e-10)
 

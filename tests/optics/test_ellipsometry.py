@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.optics import ellipsometry
+
+from ..by_tmm import films
 
 WAVELENGTH = 600.0
 
@@ -19,13 +20,8 @@ def psi_delta(depth, index, substrate, angle):
 
 
 def truth(depth, index, substrate, angle) -> complex:
-    r = {
-        letter: tmm.coh_tmm(
-            letter, [1.0, *index, substrate], [np.inf, *depth, np.inf], np.deg2rad(angle), WAVELENGTH
-        )["r"]
-        for letter in "sp"
-    }
-    return np.conj(r["p"] / r["s"])
+    s, p = (films(x, WAVELENGTH, [1.0, *index, substrate], depth, angle, "r")[0] for x in "sp")
+    return np.conj(p / s)
 
 
 @pytest.mark.parametrize("layers", [1, 2, 5, 12])

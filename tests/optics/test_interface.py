@@ -1,10 +1,10 @@
-"""One boundary: Fresnel's coefficients, energy, and the branch of the root."""
+"""One boundary: Fresnel's coefficients, energy, the branch of the root; and both faces of a thick plate."""
 
 import jax
 import numpy as np
 import pytest
 
-from pellicle.optics import interface
+from pellicle.optics import interface, plate
 from pellicle.optics.pair import Pair, imag, is_real, real, to_complex, to_pair
 
 
@@ -63,3 +63,23 @@ def test_cosine_of_90_degrees_is_not_negative(dtype):
     value, slope = jax.jvp(q0, (np.deg2rad(dtype(90)),), (dtype(1),))
     assert 0 < value < 1e-8
     assert slope == pytest.approx(-1.5)
+
+
+def test_the_bounces_are_summed():
+    front, back, passed, internal = plate.Face(0.2, 0.7, 0.3), 0.5, 0.4, 0.8
+    up = [0.7 * (internal**2 * back) ** (m + 1) * front.reflectance_below**m * 0.7 for m in range(60)]
+    down = [0.7 * internal * passed * (internal**2 * back * front.reflectance_below) ** m for m in range(60)]
+    assert plate.plate_reflectance(front, back, internal) == pytest.approx(0.2 + sum(up))
+    assert plate.plate_transmittance(front, back, passed, internal) == pytest.approx(sum(down))
+
+
+def test_an_opaque_plate_hides_its_back():
+    front = plate.Face(0.2, 0.7, 0.3)
+    assert plate.plate_reflectance(front, 0.5, 0.0) == 0.2
+    assert plate.plate_transmittance(front, 0.5, 0.4, 0.0) == 0
+
+
+def test_beers_law():
+    """α = 4πk/λ: 1 mm of k = 1e-6 at 500 nm has α = 25.13 /m·10³ and passes e^−0.02513."""
+    assert plate.internal_transmittance(1e-6, 1.0, 500.0) == pytest.approx(np.exp(-0.0251327412))
+    assert plate.internal_transmittance(0.0, 1.0, 500.0) == 1

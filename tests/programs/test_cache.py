@@ -58,14 +58,52 @@ def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
 
-def test_a_file_or_folder_that_others_can_write_is_not_loaded(path):
-    for place in (path, path.parent):
-        mode = place.stat().st_mode
-        for bit in (0o020, 0o002):
-            place.chmod(mode | bit)
-            assert program_cache.load(path, KEY) is None
-        place.chmod(mode)
-    assert program_cache.load(path, KEY) is not None
+def link(path):
+    path.with_name("two").symlink_to(path)
+    path.parent.with_name("linked").symlink_to(path.parent)
+    assert not program_cache.make_folder(path.parent.with_name("linked"))
+
+
+DAMAGE = {
+    "group may write": lambda path: path.chmod(0o620),
+    "others may write": lambda path: path.chmod(0o602),
+    "group may write into the folder": lambda path: path.parent.chmod(0o720),
+    "others may write into the folder": lambda path: path.parent.chmod(0o702),
+    "empty": lambda path: path.write_bytes(b""),
+    "begun": lambda path: path.write_bytes(path.read_bytes()[:20]),
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:-1]),
+    "a bit turned": lambda path: path.write_bytes(
+        bytes(x ^ (i == 1000) for i, x in enumerate(path.read_bytes()))
+    ),
+    "link": link,
+    "pipe": lambda path: os.mkfifo(path.with_name("pipe"), 0o600),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_what_may_not_be_ours_is_neither_loaded_nor_unpickled(path, monkeypatch, name):
+    """Nor does a pipe stop the process."""
+    unpickled = []
+    DAMAGE[name](path)
+    monkeypatch.setattr(program_cache.pickle, "loads", unpickled.append)
+    places = {"link": [path.with_name("two"), path.parent.with_name("linked") / path.name]}
+    for place in (places | {"pipe": [path.with_name("pipe")]}).get(name, [path]):
+        assert program_cache.load(place, KEY) is None
+    assert program_cache.load(path, b"another key") is None
+    assert not unpickled
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give files away")
+@pytest.mark.parametrize("given", ["one", "."])
+def test_a_file_or_folder_that_was_given_away_is_not_loaded(path, given):
+    os.chown(path.parent / given, 12345, -1)
+    assert program_cache.load(path, KEY) is None
+
+
+def test_what_cannot_be_deserialised_is_not_loaded(path):
+    body = program_cache.pickle.dumps((False, (b"no program", None, None)))
+    path.write_bytes(program_cache._digest(KEY, body) + body)
+    assert program_cache.load(path, KEY) is None
 
 
 def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
@@ -73,48 +111,6 @@ def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
     assert program_cache.load(path, KEY) is None
     assert program_cache.make(path, KEY, lambda x: [x + 1], VECTOR, path.parent, {}) is None
-
-
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can give files away")
-def test_a_file_that_was_given_away_is_not_loaded(path):
-    os.chown(path, 12345, -1)
-    assert program_cache.load(path, KEY) is None
-    os.chown(path, 0, -1)
-    os.chown(path.parent, 12345, -1)
-    assert program_cache.load(path, KEY) is None
-
-
-def test_a_symbolic_link_is_not_followed(path):
-    link = path.with_name("two")
-    link.symlink_to(path)
-    assert program_cache.load(link, KEY) is None
-    folder = path.parent.with_name("linked")
-    folder.symlink_to(path.parent)
-    assert program_cache.load(folder / path.name, KEY) is None
-    assert not program_cache.make_folder(folder)
-
-
-def test_a_pipe_does_not_stop_the_process(path):
-    pipe = path.with_name("pipe")
-    os.mkfifo(pipe, 0o600)
-    assert program_cache.load(pipe, KEY) is None
-
-
-def test_a_damaged_file_or_one_of_another_key_is_not_loaded(path, monkeypatch):
-    whole = path.read_bytes()
-    unpickled = []
-    monkeypatch.setattr(program_cache.pickle, "loads", unpickled.append)
-    assert program_cache.load(path, b"another key") is None
-    for damaged in (b"", whole[:20], whole[:-1], whole[:1000] + bytes([whole[1000] ^ 1]) + whole[1001:]):
-        path.write_bytes(damaged)
-        assert program_cache.load(path, KEY) is None
-    assert not unpickled
-
-
-def test_what_cannot_be_deserialised_is_not_loaded(path):
-    body = program_cache.pickle.dumps((False, (b"no program", None, None)))
-    path.write_bytes(program_cache._digest(KEY, body) + body)
-    assert program_cache.load(path, KEY) is None
 
 
 def test_the_oldest_files_make_room(tmp_path):
@@ -195,18 +191,15 @@ def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch,
         scaled(2, np.arange(5.0))
 
 
-def test_without_owners_the_traced_program_is_kept(cache, new_process, monkeypatch):
-    monkeypatch.delattr(os, "geteuid")
-    for _ in range(2):
-        assert scaled(2, np.arange(4.0)).total == 12
-        new_process()
-    assert TRACED == [2]
-    assert [file.suffix for file in (cache / "programs").iterdir()] == [".export"]
-
-
-def test_in_a_folder_of_others_the_traced_program_is_kept(cache, new_process):
-    (cache / "programs").mkdir()
-    (cache / "programs").chmod(0o777)
+@pytest.mark.parametrize("owners", [False, True])
+def test_without_owners_or_in_a_folder_of_others_the_traced_program_is_kept(
+    cache, new_process, monkeypatch, owners
+):
+    if owners:
+        (cache / "programs").mkdir()
+        (cache / "programs").chmod(0o777)
+    else:
+        monkeypatch.delattr(os, "geteuid")
     for _ in range(2):
         assert scaled(2, np.arange(4.0)).total == 12
         new_process()

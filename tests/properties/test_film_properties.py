@@ -3,7 +3,6 @@
 from functools import cache
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -111,43 +110,11 @@ def test_only_the_ratio_of_thickness_and_wavelength_counts(
     np.testing.assert_allclose(one, two, atol=1e-9)
 
 
-def draw(rng, count):
-    """Wide draws: each argument over its decades, and often exactly at its edges."""
-
-    def often(values, edges, chance=0.15):
-        return np.where(rng.random(count) < chance, rng.choice(edges, count), values)
-
-    def refraction():
-        return often(10 ** rng.uniform(-1.3, 0.8, count), [1.0, 1.5])
-
-    def medium():
-        return refraction() + 1j * often(10 ** rng.uniform(-12, 1, count), [0.0, 1e-300], 0.4)
-
-    return (
-        10 ** rng.uniform(0.5, 6, count),
-        often(10 ** rng.uniform(-4, 6, count), [0.0]),
-        medium(),
-        medium(),
-        often(rng.uniform(1, 2.5, count), [1.0, 1.5]),
-        often(rng.uniform(0, 90, count), [0.0, 30.0, 89.999, 90.0]),
-    )
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("letter", "sp")
-def test_every_value_and_gradient_is_finite(letter, dtype):
-    wavelength, thickness, layer, substrate, ambient, angle = draw(np.random.default_rng(7), 5000)
-    columns = (wavelength, thickness, layer.real, layer.imag, substrate.real, substrate.imag, ambient, angle)
-    rows = np.stack(columns, axis=1).astype(dtype)
-
-    def signals(row):
-        w, d, n1, k1, n2, k2, n0, theta = row
-        film = (w, d, jax.lax.complex(n1, k1), jax.lax.complex(n2, k2), n0, theta)
-        return jnp.stack([compiled(signal, letter)(*film) for signal in "RT"])
-
-    values, slopes = jax.jit(jax.vmap(lambda row: (signals(row), jax.jacfwd(signals)(row))))(rows)
-    assert np.all(np.isfinite(values))
-    assert np.all((values >= -1e-6) & (values <= 1 + (1e-12 if dtype is np.float64 else 1e-5)))
-    bad = ~np.all(np.isfinite(slopes), axis=(1, 2))
-    assert not np.any(bad), rows[bad][:5]
+@pytest.mark.parametrize(("layers", "dtype"), [(1, np.float64), (1, np.float32), (3, np.float64)])
+def test_random_scenes_have_finite_slopes_and_conserve_energy(load_script, layers, dtype):
+    """A few of those that `make properties` draws by the million."""
+    properties = load_script("benchmarks/properties.py")
+    rows = properties.scenes(np.random.default_rng(3), 5000, layers).astype(dtype)
+    for law, bad in properties.violations(rows, layers).items():
+        assert not np.any(bad), (law, rows[bad][0].tolist())

@@ -82,12 +82,9 @@ def test_a_chain_of_another_problem_is_refused(bands, film, kept, data, scene):
     assert kept.read_bytes() == before
 
 
-def test_a_chain_of_other_walkers_is_refused(bands, film, kept):
+def test_other_walkers_and_what_is_no_chain_are_refused(bands, film, kept, write):
     with pytest.raises(UsageError, match="is a chain of 32 walkers"):
         pl.sample(bands(), film(), walkers=40, chain=kept)
-
-
-def test_what_is_no_chain_is_refused(bands, film, write):
     path = write("notes of mine", "chain.h5")
     with pytest.raises(DataError, match="is no chain that pellicle wrote"):
         pl.sample(bands(), film(), chain=path)

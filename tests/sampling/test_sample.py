@@ -2,28 +2,23 @@
 
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.errors import UsageError
-from pellicle.scene.instrument import Drift
 
-BANDS = np.array([450.0, 520.0, 600.0, 690.0, 800.0])
-SUBSTRATE = 3.9 + 0.02j
+from ..by_tmm import films
+from .conftest import BANDS
+
 GRID = np.linspace(50.0, 1500.0, 2901)
-
-
-def reflectance(thickness: float) -> np.ndarray:
-    stack = [1.0, 1.46, SUBSTRATE]
-    return np.array([tmm.coh_tmm("s", stack, [np.inf, thickness, np.inf], 0.0, nm)["R"] for nm in BANDS])
 
 
 @pytest.fixture(scope="module")
 def grid(bands) -> np.ndarray:
     """The posterior at `GRID` under a uniform prior, which sums to 1."""
-    data = bands()
-    log = [-0.5 * np.sum(((data.values - reflectance(d)) / data.sigma) ** 2) for d in GRID]
-    weight = np.exp(np.array(log) - max(log))
+    data, stack = bands(), [1.0, 1.46, 3.9 + 0.02j]
+    seen = [films("s", BANDS, stack, [d]) for d in GRID]
+    log = -0.5 * np.sum(((data.values - seen) / data.sigma) ** 2, axis=1)
+    weight = np.exp(log - log.max())
     return weight / weight.sum()
 
 
@@ -98,19 +93,3 @@ def test_a_chain_that_is_too_short_gives_no_interval(bands, film):
 def test_impossible_walkers_are_refused(bands, film, walkers, sentence):
     with pytest.raises(UsageError, match=sentence):
         pl.sample(bands(), film(), walkers=walkers)
-
-
-@pytest.mark.slow  # a program of its own; evidences of several views are tested with the fits
-def test_every_view_counts_and_scale_is_integrated_out(bands):
-    """Two spectra of one film with a free scale each: the posterior is as wide as least squares say."""
-    scene = pl.Scene(
-        pl.Layer(1.46, pl.Free(500.0, 560.0)),
-        pl.dispersion.Constant(3.9, 0.02),
-        instrument=pl.Instrument(scale=Drift(0)),
-        uncertainty=pl.Uncertainty.none(),
-    )
-    found = pl.sample([bands(530.0, 0.004, 1), bands(530.0, 0.004, 2)], scene)
-    at = found["thickness"]
-    estimate = found.fit["thickness"]
-    assert at.sd == pytest.approx(estimate.stderr, rel=0.12)
-    assert at.mean == pytest.approx(estimate.value, abs=0.2 * estimate.stderr)

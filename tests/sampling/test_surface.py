@@ -14,7 +14,7 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
-from ..fitting.brdf.known_surface import BOUNDS, FREE, TRUTH, arcs, search_from
+from ..fitting.brdf.known_surface import BOUNDS, FREE, TRUTH, arcs, from_all_sides, noisy, search_from
 
 UNITS = [0.32, *np.log([60, 25]) / np.log(1000), 0.015, 0.05]
 """The truth in the unit cube of the search."""
@@ -29,24 +29,16 @@ class Known(NamedTuple):
 @pytest.fixture(scope="module")
 def known():
     """Samples of the truth with noise of 1 %, and a fit of them that starts at the truth."""
-    clean = pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values
-    sigma = 0.01 * clean
-    values = np.abs(clean + sigma * np.random.default_rng(3).standard_normal(clean.shape))
-    samples = dataclasses.replace(arcs(), values=values, sigma=sigma)
+    samples = noisy(pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values, 3)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "search", search_from(UNITS))
         return Known(samples, *fitting.fitted(samples, FREE, 0.0, quiet))
 
 
-@pytest.fixture
-def fitted_before(monkeypatch, known):
-    """Posteriors of the samples that were fitted, without another fit."""
-    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, known.ranked))
-
-
 @pytest.mark.slow  # fits and samples for 6 s; tests/sampling/test_sample.py samples a film
-def test_a_posterior_is_as_wide_as_the_errors_say(fitted_before, known, tmp_path):
+def test_a_posterior_is_as_wide_as_the_errors_say(monkeypatch, known, tmp_path):
     """Every number is determined and far from its bounds: the posterior is normal."""
+    monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, known.ranked))
     posterior = pl.sample(known.samples, FREE, chain=tmp_path / "chain.h5")
     assert posterior.trusted
     assert list(posterior.parameters) == [p.name for p in known.fit.free]
@@ -90,20 +82,11 @@ def test_without_evidence_of_a_layer_a_posterior_assumes_one(monkeypatch, known,
     assert posterior.assumption == assumption
 
 
-@pytest.fixture(scope="module")
-def turned():
-    """A deviation of 3 degrees at an azimuth of 170, seen from all sides with much noise."""
-    rng = np.random.default_rng(5)
-    theta_i, phi_i = rng.uniform(10, 50, 60), rng.uniform(0, 360, 60)
-    theta_o, phi_o = np.abs(theta_i + rng.uniform(-15, 15, 60)), phi_i + 180 + rng.uniform(-20, 20, 60)
-    directions = BrdfSamples(theta_i, phi_i, theta_o, phi_o, np.ones((60, 3)), ("R", "G", "B"))
-    fixed = {**TRUTH, "deviation": 3.0, "azimuth": 170.0}
-    return pl.simulate(Surface("granier-heidrich", fixed), directions=directions, noise=0.4)
-
-
 @pytest.mark.slow
-def test_an_azimuth_is_drawn_within_half_a_turn_of_the_best(turned, monkeypatch):
-    """Across the ends of its bounds, and all directions of the disc are as likely."""
+def test_an_azimuth_is_drawn_within_half_a_turn_of_the_best(monkeypatch):
+    """Across the ends of its bounds, and all directions of the disc are as likely: with much noise."""
+    tilted = Surface("granier-heidrich", {**TRUTH, "deviation": 3.0, "azimuth": 170.0})
+    turned = pl.simulate(tilted, directions=from_all_sides(("R", "G", "B")), noise=0.4)
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
     monkeypatch.setattr(fitting, "search", search_from([0.43, 0.51]))
     posterior = pl.sample(turned, Surface("granier-heidrich", {**TRUTH, **free}), steps=300)

@@ -6,12 +6,14 @@ from typing import NamedTuple
 import jax
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.problem import Explained
 from pellicle.sampling.density import systematics
+
+from ..by_tmm import films
+from ..differences import jacobian
 
 ROWS = 30
 X = np.linspace(-1.0, 1.0, ROWS)
@@ -106,16 +108,7 @@ def test_an_effect_of_the_sample_is_the_same_in_all_views():
 
 def reflectance(nm: np.ndarray, thickness: float, index: float = 1.46) -> np.ndarray:
     """R of the film, by the tmm package."""
-    stack = [1.0, index, 3.9 + 0.02j], [np.inf, thickness, np.inf]
-    return np.array([tmm.coh_tmm("s", *stack, 0.0, each)["R"] for each in nm])
-
-
-def slope(nm: np.ndarray, thickness: float, index: float) -> np.ndarray:
-    """∂R / ∂ thickness and ∂R / ∂ relative index of the film, (points, 2)."""
-    step = 1e-4
-    by_thickness = reflectance(nm, thickness + step, index) - reflectance(nm, thickness - step, index)
-    by_index = reflectance(nm, thickness, index * (1 + step)) - reflectance(nm, thickness, index * (1 - step))
-    return np.stack([by_thickness, by_index], axis=1) / (2 * step)
+    return films("s", nm, [1.0, index, 3.9 + 0.02j], [thickness])
 
 
 @pytest.mark.parametrize("uncertainty", [0.02, 0.0])
@@ -129,8 +122,8 @@ def test_an_uncertain_index_widens_a_posterior_as_it_does_the_error(bands, film,
     posterior = pl.sample(clean, dataclasses.replace(scene, layers=(layer,)))
     estimate = posterior.fit["thickness"]
     # least squares of thickness and index, of which the latter has a normal prior
-    jacobian = slope(data.wavelength, 530.0, 1.46) / 0.004
-    normal = jacobian.T @ jacobian + np.diag([0.0, 1 / max(uncertainty, 1e-9) ** 2])
+    slopes = jacobian(lambda x: reflectance(data.wavelength, x[0], 1.46 * x[1]), [530.0, 1.0], 1e-4) / 0.004
+    normal = slopes.T @ slopes + np.diag([0.0, 1 / max(uncertainty, 1e-9) ** 2])
     expected = np.sqrt(np.linalg.inv(normal)[0, 0])
     assert posterior.trusted
     assert estimate.stderr == pytest.approx(expected, rel=0.02)

@@ -1,7 +1,6 @@
 """Small surfaces and sets of BRDF samples; sizes and free numbers that share compiled programs."""
 
 import dataclasses
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -14,17 +13,9 @@ from pellicle.scene.surface import Surface
 
 from .known_surface import search_from
 
-TILTED = Surface(
-    "granier-heidrich",
-    {
-        "thickness": Free(0, 1000),
-        "n": Free(1.05, 2.5),
-        "exponent_reflection": Free(1, 1000),
-        "deviation": Free(0, 20),
-        "azimuth": Free(-180, 180),
-        "specular": Free(0, 100),
-    },
-)
+ENDS = {"thickness": (0, 1000), "n": (1.05, 2.5), "exponent_reflection": (1, 1000)}
+ENDS |= {"deviation": (0, 20), "azimuth": (-180, 180), "specular": (0, 100)}
+TILTED = Surface("granier-heidrich", {key: Free(*ends) for key, ends in ENDS.items()})
 """RGB; every kind of coordinate: linear, logarithmic, a disc, and a weight."""
 
 
@@ -37,30 +28,13 @@ def ones(theta_i, phi_i, theta_o, phi_o, channels=("R", "G", "B"), sigma=None) -
     )
 
 
-@pytest.fixture(scope="session", name="tilted")
-def _tilted() -> Surface:
-    return TILTED
-
-
-@pytest.fixture(scope="session", name="ones")
-def _ones() -> Callable[..., BrdfSamples]:
-    return ones
-
-
-GREY = {
-    "thickness": 320.0,
-    "n": 1.5,
-    "exponent_reflection": 60.0,
-    "exponent_transmission": 25.0,
-    "deviation": 0.0,
-    "azimuth": 0.0,
-    "specular": 1.5,
-    "diffuse": 0.1,
-}
+GREY = {"thickness": 320.0, "n": 1.5, "exponent_reflection": 60.0, "exponent_transmission": 25.0}
+GREY |= {"deviation": 0.0, "azimuth": 0.0, "specular": 1.5, "diffuse": 0.1}
 """A surface of one channel at 550 nm."""
 FREE = {"thickness": (0, 1000), "exponent_reflection": (1, 1000), "specular": (0, 100)}
+TRUTH = {key: GREY[key] for key in FREE}
 START = [0.32, np.log(60) / np.log(1000), 0.015]
-"""The truth in the unit cube of these numbers."""
+"""The values of these numbers, and where they are in the unit cube."""
 
 
 def grey(**changes) -> Surface:
@@ -78,22 +52,6 @@ def grey_samples(noise: float = 0.02, seed: int = 1, incidences=(15.0, 35.0, 55.
     clean = pl.simulate(Surface("granier-heidrich", GREY, (550.0,)), directions=directions).values
     values = clean + noise * np.random.default_rng(seed).standard_normal(clean.shape)
     return dataclasses.replace(directions, values=values, sigma=np.full(clean.shape, noise))
-
-
-@pytest.fixture(scope="session", name="grey")
-def _grey() -> Callable[..., Surface]:
-    return grey
-
-
-@pytest.fixture(scope="session", name="grey_samples")
-def _grey_samples() -> Callable[..., BrdfSamples]:
-    return grey_samples
-
-
-@pytest.fixture(scope="session")
-def truth() -> dict[str, float]:
-    """The values of the numbers that `grey` leaves free."""
-    return {key: GREY[key] for key in FREE}
 
 
 @pytest.fixture

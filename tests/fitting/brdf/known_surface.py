@@ -44,3 +44,17 @@ def search_from(start: Sequence[float]) -> Callable:
         return Minima(unit, np.zeros(1), np.ones(1, bool))
 
     return search
+
+
+def noisy(rho: np.ndarray, seed: int) -> BrdfSamples:
+    """Samples of the values `rho` (200, 3) along `arcs` with normal noise of 1 %, which is known."""
+    sigma = 0.01 * rho
+    return arcs(np.abs(rho + sigma * np.random.default_rng(seed).standard_normal(rho.shape)), sigma)
+
+
+def from_all_sides(channels: tuple[str, ...]) -> BrdfSamples:
+    """60 directions at incidences around the normal."""
+    rng = np.random.default_rng(5)
+    theta_i, phi_i = rng.uniform(10, 50, 60), rng.uniform(0, 360, 60)
+    theta_o, phi_o = np.abs(theta_i + rng.uniform(-15, 15, 60)), phi_i + 180 + rng.uniform(-20, 20, 60)
+    return BrdfSamples(theta_i, phi_i, theta_o, phi_o, np.ones((60, len(channels))), channels)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -15,30 +14,19 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting import estimates as shared
 from pellicle.fitting.brdf import fit as module
 from pellicle.fitting.brdf.fit import fit
-from pellicle.fitting.brdf.problem import make
-from pellicle.fitting.brdf.summary import BrdfMeasurements
-from pellicle.fitting.conclusion import Conclusion, conclude, linearised
-from pellicle.fitting.discrepancy import discrepancy
-from pellicle.fitting.minima import minima
+from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Status
-from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
-from .known_surface import search_from
+from .conftest import GREY
+from .known_surface import from_all_sides, search_from
 
-TRUTH = {
-    "thickness": 320.0,
-    "n": (1.5,),
-    "exponent_reflection": 60.0,
-    "exponent_transmission": 1000.0,
-    "deviation": 0.0,
-    "azimuth": 0.0,
-    "specular": 1.5,
-    "diffuse": 0.3,
-    "wavelengths": (550.0,),
-}
+pytestmark = pytest.mark.slow  # compiles for seconds
+
+TRUTH = GREY | {"n": (1.5,), "exponent_transmission": 1000.0, "diffuse": 0.3, "wavelengths": (550.0,)}
 BOUNDS = {"exponent_transmission": (1.0, 1000.0), "deviation": (0.0, 20.0), "specular": (0.0, 100.0)}
 FREE = {key: Free(lower, upper) for key, (lower, upper) in BOUNDS.items()}
 FIXED = {key: x for key, x in TRUTH.items() if key not in (*FREE, "wavelengths")}
@@ -62,24 +50,12 @@ def simulated():
     return samples, rho
 
 
-class Judged(NamedTuple):
-    ranked: RankedMinima
-    conclusion: Conclusion
-
-
 @pytest.fixture(scope="module")
-def judged(simulated) -> Judged:
-    """The minimum below one start, without a search, and what is concluded from it."""
-    samples, _ = simulated
-    problem = make([samples], [""], SURFACE, [pl.plan(SURFACE, directions=samples)], "linear")
-    result = minima(problem, np.full((1, 3), 0.3))
-    assert result.converged[0]
-    ranked = rank(problem, result)
-    jacobian, errors = linearised(ranked)
-    found = discrepancy(
-        BrdfMeasurements([samples], SURFACE, ranked).evidence(jacobian), jacobian, ranked.minima.units[0]
-    )
-    return Judged(ranked, conclude(ranked, jacobian, errors, found, misfit=False, fixed=[], scans={}))
+def judged(simulated):
+    """The fit below one start, without a search, and its minima."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "search", search_from([0.3] * 3))
+        return module.fitted(simulated[0], SURFACE, 0.0, quiet)
 
 
 def profile(simulated, name):
@@ -100,11 +76,10 @@ def profile(simulated, name):
     return chi2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "side"), [("deviation", 1), ("exponent_transmission", -1)])
 def test_a_limit_is_where_the_profile_has_risen(simulated, judged, name, side):
-    p, chi2 = judged.conclusion.parameters[name], profile(simulated, name)
-    [view_fit] = judged.ranked.fits
+    p, chi2 = judged[0][name], profile(simulated, name)
+    [view_fit] = judged[1].fits
     assert math.isfinite(p.stderr)
     best = chi2(p.value)
     end = BOUNDS[name][int(side > 0)]
@@ -118,15 +93,10 @@ def test_a_limit_is_where_the_profile_has_risen(simulated, judged, name, side):
 @pytest.fixture(scope="module")
 def turned():
     """A deviation of 8 degrees at an azimuth of 60, seen at incidences around the normal."""
-    rng = np.random.default_rng(5)
-    theta_i, phi_i = rng.uniform(10, 50, 60), rng.uniform(0, 360, 60)
-    theta_o, phi_o = theta_i + rng.uniform(-15, 15, 60), phi_i + 180 + rng.uniform(-20, 20, 60)
     surface = Surface("granier-heidrich", {**FIXED, "deviation": 8.0, "azimuth": 60.0, **WIDE}, (550.0,))
-    directions = BrdfSamples(theta_i, phi_i, np.abs(theta_o), phi_o, np.ones((60, 1)), ("value",))
-    return pl.simulate(surface, directions=directions, noise=0.01)
+    return pl.simulate(surface, directions=from_all_sides(("value",)), noise=0.01)
 
 
-@pytest.mark.slow  # compiles for 3 s; the other limits are profiles of the same fit
 @pytest.mark.parametrize(
     ("tilt", "azimuth", "stderr"),
     [
@@ -151,7 +121,6 @@ def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     assert (estimate.lower_limit, estimate.upper_limit, estimate.at_bound) == (None, None, False)
 
 
-@pytest.mark.slow
 def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     """Values of another shape altogether, with a σ that no model can reach: errors of the noise are those of
     the covariance, and residuals enlarge them."""
@@ -159,7 +128,7 @@ def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
     monkeypatch.setattr(module, "search", search_from([0.3] * 3))
     monkeypatch.setattr(shared, "limits", lambda around, scans: pytest.fail("a profile was made"))
-    result, ranked = module.fitted(off, SURFACE, 0.0, lambda *report: None)
+    result, ranked = module.fitted(off, SURFACE, 0.0, quiet)
     assert result.status is Status.MISFIT
     _, errors = linearised(ranked)
     for name in BOUNDS:

@@ -2,25 +2,29 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import pellicle as pl
 from pellicle.fitting.brdf.problem import in_plane, incoherent, linear_count, make, restricted, without_layer
-from pellicle.fitting.brdf.view import Local
+from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, Local, slope
 from pellicle.fitting.coordinates import Coordinates
 from pellicle.fitting.problem import Problem
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
+from ...differences import derivative
+from .conftest import TILTED, ones
+
 ARC = np.arange(10.0, 60.0)
 
 
 @pytest.fixture
-def problem(ones, tilted):
+def problem():
     """Return the problem of 50 samples at an incidence of 30 degrees, and of any surface."""
 
-    def build(flat: bool = False, surface: Surface = tilted, residual: str = "linear", **options) -> Problem:
+    def build(flat: bool = False, surface: Surface = TILTED, residual: str = "linear", **options) -> Problem:
         data = ones(30.0, 0.0, ARC, 180.0 if flat else np.arange(100.0, 150.0), **options)
         return make([data], [""], surface, [pl.plan(surface, directions=data)], residual)
 
@@ -78,14 +82,14 @@ def test_a_tilt_is_searched_in_a_disc_and_in_one_plane_in_half_of_it(problem, fl
 @pytest.mark.parametrize(
     "changed", [{"deviation": Free(1, 20)}, {"azimuth": Free(0, 180)}, {"azimuth": 10.0}, {"deviation": 5.0}]
 )
-def test_only_a_whole_disc_is_searched_as_one(problem, tilted, changed):
-    surface = dataclasses.replace(tilted, numbers={**tilted.numbers, **changed})
+def test_only_a_whole_disc_is_searched_as_one(problem, changed):
+    surface = dataclasses.replace(TILTED, numbers={**TILTED.numbers, **changed})
     built = problem(surface=surface)
     assert built.coordinates.tilt is None
     assert not any(p.periodic for p in built.parameters)
 
 
-def test_samples_in_one_plane(ones):
+def test_samples_in_one_plane():
     arc = [10.0, 40.0, 80.0]
     assert in_plane(ones(30.0, 0.0, arc, [0.0, 180.0, 180.0]))
     assert in_plane(ones(30.0, 25.0, arc, [25.0, 205.0, 205.0]))
@@ -94,13 +98,13 @@ def test_samples_in_one_plane(ones):
     assert not in_plane(ones(30.0, [0.0, 45.0, 90.0], arc, [180.0, 225.0, 270.0]))
 
 
-def test_sets_in_two_planes_see_the_sign_of_a_tilt(ones, tilted):
+def test_sets_in_two_planes_see_the_sign_of_a_tilt():
     """Each set is in a plane, but together they are not."""
     sets = [ones(30.0, phi, ARC, phi + 180.0) for phi in (0.0, 90.0)]
     assert all(in_plane(each) for each in sets)
-    plans = [pl.plan(tilted, directions=each) for each in sets]
+    plans = [pl.plan(TILTED, directions=each) for each in sets]
     for data, folded in ((sets[:1] * 2, True), (sets, False)):
-        assert make(data, ["a", "b"], tilted, plans, "linear").coordinates.folded == folded
+        assert make(data, ["a", "b"], TILTED, plans, "linear").coordinates.folded == folded
 
 
 def local(problem: Problem) -> Local:
@@ -157,3 +161,21 @@ def test_weights_are_those_of_the_compared_numbers(problem, residual):
     assert (bare.noise.given, view.noise.given) == (False, True)
     np.testing.assert_array_equal(bare.samples.weight[: bare.rows], 1.0)
     np.testing.assert_array_equal(bare.samples.weight[bare.rows :], 0.0)
+
+
+RHO, COSINE, FLOOR = np.array([0.0, 0.3, 40.0]), np.array([1.0, 0.5, 0.2]), 1e-3
+EXPECTED = {
+    "linear": RHO,
+    "cosine": RHO * COSINE,
+    "log": np.log(1 + RHO * COSINE),
+    "cube-root": (RHO + FLOOR) ** (1 / 3),
+}
+
+
+@pytest.mark.parametrize("name", RESIDUALS)
+def test_residuals_by_name(name):
+    transform = RESIDUALS[name]
+    np.testing.assert_allclose(transform(RHO, COSINE, FLOOR), EXPECTED[name], rtol=1e-12)
+    np.testing.assert_allclose(INVERSES[name](EXPECTED[name], COSINE, FLOOR), RHO, atol=1e-12)
+    expected = derivative(lambda rho: transform(rho, COSINE, FLOOR), RHO, 1e-6)
+    np.testing.assert_allclose(slope(transform, jnp.asarray(RHO), COSINE, FLOOR), expected, rtol=1e-5)

@@ -1,6 +1,7 @@
 """Rounds of the search: what is drawn anew, what is kept, and when it stops. Programs are replaced."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -14,16 +15,18 @@ from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import quiet
 from pellicle.scene.surface import Surface
 
+from .conftest import TILTED, ones
+
 FEW = Effort(candidates=6, short=4, starts=2)
 LOBES = slice(2, 4)
 """Exponent and deviation, after thickness and index."""
 
 
 @pytest.fixture
-def grey(ones, tilted) -> Problem:
+def grey() -> Problem:
     """A problem of five numbers, the last one a weight."""
     free = ("thickness", "n", "exponent_reflection", "deviation", "specular")
-    surface = Surface("granier-heidrich", {key: tilted.numbers[key] for key in free}, (550.0,))
+    surface = Surface("granier-heidrich", {key: TILTED.numbers[key] for key in free}, (550.0,))
     data = ones(30.0, 0.0, np.arange(10.0, 60.0), 180.0, ("value",))
     return make([data], [""], surface, [pl.plan(surface, directions=data)], "linear")
 
@@ -32,13 +35,14 @@ class Programs:
     """Replaced programs: χ² is what `rule` says of a candidate, and polishing leaves it where it is."""
 
     def __init__(self, monkeypatch, rule):
-        self.rule, self.scanned, self.short, self.final = rule, [], [], []
+        self.rule, self.scanned, self.seen, self.short, self.final = rule, [], [], [], []
         monkeypatch.setattr(module, "scan", self.scan)
         monkeypatch.setattr(module, "solve", self.solve)
         monkeypatch.setattr(module, "minima", self.minima)
 
     def scan(self, static, samples, fixed, box, units):
         self.scanned.append(units)
+        self.seen.append(samples)
         return Candidates(self.rule(units), np.full((len(units), 1), 0.1))
 
     def solve(self, few, starts, *, steps):
@@ -67,20 +71,21 @@ def test_later_rounds_keep_the_lobes_and_draw_the_fringes(grey, monkeypatch):
     np.testing.assert_array_equal(second[:, LOBES], np.resize(shorts, (6, 4))[:, LOBES])
 
 
-def test_rounds_end_with_one_that_gains_nothing(grey, monkeypatch):
-    programs = Programs(monkeypatch, lambda units: np.ones(len(units)))
-    search(grey, FEW, quiet)
-    assert len(programs.scanned) == 2
-    better = iter(range(1, 99))
-    halving = Programs(monkeypatch, lambda units: np.full(len(units), 0.5 ** next(better)))
-    search(grey, FEW, quiet)
-    assert len(halving.scanned) == 4  # at most
+def halving():
+    better = itertools.count(1)
+    return lambda units: np.full(len(units), 0.5 ** next(better))
 
 
-def test_without_a_short_polish_there_is_one_round(grey, monkeypatch):
-    programs = Programs(monkeypatch, distance)
-    search(grey, FEW._replace(short=0), quiet)
-    assert (len(programs.scanned), len(programs.short)) == (1, 0)
+@pytest.mark.parametrize(
+    ("rule", "short", "rounds"),
+    # at most four, the last of which gains nothing, and one without a short polish
+    [(lambda units: np.ones(len(units)), 4, 2), (halving(), 4, 4), (distance, 0, 1)],
+)
+def test_rounds_end_with_one_that_gains_nothing(grey, monkeypatch, rule, short, rounds):
+    programs = Programs(monkeypatch, rule)
+    search(grey, FEW._replace(short=short), quiet)
+    assert len(programs.scanned) == rounds
+    assert bool(programs.short) == bool(short)
 
 
 def test_the_last_starts_are_the_best_of_all_rounds_two_nanometres_apart(grey, monkeypatch):
@@ -106,14 +111,7 @@ def test_starts_of_one_thickness_are_filled_up_with_the_next_best(grey, monkeypa
 def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
     """150 of several views, from the darkest to the brightest, some twice where there are fewer. Few of one
     view stay as they are, so that its polish and the scan share their shapes."""
-    views = []
-
-    def watched(static, samples, fixed, box, units):
-        views.append(samples)
-        return Candidates(np.ones(len(units)), np.full((len(units), 1), 0.1))
-
-    Programs(monkeypatch, distance)
-    monkeypatch.setattr(module, "scan", watched)
+    programs = Programs(monkeypatch, distance)
     [view] = grey.views
     weight = np.array(view.samples.weight)
     weight[10:20] = 0.0  # held out
@@ -123,7 +121,7 @@ def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
         values[: view.rows, 0] = own * view.rows + np.arange(view.rows)
         several.append(dataclasses.replace(view, samples=view.samples._replace(weight=weight, values=values)))
     search(grey._replace(views=tuple(several)), FEW, quiet)
-    chosen = views[0]
+    chosen = programs.seen[0]
     if count == 1:
         assert chosen is several[0].samples
         return
@@ -136,9 +134,19 @@ def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
     assert count == 4 or len(seen) == len(fitted)
 
 
-def test_candidates_of_a_channel_are_near_those_of_the_first(ones, tilted):
-    data = ones(30.0, 0.0, np.arange(10.0, 60.0), np.arange(100.0, 150.0))
-    problem = make([data], [""], tilted, [pl.plan(tilted, directions=data)], "linear")
+def tilted(phi_o) -> Problem:
+    data = ones(30.0, 0.0, np.arange(10.0, 60.0), phi_o)
+    return make([data], [""], TILTED, [pl.plan(TILTED, directions=data)], "linear")
+
+
+def test_folded_candidates_are_even_in_the_tilt_out_of_the_plane():
+    """Uniform in y, where the coordinate is y²: a third of them below y = 1/3."""
+    drawn = candidates(tilted(180.0), 3000)[:, 6]
+    assert np.mean(drawn < 1 / 9) == pytest.approx(1 / 3, abs=0.03)
+
+
+def test_candidates_of_a_channel_are_near_those_of_the_first():
+    problem = tilted(np.arange(100.0, 150.0))
     drawn = candidates(problem, 500, seed=3)
     assert drawn.shape == (500, 7)
     assert ((drawn >= 0) & (drawn <= 1)).all()
@@ -148,11 +156,3 @@ def test_candidates_of_a_channel_are_near_those_of_the_first(ones, tilted):
     assert apart.max() > 0.09
     np.testing.assert_array_equal(drawn, candidates(problem, 500, seed=3))
     assert not np.array_equal(drawn, candidates(problem, 500))
-
-
-def test_folded_candidates_are_even_in_the_tilt_out_of_the_plane(ones, tilted):
-    """Uniform in y, where the coordinate is y²: a third of them below y = 1/3."""
-    data = ones(30.0, 0.0, np.arange(10.0, 60.0), 180.0)
-    problem = make([data], [""], tilted, [pl.plan(tilted, directions=data)], "linear")
-    drawn = candidates(problem, 3000)[:, 6]
-    assert np.mean(drawn < 1 / 9) == pytest.approx(1 / 3, abs=0.03)

@@ -105,13 +105,7 @@ CASES = {
 
 def evaluations(scene: pl.Scene):
     """Deviance of candidates, and their residuals with the Jacobian, compiled."""
-    wavelength = np.linspace(400.0, 900.0, POINTS)
-    if scene.light.signal == "R":
-        data = pl.Spectrum(wavelength, np.full(POINTS, 0.3), "R")
-    else:
-        delta, angle = np.full(POINTS, 120.0), np.full(POINTS, scene.light.angle)
-        data = pl.Spectrum(wavelength, np.full(POINTS, 30.0), "psi-delta", delta=delta, angle=angle)
-    problem = make(measured(data, scene))
+    problem = make(measured(pl.simulate(scene, np.linspace(400.0, 900.0, POINTS)), scene))
     [view] = problem.views
     size = len(problem.parameters)
     at = np.asarray(problem.values(np.random.default_rng(1).uniform(0.1, 0.9, (CANDIDATES, size))))

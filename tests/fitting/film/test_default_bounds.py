@@ -35,9 +35,7 @@ def test_default_bounds_are_widened_where_the_data_want_it(film, measured, n, lo
     assert abs(fit["n"].value - n) < 4 * fit["n"].stderr
     assert abs(fit["thickness"].value - 430.0) < 4 * fit["thickness"].stderr
     [warning] = said(fit, "widened")
-    assert (
-        f"n were widened from {lower:g} ... {upper:g} to {fit['n'].lower:g} ... {fit['n'].upper:g}" in warning
-    )
+    assert f"n were widened from {lower:g} ... {upper:g} to {fit['n'].lower:g} ..." in warning
     [_, (_, free)] = sorted(free_leaves(fit.scene), key=lambda pair: pair[1].limits is not None)
     assert (free.lower, free.upper) == (fit["n"].lower, fit["n"].upper)
 
@@ -74,12 +72,9 @@ def test_where_the_data_do_not_want_it_a_bound_is_a_remark(film, measured):
         assert fit.status is pl.Status.CONVERGED
         assert fit["n"].upper == 1.46
         assert not said(fit, "widened")
-        found.append(
-            bool(said(fit, "n rests on 1.46, a default bound: wider ones explain the data no better"))
-        )
+        found.append(bool(said(fit, "n rests on 1.46, a default bound: wider ones explain the data no")))
         assert found[-1] == (fit["n"].value == 1.46)
-    assert any(found)
-    assert not all(found)
+    assert set(found) == {True, False}
 
 
 @pytest.mark.slow
@@ -98,13 +93,8 @@ def test_a_joint_fit_is_widened_as_one(film, measured):
 
 
 def test_limits_make_no_new_program(film):
-    marked, plain = (
-        jax.tree_util.tree_structure(anonymous(film(material=m)))
-        for m in (constant(1.2, 1.4), constant(1.2, 1.4, None))
-    )
+    media = constant(1.2, 1.4), constant(1.2, 1.4, None)
+    marked, plain = (jax.tree_util.tree_structure(anonymous(film(material=m))) for m in media)
     assert marked == plain
-
-
-def test_bounds_outside_their_limits_are_refused():
     with pytest.raises(ValueError, match=r"bounds 0\.5 to 2 are outside 1 to 6"):
         pl.Free(0.5, 2.0, limits=INDEX)

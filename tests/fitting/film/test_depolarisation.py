@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.data.repeated_sweeps import mean_spectrum
@@ -13,9 +12,11 @@ from pellicle.fitting.comparison import compare
 from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import quiet
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.result import predictions
-from pellicle.signals.sphere import psi_delta
+
+from ...by_tmm import psi_delta, stokes
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)
 SILICON = np.asarray(pl.refractive_index(WAVELENGTH, "Si"))
@@ -27,17 +28,12 @@ PSI, DELTA, SHARE = 0.05, 0.1, 0.003
 
 def averaged(thickness: float, spread: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ψ, Δ and depolarisation at 70° of a film of index 1.46 on silicon, of normal thicknesses: Stokes sums
-    of tmm (S. J. Byrnes, arXiv:1603.02720), averaged with Gauss and Hermite's nodes."""
+    of tmm, averaged with Gauss and Hermite's nodes."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
-    sums = np.zeros((WAVELENGTH.size, 4))
-    for node, weight in zip(nodes, weights / weights.sum(), strict=True):
-        layers = [np.inf, thickness + node * spread, np.inf]
-        for row, nm, index in zip(sums, WAVELENGTH, SILICON, strict=True):
-            s, p = (tmm.coh_tmm(x, [1, 1.46, index], layers, np.deg2rad(70.0), nm)["r"] for x in "sp")
-            cross, ss, pp = 2 * np.conj(p) * s, abs(s) ** 2, abs(p) ** 2
-            row += weight * np.array([ss - pp, cross.real, cross.imag, ss + pp])
+    each = [stokes(WAVELENGTH, [1, 1.46, SILICON], [thickness + node * spread], 70.0) for node in nodes]
+    sums = np.average(each, axis=0, weights=weights)
     ncs = sums[:, :3] / sums[:, 3:]
-    return *psi_delta(ncs), 1 - np.sum(ncs**2, axis=1)
+    return *psi_delta(*ncs.T), 1 - np.sum(ncs**2, axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +64,8 @@ WIDTH = pl.Free(0, 30)
 
 
 @pytest.fixture(scope="module")
-def ranked(measured) -> tuple[pl.Fit, Problem]:
-    fit, found = fitted(measured, scene(WIDTH), 0.0, lambda *_: None)
-    return fit, found.problem
+def ranked(measured) -> tuple[pl.Fit, RankedMinima]:
+    return fitted(measured, scene(WIDTH), 0.0, quiet)
 
 
 @pytest.fixture(scope="module")
@@ -91,31 +86,24 @@ def bounds() -> list[np.ndarray]:
     return [np.sqrt(np.diag(np.linalg.inv(own))) for own in information]
 
 
-def is_at_the_bound(fit: pl.Fit, bound: np.ndarray) -> None:
-    """Thickness and spread are found, with the least standard errors."""
-    assert fit.status == "converged"
-    assert 0.7 < fit.chi2_reduced < 1.4
-    for name, truth, least in zip(("thickness", SPREADS), (THICKNESS, SPREAD), bound, strict=True):
-        assert fit[name].stderr_noise == pytest.approx(least, rel=0.05)
-        assert abs(fit[name].value - truth) < 4 * least
-
-
 @pytest.mark.slow
 def test_the_spread_is_better_determined(together, measured):
     """By as much as the bound of Cramér and Rao says."""
     psi_and_delta, all_three = bounds()
-    is_at_the_bound(together, all_three)
+    assert together.status == "converged"
+    assert 0.7 < together.chi2_reduced < 1.4
+    for name, truth, least in zip(("thickness", SPREADS), (THICKNESS, SPREAD), all_three, strict=True):
+        assert together[name].stderr_noise == pytest.approx(least, rel=0.05)
+        assert abs(together[name].value - truth) < 4 * least
     assert together[SPREADS].stderr_noise < 0.75 * psi_and_delta[1]
     np.testing.assert_array_equal(together.curve.depolarisation_data, measured.depolarisation)
     assert np.std(together.curve.depolarisation_residual) == pytest.approx(SHARE, rel=0.2)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("unknown", ["psi and delta", "depolarisation"])
+@pytest.mark.parametrize("unknown", [("sigma", "delta_sigma"), ("depolarisation_sigma",)])
 def test_a_noise_that_is_not_given_is_that_of_its_own_residuals(measured, together, unknown):
-    angles = {} if unknown == "depolarisation" else {"sigma": None, "delta_sigma": None}
-    share = {} if unknown == "psi and delta" else {"depolarisation_sigma": None}
-    fit = pl.fit(replace(measured, **angles, **share), scene(WIDTH))
+    fit = pl.fit(replace(measured, **dict.fromkeys(unknown)), scene(WIDTH))
     assert fit.status == "converged"
     assert abs(fit[SPREADS].value - SPREAD) < 4 * together[SPREADS].stderr_noise
     # residuals that set the noise also count as correlated, here by chance
@@ -167,7 +155,7 @@ def test_noise_alone_is_no_depolarisation(measured):
 @pytest.mark.slow
 def test_predictions(ranked):
     """Of a posterior at one point: the curves of the fit, and noise of σ."""
-    fit, problem = ranked
+    fit, problem = ranked[0], ranked[1].problem
     affine = problem.affine()
     units = np.array([(p.value - p.lower) / (p.upper - p.lower) for p in fit.free])
     psi, delta, share = predictions(affine, fit.parts, np.tile(units, (4, 4, 1)), 0)
@@ -211,7 +199,7 @@ def test_noise_of_a_simulated_depolarisation():
 def test_effects_depolarise(ranked, measured):
     """A bandwidth that the scene leaves out, against a simulation that has it: of its own size, times the
     root mean square of a half-normal prior on the variance."""
-    _, problem = ranked
+    problem = ranked[1].problem
     [view], values = problem.views, np.array([THICKNESS, SPREAD])
     allowed = scene(WIDTH)
     allowed = replace(allowed, uncertainty=replace(pl.Uncertainty.none(), bandwidth=0.5))

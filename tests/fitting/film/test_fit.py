@@ -1,6 +1,6 @@
-"""Simulated and fitted again: the truth comes back within its errors, for every kind of scene."""
+"""Simulated and fitted again: the truth comes back within its errors, for scenes of every kind."""
 
-import time
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -8,7 +8,10 @@ import pytest
 
 import pellicle as pl
 from pellicle.dispersion import Constant
+from pellicle.effects.film_plan import exact
+from pellicle.effects.removal import FilmRemoval
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film import fit as fitting
 from pellicle.scene.free import free_leaves
 from pellicle.simulation.spectra import simulate_signal
 
@@ -24,23 +27,31 @@ def agrees(fit, truth, sigmas=4.0):
         assert estimate.stderr < 0.1 * (estimate.upper - estimate.lower), (name, estimate)
 
 
+THREE = {"n": 1.72, "k": 0.03, "thickness": 480.0}
+WINDOW = pl.Instrument(bandwidth=pl.Free(0.0, 40.0))
+CASES = {
+    "R": ({"material": Constant(N, K), "substrate": Constant(1.5)}, THREE, {}),
+    "T": (
+        {"material": Constant(N, K), "substrate": Constant(1.5), "light": pl.Light(signal="T")},
+        THREE,
+        {"transmission"},
+    ),
+    "bandwidth": ({"instrument": WINDOW}, {"thickness": 900.0, "instrument.bandwidth": 25.0}, {"coherence"}),
+    "no thickness": ({"thickness": 480.0, "material": Constant(N, K)}, {"n": 1.6, "k": 0.02}, {}),
+}
+
+
 @pytest.mark.slow  # compiles for 5 s each; test_search.py recovers thickness and n
-@pytest.mark.parametrize("signal", ["R", "T"])
-def test_thickness_n_and_k(film, measured, signal):
-    scene = film(material=Constant(N, K), substrate=Constant(1.5), light=pl.Light(signal=signal))
-    fit = pl.fit(measured(scene, 1.72, 0.03, 480.0, noise=0.002), scene)
-    agrees(fit, {"n": 1.72, "k": 0.03, "thickness": 480.0})
+@pytest.mark.parametrize("name", CASES)
+def test_the_truth_comes_back(film, measured, name):
+    described, truth, effects = CASES[name]
+    scene = film(**described)
+    fit = pl.fit(measured(scene, *truth.values(), noise=0.002), scene)
+    agrees(fit, truth)
     assert fit.rms == pytest.approx(0.002, rel=0.2)
     assert fit["thickness"].unit == "nm"
-    assert fit.plan.on("transmission") == (signal == "T")
-
-
-@pytest.mark.slow  # compiles a fit of its own
-def test_angles_of_the_spectrum_go_before_those_of_the_scene(film, measured):
-    data = measured(film(light=pl.Light(angle=60.0, polarisation="s")), 480.0)
-    angle = np.full(len(data), 60.0)
-    stated = pl.Spectrum(data.wavelength, data.values, "R", polarisation="s", angle=angle)
-    agrees(pl.fit(stated, film()), {"thickness": 480.0})
+    assert {effect for effect in ("transmission", "coherence") if fit.plan.on(effect)} == set(effects)
+    assert (fit.profile is None) == (not fit["thickness"].free) == ("thickness" not in truth)
 
 
 @pytest.mark.slow  # compiles a scene of its own
@@ -53,14 +64,6 @@ def test_a_plate_with_its_back_face(film, measured):
     dark = film(substrate=pl.Substrate(Constant(3.9, 0.02), "air", 1.0))
     opaque = pl.fit(measured(dark, 480.0), dark)
     assert "The back face makes no difference here" in opaque.verdict
-
-
-@pytest.mark.slow  # compiles a scene of its own
-def test_a_free_bandwidth(film, measured):
-    scene = film(instrument=pl.Instrument(bandwidth=pl.Free(0.0, 40.0)))
-    fit = pl.fit(measured(scene, 900.0, 25.0), scene)
-    agrees(fit, {"thickness": 900.0, "instrument.bandwidth": 25.0})
-    assert fit.plan.on("coherence")
 
 
 def test_a_prior_pulls_and_sharpens(film, measured):
@@ -94,12 +97,9 @@ def test_float32_and_the_callers_setting(film, measured):
     assert pl.fit(single, film())["thickness"].value == pytest.approx(480, abs=0.5)
 
 
-def test_nothing_free(film, measured):
+def test_nothing_to_fit(film, measured):
     with pytest.raises(UsageError, match="nothing is free"):
         pl.fit(measured(film(), 480.0), film(480.0))
-
-
-def test_one_point_is_no_spectrum(film):
     with pytest.raises(DataError, match=r"spot\.csv: holds one point of R"):
         pl.fit(pl.Spectrum(np.array([550.0]), np.array([0.2]), "R", path="spot.csv"), film())
 
@@ -130,23 +130,11 @@ def test_an_index_near_a_table_over_its_whole_range():
     assert f"n is added to the index of HfO2; the sum is {total:.4g} at 575 nm" in fit.warnings
 
 
-@pytest.mark.slow  # compiles a fit of its own
-def test_a_scene_without_a_free_thickness(film, measured):
-    scene = film(480.0, Constant(N, K))
-    fit = pl.fit(measured(scene, 1.6, 0.02), scene)
-    agrees(fit, {"n": 1.6, "k": 0.02})
-    assert fit.profile is None
-    assert not fit["thickness"].free
-    assert fit["thickness"].value == 480
-
-
 def test_the_record(film, measured):
     """What a fit returns beside the parameters."""
     scene = film(material=Constant(N))
     data = measured(scene, 1.5, 480.0, sigma=True)
-    began = time.perf_counter()
     fit = pl.fit(data, scene)
-    elapsed = time.perf_counter() - began
     assert fit.free[0].name == "thickness"
     assert len(free_leaves(scene)) == len(fit.free)
     assert fit.curve.wavelength.shape == fit.curve.model.shape == (128,)
@@ -160,7 +148,7 @@ def test_the_record(film, measured):
     best = fit.profile.delta_chi2.argmin()
     assert abs(fit.profile.thickness[best] - 480) < 40
     assert fit.spectrum is data
-    assert 0 < fit.seconds <= elapsed
+    assert fit.seconds > 0
 
 
 def test_rivals_cost_what_a_fit_there_costs(film, measured):
@@ -192,3 +180,85 @@ def test_a_shift_of_the_wavelengths(film):
     agrees(fit, {"thickness": 480.0, "instrument.wavelength_shift": 3.0})
     assert fit["instrument.wavelength_shift"].unit == "nm"
     assert abs(pl.fit(pl.Spectrum(nm, seen, "R"), film(substrate="Si"))["thickness"].value - 480) > 1
+
+
+SAMPLED = np.linspace(400.0, 900.0, 192)
+STACK_NOISE = 0.003
+
+
+def stack(oxide, nitride, **options) -> pl.Scene:
+    layers = [pl.Layer("SiO2", oxide, "oxide"), pl.Layer("Si3N4/Vogt-2.09", nitride, "nitride")]
+    return pl.Scene(layers, "Si", **options)
+
+
+@pytest.mark.slow  # fits of two layers; test_compiled_operations.py has their programs
+def test_both_thicknesses_come_out():
+    """Through a spectrometer's window, which a stack takes by quadrature."""
+    instrument = pl.Instrument(bandwidth=4.0)
+    truth = {"oxide.thickness": 350.0, "nitride.thickness": 120.0}
+    values = simulate_signal(stack(350.0, 120.0, instrument=instrument), SAMPLED, STACK_NOISE, 1).values
+    spectrum = pl.Spectrum(SAMPLED, values, "R", sigma=np.full(SAMPLED.size, STACK_NOISE))
+    free = stack(pl.Free(150, 550), pl.Free(30, 230), instrument=instrument)
+    found = pl.fit(spectrum, free)
+    assert found.status == "converged"
+    for name, value in truth.items():
+        assert abs(found[name].value - value) < 4 * found[name].stderr_noise < 1.0
+    assert found.plan.on("stack")
+
+
+@pytest.mark.slow
+def test_quadrature_equals_the_series_for_a_layer_split_in_two():
+    """Two halves of one layer are a stack; the whole of it is a series. The window must be the same."""
+    instrument = pl.Instrument(bandwidth=5.0)
+    whole = pl.Scene(pl.Layer("SiO2", 1500.0), "Si", instrument=instrument)
+    halves = pl.Scene([pl.Layer("SiO2", 700.0), pl.Layer("SiO2", 800.0)], "Si", instrument=instrument)
+    a, b = simulate_signal(whole, SAMPLED).clean, simulate_signal(halves, SAMPLED).clean
+    none = simulate_signal(pl.Scene(pl.Layer("SiO2", 1500.0), "Si"), SAMPLED).clean
+    # the series takes the amplitudes at the centre of the window, the quadrature across it
+    assert np.max(np.abs(a - b)) < 1e-3 < 0.01 < np.max(np.abs(none - b))
+
+
+NM = np.linspace(450.0, 850.0, 41)
+SMALL = 1e-3
+
+
+def absorbing(extinction):
+    layer = pl.Layer(1.46 + 1j * extinction, pl.Free(150, 350, start=237.0))
+    return pl.Scene(layer, 3.9 + 0.02j)
+
+
+def spectrum(thing):
+    values = simulate_signal(thing, NM, SMALL, seed=1).values
+    return pl.Spectrum(NM, values, "R", np.full(NM.shape, SMALL))
+
+
+@pytest.mark.slow  # two fits of a cone of light
+def test_a_fit_leaves_out_what_the_tolerance_allows():
+    thing = absorbing(1e-6)
+    data = spectrum(thing)
+    whole, cheap = (pl.fit(data, thing, tolerance=t) for t in (0.0, 1e-3))
+    assert not cheap.plan.on("absorption")
+    assert cheap.plan.on("precision")
+    assert cheap.plan.error_bound <= 1e-3
+    (exactly,), (nearly,) = whole.free, cheap.free
+    assert abs(exactly.value - nearly.value) < 0.1 * exactly.stderr
+    assert cheap.warnings == whole.warnings
+
+
+@pytest.mark.slow  # two fits of different plans
+def test_a_fit_beyond_its_tolerance_is_done_again(monkeypatch):
+    """As where the design of the plan missed the place that the best fit is at."""
+    thing = absorbing(0.05)
+    data = spectrum(thing)
+
+    def careless(absorbing, tolerance, keep):
+        return replace(exact(absorbing), left_out=(FilmRemoval("absorption"),), tolerance=tolerance)
+
+    monkeypatch.setattr(
+        "pellicle.fitting.film.problem.plan", lambda s, t, k: careless(s, t, k) if t else exact(s)
+    )
+    found = fitting.fit(data, thing, tolerance=1e-3)
+    assert found.plan.on("absorption")
+    assert "fitted again with every effect" in found.warnings[0]
+    (thickness,) = found.free
+    assert thickness.value == pytest.approx(237.0, abs=4 * thickness.stderr)

@@ -58,12 +58,9 @@ def test_vmapped_fits_agree_with_a_loop_of_fits(spectra, programs):
     assert found.values.shape == (3, 2, 2)
     assert found.deviance.shape == found.converged.shape == found.steps.shape == (3, 2)
     assert found.converged.all()
-    at = problem.names.index("thickness")
     for spectrum, values in zip(spectra, found.values, strict=True):
         fit = pl.fit(spectrum, FREE)
-        expected = [fit[name].value for name in problem.names]
-        assert np.allclose(values[:, at], fit["thickness"].value, rtol=1e-6, atol=0)
-        assert np.allclose(values, expected, rtol=1e-5, atol=0)
+        assert np.allclose(values, [fit[name].value for name in problem.names], rtol=1e-5, atol=0)
 
 
 @pytest.mark.slow
@@ -99,13 +96,9 @@ def test_wrong_shapes_are_refused(spectra):
         problem.with_data(np.zeros(3))
     with pytest.raises(ValueError, match="2 parameters"):
         pl.fitting.solve(problem, [500.0, 1.5])
-    angles = pl.Light(angle=70.0, signal="psi-delta")
-    ellipsometry = pl.Scene(pl.Layer(1.5, 100.0), 3.9, light=angles)
-    psi = pl.fitting.prepare(
-        pl.simulate(ellipsometry, NM), pl.Scene(pl.Layer(1.5, pl.Free(50, 200)), 3.9, light=angles)
-    )
+    free = pl.Scene(FREE.layers, 3.9, light=pl.Light(angle=70.0, signal="psi-delta"))
     with pytest.raises(UsageError, match="prepare and stack"):
-        psi.with_data(np.zeros(120))
+        pl.fitting.prepare(pl.simulate(free, NM), free).with_data(np.zeros(120))
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
@@ -21,6 +20,8 @@ from pellicle.reporting.measured_text import describe
 from pellicle.signals.generalised import RATIOS, Generalised, block_frame, delta_sigma, upright
 from pellicle.signals.sphere import ncs, sphere_frame
 
+from ... import by_tmm
+
 SIGNAL = "generalised-psi-delta"
 
 NM = np.linspace(400.0, 800.0, 64)
@@ -31,31 +32,18 @@ NOISE = np.array([0.03, 0.06, 0.1])
 
 def film_ratios(thickness: float = THICKNESS) -> np.ndarray:
     """N, C, S of r_p/r_s, and of two ratios of 0, (points, 3, 3)."""
-    rows = []
-    for nm in NM:
-        rs, rp = (
-            tmm.coh_tmm(x, [1, INDEX, SUBSTRATE], [np.inf, thickness, np.inf], np.deg2rad(ANGLE), nm)["r"]
-            for x in "sp"
-        )
-        cross, both = 2 * np.conj(rp) * rs, abs(rs) ** 2 + abs(rp) ** 2
-        own = [(abs(rs) ** 2 - abs(rp) ** 2) / both, cross.real / both, cross.imag / both]
-        rows.append([own, [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    return np.array(rows)
-
-
-def spectrum(sphere: np.ndarray, with_sigma: bool = True, **more) -> pl.Spectrum:
-    n, c, s = np.moveaxis(sphere, -1, 0)
-    psi, delta = np.rad2deg(np.arctan2(np.hypot(c, s), n)) / 2, np.rad2deg(np.arctan2(s, c)) % 360
-    sigma = np.broadcast_to(NOISE, psi.shape) if with_sigma else None
-    error = delta_sigma(psi, sigma) if with_sigma else None
-    return pl.Spectrum(NM, psi, SIGNAL, sigma=sigma, delta=delta, delta_sigma=error, ratios=RATIOS, **more)
+    own = by_tmm.ncs(NM, [1, INDEX, SUBSTRATE], [thickness], ANGLE)
+    none = np.broadcast_to([1.0, 0.0, 0.0], own.shape)
+    return np.stack([own, none, none], axis=1)
 
 
 def data(with_sigma: bool = True) -> pl.Spectrum:
     """The film with a noise of 2σ in any direction on the sphere of each ratio."""
-    random = np.random.default_rng(4)
-    noise = 2 * np.deg2rad(NOISE)[:, None] * random.normal(size=(64, 3, 3))
-    return spectrum(film_ratios() + noise, with_sigma)
+    noise = 2 * np.deg2rad(NOISE)[:, None] * np.random.default_rng(4).normal(size=(64, 3, 3))
+    psi, delta = by_tmm.psi_delta(*np.moveaxis(film_ratios() + noise, -1, 0))
+    sigma = np.broadcast_to(NOISE, psi.shape) if with_sigma else None
+    error = delta_sigma(psi, sigma) if with_sigma else None
+    return pl.Spectrum(NM, psi, SIGNAL, sigma=sigma, delta=delta, delta_sigma=error, ratios=RATIOS)
 
 
 def scene(index: complex = INDEX) -> pl.Scene:
@@ -168,12 +156,7 @@ def test_offsets_are_changes_of_psi_and_delta():
     step = 1e-4
     allowed = replace(pl.Uncertainty.none(), psi=step, delta=2 * step)
     effects = Generalised(("ane", "aps")).offsets(ncs(psi, delta).reshape(1, -1), allowed)
-    names = [
-        "offset of psi of ane",
-        "offset of delta of ane",
-        "offset of psi of aps",
-        "offset of delta of aps",
-    ]
+    names = [f"offset of {angle} of {ratio}" for ratio in ("ane", "aps") for angle in ("psi", "delta")]
     assert [effect.name for effect in effects] == names
     for i, effect in enumerate(effects):
         ratio = np.array([[i // 2 == 0, i // 2 == 1]])

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import tmm
 
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
@@ -16,6 +15,8 @@ from pellicle.reporting.fit_tables import fit_csv
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
 
+from ...by_tmm import ncs
+
 NM = np.linspace(400.0, 800.0, 128)
 ANGLE, THICKNESS, INDEX, SUBSTRATE = 70.0, 180.0, 1.46, 3.9 + 0.02j
 ELEMENTS = ("m12", "m22", "m33", "m34", "m43")
@@ -24,25 +25,16 @@ NOISE = np.array([0.001, 0.002, 0.004, 0.002, 0.008])
 
 def measured(thickness: float = THICKNESS, seed: int = 3) -> pl.Spectrum:
     """Data without σ, whose elements have a noise of their own."""
-    rows = []
-    for nm in NM:
-        rs, rp = (
-            tmm.coh_tmm(x, [1, INDEX, SUBSTRATE], [np.inf, thickness, np.inf], np.deg2rad(ANGLE), nm)["r"]
-            for x in "sp"
-        )
-        both = abs(rs) ** 2 + abs(rp) ** 2
-        N, cross = (abs(rs) ** 2 - abs(rp) ** 2) / both, 2 * np.conj(rp) * rs / both
-        rows.append([-N, 1.0, cross.real, cross.imag, -cross.imag])
-    values = np.array(rows) + NOISE * np.random.default_rng(seed).normal(size=(len(NM), len(ELEMENTS)))
+    n, c, s = ncs(NM, [1, INDEX, SUBSTRATE], [thickness], ANGLE).T
+    values = np.stack([-n, np.ones(len(NM)), c, s, -s], axis=1)
+    values += NOISE * np.random.default_rng(seed).normal(size=values.shape)
     return pl.Spectrum(NM, values, "mueller", elements=ELEMENTS)
 
 
 def scene(index: complex = INDEX) -> pl.Scene:
     light = pl.Light(angle=ANGLE, signal="mueller")
-    return pl.Scene(pl.Layer(index, pl.Free(10, 500)), SUBSTRATE, light=light, uncertainty=NONE)
-
-
-NONE = pl.Uncertainty.none()
+    layer, none = pl.Layer(index, pl.Free(10, 500)), pl.Uncertainty.none()
+    return pl.Scene(layer, SUBSTRATE, light=light, uncertainty=none)
 
 
 @pytest.fixture(scope="module")
@@ -50,15 +42,11 @@ def fit() -> pl.Fit:
     return pl.fit(measured(), scene())
 
 
-def test_the_thickness_is_found(fit):
-    thickness = fit["thickness"]
+def test_the_thickness_is_found_and_each_element_has_its_own_noise(fit):
+    thickness, [part] = fit["thickness"], fit.parts
     assert fit.status == "converged"
     assert abs(thickness.value - THICKNESS) < 4 * thickness.stderr
     assert thickness.stderr < 0.02
-
-
-def test_each_element_has_its_own_noise(fit):
-    [part] = fit.parts
     np.testing.assert_allclose(part.curve.sigma[0], NOISE, rtol=0.2)  # 1/√256 = 0.06
     assert part.curve.data.shape == part.curve.model.shape == (128, 5)
     # of all values; that of the noisiest counts most
@@ -66,9 +54,8 @@ def test_each_element_has_its_own_noise(fit):
 
 
 def test_records(fit, write):
-    record = to_json(fit)
-    assert record["data"]["signal"] == "mueller"
-    assert record["data"]["points"] == 128
+    record = to_json(fit)["data"]
+    assert (record["signal"], record["points"]) == ("mueller", 128)
     assert "mueller (m12, m22, m33, m34, m43), 128 points from 400 to 800 nm" in report(fit)
     path = write(fit_csv(fit), "fit.csv")
     back = read_spectrum(path)
@@ -78,19 +65,15 @@ def test_records(fit, write):
 
 
 def test_the_figure_has_a_panel_for_each_element(fit):
-    figure = draw(fit)
-    panels = figure.axes[:16]
-    lines = [len(panel.lines) for panel in panels]
-    drawn = [i for i, count in enumerate(lines) if count]
-    assert drawn == [1, 5, 10, 11, 14]
+    panels = draw(fit).axes[:16]
+    assert [i for i, panel in enumerate(panels) if len(panel.lines)] == [1, 5, 10, 11, 14]
     np.testing.assert_allclose(panels[1].lines[0].get_ydata(), fit.parts[0].data.values[:, 0])
 
 
 def test_a_wrong_index_is_a_misfit_and_compare_says_so(fit):
     wrong = pl.fit(measured(), scene(1.8))
     assert wrong.status == "misfit"
-    compared = compare({"right": fit, "wrong": wrong})
-    assert compared.best.name == "right"
+    assert compare({"right": fit, "wrong": wrong}).best.name == "right"
 
 
 def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():

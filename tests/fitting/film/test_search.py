@@ -100,56 +100,30 @@ def test_minima_are_distinct_and_best_first(film, measured):
     assert apart[~np.eye(len(apart), dtype=bool)].all()
 
 
-def test_progress_is_reported(film, measured):
-    reports = []
-    scene = film()
-    search(built(scene, measured(scene, 700.0)), lambda *report: reports.append(report))
-    assert {stage for stage, _, _ in reports} == {"scan", "polish"}
-    assert all(0 <= done <= total for _, done, total in reports)
-    for stage in ("scan", "polish"):
-        assert [done == total for name, done, total in reports if name == stage][-1]
-
-
-CASES = {
-    "thickness": (lambda: 1.46 + 0.0, ()),
-    "thickness and n": (lambda: pl.dispersion.Constant(pl.Free(1.3, 1.95)), ("n",)),
-    "thickness and Cauchy": (lambda: pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0.0, 3e4)), ("A", "B")),
-}
-
-
-def recovered(film, measured, case, films, noise):
-    """(right, identifiable) over random films: 30 to 950 nm, index 1.4 to 1.85.
-
-    The index stays below √3.9: on a substrate of 3.9, n and 3.9/n at one n·d look alike (a status
-    of its own, tested there).
-    Right is within max(2 %, 5 nm); identifiable where the error that the fit gives is below half of
-    that, so that noise alone would not miss it.
-    """
-    random = np.random.default_rng(2024)
-    right, identifiable = [], []
-    for seed in range(films):
-        material, extra = CASES[case]
-        scene = film(pl.Free(10, 1000), material())
-        truth = float(random.uniform(30, 950))
-        index = {
-            "n": random.uniform(1.4, 1.85),
-            "A": random.uniform(1.4, 1.85),
-            "B": random.uniform(1e3, 2e4),
-        }
-        values = [*(float(index[name]) for name in extra), truth]
-        fit = pl.fit(measured(scene, *values, noise=noise, seed=seed, sigma=True), scene)
-        tolerance = max(0.02 * truth, 5.0)
-        right.append(abs(fit["thickness"].value - truth) < tolerance)
-        identifiable.append(fit["thickness"].stderr_noise < tolerance / 2)
-    return np.array(right), np.array(identifiable)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.005, 0.02])
-@pytest.mark.parametrize("case", CASES)
-def test_identifiable_films_are_recovered(film, measured, case, noise):
-    """One miss in a hundred is allowed at 2 % noise, where the best fit need not be the true one."""
-    right, identifiable = recovered(film, measured, case, films=60, noise=noise)
-    share = right[identifiable].mean()
-    print(f"{case}, noise {noise:g}: {share:.3f} of {identifiable.sum()} identifiable of {len(right)}")
-    assert share >= (0.95 if noise > 0.01 else 0.99)
+@pytest.mark.parametrize(
+    ("material", "indices"),
+    [
+        (1.46, {}),
+        (pl.dispersion.Constant(pl.Free(1.3, 1.95)), {"n": (1.4, 1.85)}),
+        (pl.dispersion.Cauchy(pl.Free(1.3, 1.95), pl.Free(0, 3e4)), {"A": (1.4, 1.85), "B": (1e3, 2e4)}),
+    ],
+)
+def test_identifiable_films_are_recovered(film, measured, material, indices, noise):
+    """60 films of 30 to 950 nm, right within max(2 %, 5 nm) where the error that the fit gives is below
+    half of that. One miss in a hundred is allowed at 2 % noise, where the best fit need not be the true one.
+
+    The index stays below √3.9: on a substrate of 3.9, n and 3.9/n at one n·d look alike (test_status.py).
+    """
+    random, scene = np.random.default_rng(2024), film(pl.Free(10, 1000), material)
+    right = []
+    for seed in range(60):
+        truth = float(random.uniform(30, 950))
+        values = [*(float(random.uniform(*ends)) for ends in indices.values()), truth]
+        fit = pl.fit(measured(scene, *values, noise=noise, seed=seed, sigma=True), scene)
+        tolerance = max(0.02 * truth, 5.0)
+        if fit["thickness"].stderr_noise < tolerance / 2:
+            right.append(abs(fit["thickness"].value - truth) < tolerance)
+    assert len(right) > 30
+    assert np.mean(right) >= (0.95 if noise > 0.01 else 0.99)

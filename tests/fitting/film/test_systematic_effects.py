@@ -5,9 +5,14 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting.discrepancy import HALF_NORMAL
+from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
+from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.progress import quiet
+from pellicle.scene.layers import Interface
+
+from ...differences import derivative
 
 NM = np.linspace(420, 880, 60)
 THICKNESS = 310.0
@@ -35,70 +40,53 @@ def reflectance():
     return changes(pl.Scene(pl.Layer(1.6, FREE), 3.9), spectrum())
 
 
-def difference(scene):
-    """Change of R by what a scene has in addition."""
-    return pl.simulate(scene, wavelength=NM).values - spectrum().values
+def R(nm, n=1.6, substrate=3.9):
+    return np.asarray(pl.reflectance(nm, THICKNESS, n, substrate))
 
 
-def R(nm, d=THICKNESS, n=1.6, substrate=3.9):
-    return np.asarray(pl.reflectance(nm, d, n, substrate))
-
-
-def slope(function, size):
+def linear(function, size):
     """Change by one uncertainty, to first order."""
-    step = 1e-3 * size
-    return (function(step) - function(-step)) / 2e-3
+    return size * derivative(function, 0.0, 1e-3 * size)
 
 
-LINEAR = {
-    "wavelength shift": (0.5, lambda s: R(NM + s)),
-    "index of the layer": (0.005, lambda s: R(NM, n=1.6 * (1 + s))),
-    "index of the substrate": (0.005, lambda s: R(NM, substrate=3.9 * (1 + s))),
-    "offset": (0.005, lambda s: R(NM) + s),
-    "scale": (0.01, lambda s: R(NM) * (1 + s)),
-}
+def wide(change):
+    """Change by a width, times the root mean square of a half-normal prior on the variance."""
+    return HALF_NORMAL * (change - R(NM))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LINEAR)
-def test_linear_effects_are_derivatives(reflectance, name):
-    size, function = LINEAR[name]
-    effect = reflectance[name]
-    assert effect.size == size
-    expected = slope(function, size)
-    np.testing.assert_allclose(effect.change[:, 0], expected, atol=2e-4 * np.abs(expected).max())
+def simulated(*below, **more):
+    layer = {key: more.pop(key) for key in ("thickness_spread", "roughness") if key in more}
+    layers = [pl.Layer(1.6, THICKNESS, name="film", **layer), *below]
+    return pl.simulate(pl.Scene(layers, 3.9, instrument=pl.Instrument(**more)), wavelength=NM).values
 
 
-def test_a_slit_is_an_average_over_wavelengths(reflectance):
+def slit():
     """A full width of 2 nm at half maximum, by Gauss and Hermite's quadrature."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(9)
     sd = 2.0 / np.sqrt(8 * np.log(2))
-    mean = np.average([R(NM + sd * node) for node in nodes], axis=0, weights=weights)
-    change = reflectance["bandwidth"].change[:, 0]
-    np.testing.assert_allclose(change, HALF_NORMAL * (mean - R(NM)), rtol=1e-2, atol=1e-8)
+    return np.average([R(NM + sd * node) for node in nodes], axis=0, weights=weights)
 
 
-WIDTHS = {
-    "thickness spread": lambda: pl.Scene(pl.Layer(1.6, THICKNESS, thickness_spread=3.1), 3.9),
-    "roughness": lambda: pl.Scene(pl.Layer(1.6, THICKNESS, roughness=1.5), 3.9),
-    "angle spread": lambda: pl.Scene(
-        pl.Layer(1.6, THICKNESS), 3.9, instrument=pl.Instrument(angle_spread=2.0)
-    ),
+# the change, and its relative error
+EFFECTS = {
+    "wavelength shift": (lambda: linear(lambda s: R(NM + s), 0.5), 2e-4),
+    "index of the layer": (lambda: linear(lambda s: R(NM, n=1.6 * (1 + s)), 0.005), 2e-4),
+    "index of the substrate": (lambda: linear(lambda s: R(NM, substrate=3.9 * (1 + s)), 0.005), 2e-4),
+    "offset": (lambda: linear(lambda s: R(NM) + s, 0.005), 2e-4),
+    "scale": (lambda: linear(lambda s: R(NM) * (1 + s), 0.01), 2e-4),
+    "bandwidth": (lambda: wide(slit()), 0.01),
+    "thickness spread": (lambda: wide(simulated(thickness_spread=3.1)), 0.02),
+    "roughness": (lambda: wide(simulated(roughness=1.5)), 0.02),
+    "angle spread": (lambda: wide(simulated(angle_spread=2.0)), 0.02),
+    "native oxide": (lambda: simulated(pl.Layer(1.46, 1.0, name="oxide")) - R(NM), 1e-7),
 }
 
 
-@pytest.mark.parametrize("name", WIDTHS)
-def test_widths_are_averages(reflectance, name):
-    """Of their own size, times the root mean square of a half-normal prior on the variance."""
-    expected = HALF_NORMAL * difference(WIDTHS[name]())
-    change = reflectance[name].change[:, 0]
-    np.testing.assert_allclose(change, expected, atol=0.02 * np.abs(expected).max())
-
-
-def test_a_native_oxide_is_one_more_layer(reflectance):
-    thin = pl.Layer(1.46, 1.0, name="oxide")
-    expected = difference(pl.Scene([pl.Layer(1.6, THICKNESS, name="film"), thin], 3.9))
-    np.testing.assert_allclose(reflectance["native oxide"].change[:, 0], expected, atol=1e-9)
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_changes_the_data_as_a_scene_that_has_it(reflectance, name):
+    change, error = EFFECTS[name]
+    expected = change()
+    np.testing.assert_allclose(reflectance[name].change[:, 0], expected, atol=error * np.abs(expected).max())
 
 
 @pytest.mark.slow  # compiles a scene of its own
@@ -115,23 +103,15 @@ def test_offsets_of_psi_and_delta():
         ("offset of psi", lambda s: sphere(psi + 2 * s, delta), np.deg2rad(0.05)),
         ("offset of delta", lambda s: sphere(psi, delta + s), np.deg2rad(0.15)),
     ):
-        expected = slope(moved, size)
+        expected = linear(moved, size)
         np.testing.assert_allclose(found[name].change, expected, atol=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.slow  # compiles a scene for each effect
 def test_what_the_scene_describes_is_no_effect():
-    scene = pl.Scene(
-        pl.Layer(1.6, FREE, roughness=1.0),
-        3.9,
-        instrument=pl.Instrument(scale="free", bandwidth=2.0),
-        uncertainty=pl.Uncertainty(wavelength=0.0),
-    )
-    data = pl.simulate(
-        pl.Scene(pl.Layer(1.6, THICKNESS, roughness=1.0), 3.9, instrument=pl.Instrument(bandwidth=2.0)),
-        wavelength=NM,
-    )
-    names = set(changes(scene, data))
+    window, known = pl.Instrument(scale="free", bandwidth=2.0), pl.Uncertainty(wavelength=0.0)
+    scene = pl.Scene(pl.Layer(1.6, FREE, roughness=1.0), 3.9, instrument=window, uncertainty=known)
+    names = set(changes(scene, pl.Spectrum(NM, simulated(roughness=1.0, bandwidth=2.0), "R")))
     assert not names & {"roughness", "scale", "bandwidth", "wavelength shift"}
     assert {"offset", "index of the layer", "thickness spread"} <= names
     assert changes(pl.Scene(pl.Layer(1.6, FREE), 3.9, uncertainty=pl.Uncertainty.none()), spectrum()) == {}
@@ -171,3 +151,43 @@ def test_impossible_uncertainties_are_refused(wrong):
         pl.Uncertainty(wavelength=wrong)
     with pytest.raises(ValueError, match="the uncertainty of `index`"):
         pl.Layer(1.6, 100.0, index_uncertainty=wrong)
+
+
+NINE = np.linspace(400, 800, 9)
+
+
+@pytest.mark.parametrize(
+    ("film", "mixes"),
+    [(1.6, True), (pl.Anisotropic(1.6, 1.7, axis=(20.0, 10.0)), True), (pl.Anisotropic(1.46, 1.5), False)],
+)
+def test_mixed_interface_under_a_birefringent_film(film, mixes):
+    """An oxide between film and silicon mixes with it; a film that is like an oxide has none beneath it."""
+    scene = pl.Scene(pl.Layer(film, pl.Free(50, 400, start=200.0)), "Si", light=pl.Light(angle=60.0))
+    (view,) = make(*measurements(pl.simulate(scene, NINE, noise=0.01), scene)).views
+    scene = extended(view, np.array([200.0]))
+    assert (scene.mixture is not None) == mixes
+    interfaces = [
+        [type(x) is Interface for x in program.scene.layers] for program in scene.programs().values()
+    ]
+    assert any(map(any, interfaces)) == mixes
+
+
+def test_a_shift_of_wavelengths_at_the_ends_of_a_table_beside_a_free_index():
+    """The table of HfO2 ends at 250 and 900 nm; beyond, its index goes on with its slope there."""
+    nm = np.linspace(250, 900, 66)
+    film = pl.dispersion.Shifted(pl.material("HfO2"), pl.Free(-0.3, 0.3, start=0.0))
+    scene = pl.Scene(pl.Layer(film, 120.0), 1.5)
+    (view,) = make(*measurements(pl.Spectrum(nm, np.full(66, 0.1), "R"), scene)).views
+    at = np.array([0.05])
+    shift = extended(view, at).wavelength
+    assert shift is not None
+    changes = [(shift, x) for x in (0.5, 0.0, -0.5)]
+    longer, as_is, shorter = extended(view, at).signals(view.data, at, changes)[:, :66]
+
+    known = np.real(pl.material("HfO2")(nm)) + 0.05
+
+    def reflectance(shift):
+        return np.asarray(pl.reflectance(nm + shift, 120.0, known + shift * np.gradient(known, nm), 1.5))
+
+    np.testing.assert_allclose(as_is, reflectance(0.0), atol=1e-9)
+    np.testing.assert_allclose(longer - shorter, reflectance(0.5) - reflectance(-0.5), atol=3e-5)
