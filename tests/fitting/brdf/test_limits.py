@@ -11,7 +11,7 @@ from scipy.optimize import brentq, least_squares
 import pellicle as pl
 from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.fitting import estimates as shared
+from pellicle.fitting import conclusion as shared
 from pellicle.fitting.brdf import fit as module
 from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.conclusion import linearised
