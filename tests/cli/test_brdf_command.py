@@ -114,11 +114,9 @@ def test_a_recipe_says_what_is_fitted_and_how(folder, fits, pellicle):
 
 
 def test_flags_go_before_the_recipe_and_a_bad_file_does_not_stop_the_others(folder, fits, pellicle):
-    ran = pellicle(
-        *("fit", folder / "absent.csv", folder / "paint.csv", "--noise", 0.5),
-        *("--recipe", folder / "paint.toml", "--json"),
-        code=4,
-    )
+    files = (folder / "absent.csv", folder / "paint.csv")
+    flags = ("--noise", 0.5, "--recipe", folder / "paint.toml", "--json")
+    ran = pellicle("fit", *files, *flags, code=4)
     assert [each["status"] for each in ran.objects] == ["failed", "not-identifiable"]
     assert "no such file" in ran.err
     assert np.all(fits[-1]["samples"].sigma == 0.5)

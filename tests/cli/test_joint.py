@@ -21,10 +21,8 @@ def files(spectrum_file):
 def test_one_object_whose_data_is_a_list(pellicle, files, scene, tmp_path):
     out = tmp_path / "out"
     [found] = pellicle("fit", *files, *scene, "--joint", "--json", "--out", out, code=0).objects
-    assert [(d["name"], d["path"], d["points"]) for d in found["data"]] == [
-        ("a", str(files[0]), 100),
-        ("b", str(files[1]), 100),
-    ]
+    about = [(data["name"], data["path"], data["points"]) for data in found["data"]]
+    assert about == [("a", str(files[0]), 100), ("b", str(files[1]), 100)]
     thickness = found["parameters"]["thickness"]
     assert abs(thickness["value"] - 300.0) < 4 * thickness["stderr_noise"]
     assert json.loads((out / "result.json").read_text())["data"] == found["data"]

@@ -104,13 +104,3 @@ def test_verdict_and_warnings_of_a_fit(pellicle, spectrum_file, scene, tmp_path)
     assert (tmp_path / "out" / "report.txt").read_text() == ran.out.removesuffix("\n")
     record = json.loads((tmp_path / "out" / "result.json").read_text())
     assert (record["verdict"], record["warnings"]) == ("Give --angle 70.", ["noise: give --noise 0.01"])
-
-
-def test_the_error_of_a_file_that_fails(pellicle, spectrum_file, scene, monkeypatch):
-    def refused(*_, **__):
-        raise ValueError("too few points: give a wider `range`")
-
-    monkeypatch.setattr("pellicle.data.read_spectrum.read_spectra", refused)
-    ran = pellicle("fit", spectrum_file(), *scene, "--json", code=3)
-    assert "give a wider --range" in ran.err
-    assert ran.objects[0]["error"].endswith("give a wider --range")

@@ -69,11 +69,8 @@ def test_a_chain_may_end_before_its_last_step(terminal, clock):
         for clock[0], done in enumerate((0, 100, 200)):
             line("sample", done, 20000)
         line("sample", 200, 200)
-    assert terminal()[2:] == [
-        "a.csv: sample 200 of at most 20000, at most 3 min left",
-        "a.csv: sample 200/200",
-        "",
-    ]
+    shown = ["a.csv: sample 200 of at most 20000, at most 3 min left", "a.csv: sample 200/200", ""]
+    assert terminal()[2:] == shown
 
 
 def test_compiling_is_named(terminal):

@@ -58,11 +58,8 @@ def test_flags_of_cubes(pellicle, cube, tmp_path):
 def test_white_that_is_a_material(pellicle, cube, tmp_path):
     np.save(tmp_path / "raw.npy", 3000 * cube)
     np.save(tmp_path / "white.npy", np.full(9, 3000.0))
-    given = [
-        *("--wavelengths", "400:800:50"),
-        *("--white-frame", tmp_path / "white.npy"),
-        *("--white-reflectance", "99"),
-    ]
+    given = ["--wavelengths", "400:800:50", "--white-frame", tmp_path / "white.npy"]
+    given += ["--white-reflectance", "99"]
     pellicle("read", tmp_path / "raw.npy", *given).refused(3, "--white-reflectance")
     given[-1] = "1.5+0.0j"  # a glass: 4 % at normal incidence
     [record] = pellicle("read", tmp_path / "raw.npy", "--json", *given).objects

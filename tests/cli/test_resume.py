@@ -164,12 +164,9 @@ def test_results_without_all_their_files_are_computed_again(batch, full, fitted,
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_results_that_cannot_be_printed():
     with open("/dev/full", "w") as full_disk:
-        ran = subprocess.run(
-            [sys.executable, "-c", "from pellicle.cli import main; raise SystemExit(main())", "materials"],
-            stdout=full_disk,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        code = "from pellicle.cli import main; raise SystemExit(main())"
+        command = [sys.executable, "-c", code, "materials"]
+        ran = subprocess.run(command, stdout=full_disk, stderr=subprocess.PIPE, text=True)
     assert ran.returncode == 3
     assert ran.stderr == "pellicle: the result cannot be printed (No space left on device)\n"
 
@@ -181,18 +178,9 @@ def test_a_fingerprint_covers_bounds_tables_settings_and_version(monkeypatch):
     table = np.linspace(0, 1, 1000)
     other = table.copy()
     other[500] += 1e-12
-    known = [
-        fingerprint(scene()),
-        fingerprint(scene(200.0)),
-        fingerprint(scene(name="Si")),
-        fingerprint(scene(index=1.46)),
-        fingerprint(scene(), 1e-4),
-        fingerprint(table),
-        fingerprint(other),
-        fingerprint(("ab", "c")),
-        fingerprint(("a", "bc")),
-        fingerprint(("a",), "bc"),
-    ]
+    scenes = [scene(), scene(200.0), scene(name="Si"), scene(index=1.46)]
+    others = [(scene(), 1e-4), (table,), (other,), (("ab", "c"),), (("a", "bc"),), (("a",), "bc")]
+    known = [*map(fingerprint, scenes), *(fingerprint(*each) for each in others)]
     assert len(set(known)) == len(known)
     assert fingerprint(scene()) == known[0]
     monkeypatch.setattr("pellicle.reporting.json_record.versions", lambda: {"pellicle": "9.9"})

@@ -26,12 +26,9 @@ def test_xyz_agrees_with_colour_science():
     at = sensor("1931", "D65").wavelength
     reflectance = 0.5 + 0.4 * np.sin(at / 17.0)
     spectrum = colour.SpectralDistribution(dict(zip(at, reflectance, strict=True)))
-    expected = colour.sd_to_XYZ(
-        spectrum,
-        colour.MSDS_CMFS[NAMES["1931"]].copy().align(spectrum.shape),
-        colour.SDS_ILLUMINANTS["D65"].copy().align(spectrum.shape),
-        method="Integration",
-    )
+    observer = colour.MSDS_CMFS[NAMES["1931"]].copy().align(spectrum.shape)
+    lamp = colour.SDS_ILLUMINANTS["D65"].copy().align(spectrum.shape)
+    expected = colour.sd_to_XYZ(spectrum, observer, lamp, method="Integration")
     # colour-science interpolates the illuminant by a polynomial; CIE 15 and pellicle, linearly
     np.testing.assert_allclose(reflectance @ sensor("1931", "D65").weights, expected / 100, atol=2e-4)
 

@@ -37,6 +37,7 @@ DATA = [
     (NONE, "", "is empty", "expected rows"),
     (NONE, "# nothing\n# here\n", "only comments", "expected rows"),
     (NONE, "wavelength,R\n", "line", "without any row of two numbers", "expected rows"),
+    (NONE, ">>>>>Begin\t1\t2\n", "without any row of two numbers"),
     (NONE, "some words\nand more\n", "without any row of two numbers"),
     (NONE, "wl,R\n400,5,0,11\n500,5,0,21\n", "4 values", "names 2 columns", "semicolons", "decimal commas"),
     (NONE, "wavelength,R\n400,0.1\n500, # dust\n600,0.3\n", "line 3", "is empty; fill"),

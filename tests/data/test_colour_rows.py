@@ -59,6 +59,7 @@ def test_films_by_name_with_angles_and_sigmas(write):
         ("R,G,B\n0.1,0.2,-\n", {}, DataError, ("line 2", "'B'", "expected a number")),
         ("R,G,B\n0.1,0.2,0.3,0.4\n", {}, DataError, ("line 2", "4 values")),
         ("R,G,B\n", {}, DataError, ("no row",)),
+        ("R,G,B\n0,0,256000\n", {}, UsageError, ("unclear unit",)),
         ("R,G,B\n0,0,300\n", {"unit": "8-bit"}, DataError, ("line 2", "300", "8-bit")),
         ("R,G,B\n0,0,3\n", {"unit": "fraction"}, DataError, ("line 2", "beyond 1")),
         ("X,Y,Z\n400,500,600\n", {}, DataError, ("beyond the 100",)),
@@ -78,6 +79,11 @@ def test_films_by_name_with_angles_and_sigmas(write):
 )
 def test_what_is_damaged_or_unclear_is_refused(write, refusal, text, options, error, parts):
     refusal(read_colour_rows, write(text), error, *parts, **options)
+
+
+def test_a_unit_that_is_none(write):
+    with pytest.raises(UsageError, match="signal_unit"):
+        read_colour_rows(write("R,G,B\n0.1,0.2,0.3\n"), unit="od")
 
 
 def test_named_columns_replace_the_header(write):

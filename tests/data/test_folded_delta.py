@@ -91,9 +91,6 @@ def test_only_in_the_kept_range(write):
 def test_two_angles(write):
     """Each is a curve of its own; one with a kink is enough."""
     curves = {65: 180 - np.abs(NM - 601) / 3, 75: 90 + (NM - 600) / 10}
-    rows = "".join(
-        f"{nm},{angle},30,{d:.6f}\n"
-        for angle, delta in curves.items()
-        for nm, d in zip(NM, delta, strict=True)
-    )
+    points = [(nm, angle, d) for angle, delta in curves.items() for nm, d in zip(NM, delta, strict=True)]
+    rows = "".join(f"{nm},{angle},30,{d:.6f}\n" for nm, angle, d in points)
     assert read_spectrum(write("wl,angle,psi,delta\n" + rows)).folded

@@ -77,14 +77,9 @@ def test_impossible_values_name_their_place(write):
 def test_repeats_are_averaged_on_the_spheres():
     random, count = np.random.default_rng(1), 8
     noise = np.deg2rad(0.1)  # of N, C, S: 0.05 degrees of Ψ
-    sphere = np.stack(
-        [
-            np.cos(2 * np.deg2rad(PSI)),
-            np.sin(2 * np.deg2rad(PSI)) * np.cos(np.deg2rad(DELTA)),
-            np.sin(2 * np.deg2rad(PSI)) * np.sin(np.deg2rad(DELTA)),
-        ],
-        axis=-1,
-    )
+    double, delta = 2 * np.deg2rad(PSI), np.deg2rad(DELTA)
+    c, s = np.sin(double) * np.cos(delta), np.sin(double) * np.sin(delta)
+    sphere = np.stack([np.cos(double), c, s], axis=-1)
     sweeps = []
     for _ in range(count):
         n, c, s = np.moveaxis(sphere + noise * random.normal(size=sphere.shape), -1, 0)

@@ -114,11 +114,8 @@ def test_columns_that_are_missing_or_wrong(write, header, said, refused):
 
 def test_columns_that_only_the_user_can_tell(write, refused):
     refused(write(ROW), UsageError, "has no header", '`columns=["theta_i"')
-    refused(
-        write("theta_i,phi_i,theta_o,phi_o,value,R,G,B\n30,0,40,180,1,1,1,1\n"),
-        UsageError,
-        "value as well as",
-    )
+    both = write("theta_i,phi_i,theta_o,phi_o,value,R,G,B\n30,0,40,180,1,1,1,1\n")
+    refused(both, UsageError, "value as well as")
 
 
 def test_standard_deviations_above_zero(write, refused):

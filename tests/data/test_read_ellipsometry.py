@@ -145,12 +145,8 @@ def test_missing_columns(write, header, refused):
 def test_radians_are_not_taken_for_degrees(write, refused):
     small = write("wl,psi,delta\n400,0.35,2.9\n500,0.36,3.0\n")
     refused(small, DataError, "look like radians", "psi_deg")
-    refused(
-        write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n"),
-        DataError,
-        "'rad'",
-        "convert both to degrees",
-    )
+    stated = write("wl,psi (rad),delta (rad)\n400,0.35,2.9\n500,0.36,3.0\n")
+    refused(stated, DataError, "'rad'", "convert both to degrees")
 
 
 def test_a_pseudo_dielectric_function(write, refused):

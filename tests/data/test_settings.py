@@ -49,12 +49,10 @@ def test_repeats_at_each_azimuth_are_averaged(write_columns):
 
 
 def test_a_repeated_point_names_its_line(write_columns):
+    columns = (np.append(x[:12], x[11]) for x in (NM, *SIGNALS["R"], AZIMUTH))
+    path = write_columns("nm,R,azimuth_deg", *columns)
     with pytest.raises(DataError, match="repeats 800 of line 13; within one angle and azimuth"):
-        read_spectrum(
-            write_columns(
-                "nm,R,azimuth_deg", *(np.append(x[:12], x[11]) for x in (NM, *SIGNALS["R"], AZIMUTH))
-            )
-        )
+        read_spectrum(path)
     with pytest.raises(DataError, match="comes twice at one angle"):
         Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.full(2, 30.0))
     assert len(Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.array([0.0, 30.0]))) == 2
@@ -67,12 +65,8 @@ def test_an_azimuth_in_other_units_is_refused(write_columns):
 
 def test_names_of_settings():
     every = settings(ANGLE, AZIMUTH, 24)
-    assert [named(one, every) for one in every] == [
-        "60°, azimuth 0°",
-        "60°, azimuth 45°",
-        "70°, azimuth 0°",
-        "70°, azimuth 45°",
-    ]
+    names = [f"{angle}°, azimuth {azimuth}°" for angle in (60, 70) for azimuth in (0, 45)]
+    assert [named(one, every) for one in every] == names
     turned = settings(np.full(24, 60.0), AZIMUTH, 24)
     assert [named(one, turned) for one in turned] == ["azimuth 0°", "azimuth 45°"]
     [alone] = settings(None, None, 3)

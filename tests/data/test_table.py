@@ -21,15 +21,10 @@ FILES = [*(ROOT / "measurements").rglob("*nm*.csv"), *(ROOT / "measurements").rg
 def by_pandas(table):
     """Every column."""
     cells = table.cells
-    frame = pd.read_csv(
-        StringIO("\n".join(line.bare for line in cells.rows)),
-        sep=r"\s+" if cells.delimiter == " " else cells.delimiter,
-        header=None,
-        names=list(range(cells.raw_width)),
-        index_col=False,
-        decimal=cells.decimal,
-        skipinitialspace=True,
-    )
+    text = StringIO("\n".join(line.bare for line in cells.rows))
+    marks = {"sep": r"\s+" if cells.delimiter == " " else cells.delimiter, "decimal": cells.decimal}
+    plain = {"header": None, "index_col": False, "skipinitialspace": True}
+    frame = pd.read_csv(text, names=list(range(cells.raw_width)), **marks, **plain)
     return [frame[i].to_numpy() for i in range(table.width)]
 
 

@@ -21,17 +21,10 @@ def reflectance(**changes):
 
 def angles(**changes):
     count = NM.size
-    return pl.Spectrum(
-        wavelength=np.tile(NM, 2),
-        values=np.linspace(10, 40, 2 * count),
-        signal="psi-delta",
-        delta=np.linspace(5, 355, 2 * count),
-        angle=np.repeat([65.0, 75.0], count),
-        sigma=np.full(2 * count, 0.05),
-        delta_sigma=np.full(2 * count, 0.1),
-        depolarisation=np.linspace(0, 0.1, 2 * count),
-        **changes,
-    )
+    psi, delta = np.linspace(10, 40, 2 * count), np.linspace(5, 355, 2 * count)
+    errors = {"sigma": np.full(2 * count, 0.05), "delta_sigma": np.full(2 * count, 0.1)}
+    about = {"depolarisation": np.linspace(0, 0.1, 2 * count), "angle": np.repeat([65.0, 75.0], count)}
+    return pl.Spectrum(np.tile(NM, 2), psi, "psi-delta", delta=delta, **errors, **about, **changes)
 
 
 def elements():

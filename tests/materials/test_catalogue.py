@@ -139,10 +139,8 @@ def test_a_page_without_k_is_real_and_says_so():
     source = material("SiO2")
     assert not source.has_extinction
     assert is_real(source.index(jnp.array([500.0])))
-    assert source.warnings() == [
-        "SiO2 (main/SiO2/Malitson) has no data for k: it is taken as transparent, "
-        "which its source does not say."
-    ]
+    [warning] = source.warnings()
+    assert warning.startswith("SiO2 (main/SiO2/Malitson) has no data for k: it is taken as transparent")
 
 
 def test_a_table_whose_k_is_zero_is_real_and_needs_no_warning():

@@ -43,12 +43,9 @@ def test_n_and_k_from_different_sources_are_known_where_both_are():
 
 
 def test_two_tables_with_their_own_points():
-    both = contents(
-        page(
-            {"type": "tabulated n", "data": "0.4 1.5\n0.6 1.7\n"},
-            {"type": "tabulated k", "data": "0.45 0.1\n0.7 0.1\n"},
-        )
-    )
+    index = {"type": "tabulated n", "data": "0.4 1.5\n0.6 1.7\n"}
+    extinction = {"type": "tabulated k", "data": "0.45 0.1\n0.7 0.1\n"}
+    both = contents(page(index, extinction))
     assert both.wavelength_range == (450.0, 600.0)
     assert real(both.dispersion.index(500.0)) == pytest.approx(1.6)
 
@@ -95,18 +92,3 @@ REFERENCE = (
 )
 def test_plain_text_has_dois_and_no_tags(markup, text):
     assert plain_text(markup) == text
-
-
-@pytest.mark.parametrize(
-    ("markup", "citation"),
-    [
-        (REFERENCE, "Johnson et al. 1972"),
-        ("M. J. Dodge.\nMgF2.\nAppl. Opt. 23, 1980-1985 (1984)", "Dodge 1984"),
-        ("1) A. D. Rakić.\nX 12 (1995)", "Rakić 1995"),
-        ("L. V. Rodríguez-de Marcos, J. A. B. (2017)", "Rodríguez-de Marcos 2017"),
-        ("Some catalog", "Some catalog"),
-        (None, ""),
-    ],
-)
-def test_short_citation_has_first_author_and_year(load_script, markup, citation):
-    assert load_script("scripts/index_materials.py").short_citation(markup) == citation

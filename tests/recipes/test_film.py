@@ -105,12 +105,14 @@ def test_an_unknown_key_names_the_nearest(refused, text, said):
     ("text", "said"),
     [
         ("[data]\nsignal = 'X'\n" + BASE, ("data.signal", "'X'")),
+        ("[data]\nspot = 0\n" + BASE, ("data.spot: ",)),
         ("[data]\nanalyser = 90\n" + BASE, ("data.analyser: ",)),
         ("[data]\nwavelength_unit = 'mm'\n" + BASE, ("data.wavelength_unit: must be one of nm, um", "'mm'")),
         ("[data]\nsignal_unit = 'ppm'\n" + BASE, ("data.signal_unit: must be one of fraction", "'ppm'")),
         ("[data]\nnoise = 0\n" + BASE, ("data.noise", "greater than 0")),
         (BASE.replace("{ lower = 10, upper = 3000 }", "'thick'"), ("thickness", "'thick'")),
         (BASE.replace("lower = 10", "lower = -10"), ("thickness", "-10")),
+        (BASE.replace("lower = 10", "lower = 5000"), ("thickness", "reversed")),
         (BASE.replace("lower = 10, ", ""), ("thickness", "lower and upper")),
         (BASE.replace("lower = 10", "value = 5, lower = 10"), ("thickness", "start value 5")),
         (BASE.replace('"SiO2"', '"SiO3"'), ("SiO3", "SiO2")),
@@ -124,6 +126,8 @@ def test_an_unknown_key_names_the_nearest(refused, text, said):
         ("[data]\nfile = ['a.csv']\n" + BASE, ("data.file", "go into files")),
         ("[data]\nwavelengths = [400, nan]\n" + BASE, ("data.wavelengths.1", "finite", "nan")),
         (BASE.replace('"SiO2"', "inf"), ("scene.layer.0.material", "finite", "inf")),
+        (BASE.replace('"SiO2"', "{ model = 'cody-lorentz', E0 = 2, Eg = 3 }"), ("below", "Eg 3 and E0 2")),
+        (BASE + "[instrument]\nbandwidth = -1\n", ("bandwidth", "-1")),
         (BASE.replace('"SiO2"', "{ model = 'tauc-lorentz', A = nan }"), ("A must be a finite number",)),
         (BASE.replace('"SiO2"', "{ model = 'spline', knots = [400, nan, 700] }"), ("knots2", "finite")),
         (BASE.replace("upper = 3000", "upper = 1e300"), ("thickness", "a metre", "1e+300")),
@@ -178,18 +182,6 @@ def test_a_file_has_its_own_words(tmp_path, read):
     assert first.scene().substrate.back is not None
     assert second.scene().substrate.back is None
     assert second.scene().substrate.plate_mm == 2.0
-
-
-def test_how_files_are_read(read):
-    """The words of the flags, of all files or of one."""
-    recipe = read(
-        "[data]\ncolumns = 'wavelength,R,_'\nwavelength_unit = 'µm'\n[[data.file]]\npath = 'a.csv'\n"
-        "[[data.file]]\npath = 'b.dat'\ncolumns = ['energy', 'T']\nsignal_unit = '%'\nspot = 2\n" + BASE
-    )
-    first, second = (found.tables.data for found in recipe.each)
-    assert (first.columns, second.columns) == ("wavelength,R,_", ["energy", "T"])
-    assert (first.wavelength_unit, second.wavelength_unit) == ("µm", "µm")
-    assert (first.signal_unit, second.signal_unit, first.spot, second.spot) == (None, "%", None, 2)
 
 
 @pytest.mark.parametrize(

@@ -19,12 +19,8 @@ from pellicle.recipes.write import recipe_text
 from pellicle.scene.instrument import Drift
 
 ROOT = Path(__file__).parents[2]
-RECIPES = [
-    *ROOT.glob("docs/**/*.toml"),
-    *ROOT.glob("fits/**/recipe.toml"),
-    *ROOT.glob("measurements/**/*.toml"),
-    *ROOT.glob("benchmarks/**/*.toml"),
-]
+PATTERNS = ("docs/**/*.toml", "fits/**/recipe.toml", "measurements/**/*.toml", "benchmarks/**/*.toml")
+RECIPES = [path for pattern in PATTERNS for path in ROOT.glob(pattern)]
 RECIPES.sort()
 
 

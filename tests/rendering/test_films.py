@@ -15,17 +15,8 @@ NM = np.array([450.0, 550.0, 650.0])
 
 def test_a_surface_is_a_film_on_rough_facets():
     """Indices per channel, in the order of the model's wavelengths, are linear between them."""
-    surface = pl.Surface(
-        "microfacet-film",
-        {
-            "thickness": pl.Free(10, 70, start=33),
-            "n": 2.9,
-            "base_n": [2.6, 2.5, 2.4],
-            "base_k": 2.8,
-            "roughness": 0.3,
-        },
-        (650.0, 550.0, 450.0),
-    )
+    numbers = {"thickness": pl.Free(10, 70, start=33), "n": 2.9, "base_n": [2.6, 2.5, 2.4], "base_k": 2.8}
+    surface = pl.Surface("microfacet-film", numbers | {"roughness": 0.3}, (650.0, 550.0, 450.0))
     film = film_of(surface)
     [layer] = film.scene.layers
     assert (layer.thickness, film.roughness) == (33, 0.3)

@@ -70,6 +70,12 @@ def load_plugin(files):
     module.register()
 
 
+def bsdfs(exported, measured):
+    """Both ways to the film: the table of that number, and the plugin."""
+    plugin = {"type": "pellicle_film", "filename": str(exported[2]), "alpha": ALPHA}
+    return {"measured": {"type": "measured", "filename": str(exported[measured])}, "lookup": plugin}
+
+
 def pixel(bsdf, light, viewer):
     """Render one pixel of a plane that parallel light of irradiance 1 hits."""
     from_above = mi.ScalarTransform4f().look_at((9 * viewer).tolist(), [0, 0, 0], [0, 1, 0])
@@ -99,10 +105,7 @@ def pixel(bsdf, light, viewer):
 def test_rendered_colours_are_the_exact_ones(exported, kind):
     mi.set_variant("scalar_rgb")
     load_plugin(exported)
-    bsdf = {
-        "measured": {"type": "measured", "filename": str(exported[0])},
-        "lookup": {"type": "pellicle_film", "filename": str(exported[2]), "alpha": ALPHA},
-    }[kind]
+    bsdf = bsdfs(exported, 0)[kind]
     found, exact = [], []
     for light, viewer in directions():
         lobes, cosine = lobe(viewer, light, ALPHA)
@@ -120,12 +123,7 @@ def test_rendered_colours_are_the_exact_ones(exported, kind):
 def test_rendered_spectra_are_the_exact_ones(exported, kind):
     mi.set_variant("scalar_spectral")
     load_plugin(exported)
-    bsdf = mi.load_dict(
-        {
-            "measured": {"type": "measured", "filename": str(exported[1])},
-            "lookup": {"type": "pellicle_film", "filename": str(exported[2]), "alpha": ALPHA},
-        }[kind]
-    )
+    bsdf = mi.load_dict(bsdfs(exported, 1)[kind])
     wavelength = np.arange(380.0, 731.0, 5.0)[:68].reshape(-1, 4)
     for light, viewer in directions():
         lobes, cosine = lobe(viewer, light, ALPHA)

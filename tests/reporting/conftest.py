@@ -90,14 +90,8 @@ def ellipsometric(fit: Fit, wavelength, angle, with_part, **curve) -> Fit:
     )
     numbers = {"sigma": 0.1, "n": 1.46, "k": 0.0, "n_stderr": 0.001, "k_stderr": 0.0}
     arrays = {name: np.full(size, number) for name, number in numbers.items()}
-    made = Curve(
-        wavelength=spectrum.wavelength,
-        data=spectrum.values,
-        model=psi,
-        delta_data=spectrum.delta,
-        delta_model=delta,
-        **(arrays | curve),
-    )
+    deltas = {"delta_data": spectrum.delta, "delta_model": delta}
+    made = Curve(spectrum.wavelength, data=spectrum.values, model=psi, **deltas, **(arrays | curve))
     return with_part(dataclasses.replace(fit, rms=0.123), data=spectrum, curve=made, rms=0.123)
 
 
@@ -124,25 +118,13 @@ def as_ellipsometry(fit, with_part):
 def brdf_fit() -> Fit:
     """Three samples in the plane of incidence, where the half angle is half the difference of the angles."""
     theta_o = np.array([10.0, 30.0, 50.0])
-    samples = BrdfSamples(
-        theta_i=np.full(3, 30.0),
-        phi_i=np.zeros(3),
-        theta_o=theta_o,
-        phi_o=np.full(3, 180.0),
-        values=np.array([[0.1], [1.0], [0.2]]),
-        channels=("value",),
-        sigma=np.full((3, 1), 0.05),
-    )
+    directions = np.full(3, 30.0), np.zeros(3), theta_o, np.full(3, 180.0)
+    values = np.array([[0.1], [1.0], [0.2]])
+    samples = BrdfSamples(*directions, values, ("value",), np.full((3, 1), 0.05))
     surface = Surface("microfacet-film", {"thickness": 40.0, "n": 1.5, "base_n": 2.7}, (550.0,))
-    part = Part(
-        name="",
-        data=samples,
-        curve=BrdfCurve(samples.values + 0.1, np.full((3, 1), -2.0)),
-        plan=exact(surface_view(surface, samples)),
-        rms=1.0,
-        chi2_reduced=1.0,
-        effective_points=3.0,
-    )
+    curve = BrdfCurve(samples.values + 0.1, np.full((3, 1), -2.0))
+    plan = exact(surface_view(surface, samples))
+    part = Part("", samples, curve, plan, rms=1.0, chi2_reduced=1.0, effective_points=3.0)
     return Fit(
         parts=(part,),
         status=Status.MISFIT,

@@ -193,11 +193,8 @@ def test_a_path_cannot_break_out_of_its_comment(fit, with_part, tmp_path):
 
 
 def test_the_summary_has_a_row_per_file_and_the_union_of_free_parameters(fit, tmp_path):
-    other = replace(
-        fit,
-        parameters={"thickness": fit["thickness"], "n": Estimate("n", 1.5, 0.01, "", 1.3, 1.7, True)},
-        chi2_reduced=1.5,
-    )
+    parameters = {"thickness": fit["thickness"], "n": Estimate("n", 1.5, 0.01, "", 1.3, 1.7, True)}
+    other = replace(fit, parameters=parameters, chi2_reduced=1.5)
     folder_per_file(tmp_path, ["a.csv", "b.csv", "c.csv"])
     records = [to_json(fit), failure("c, d.csv", "no such file"), to_json(other)]
     write_summary(tmp_path / "summary.csv", records)
@@ -260,11 +257,8 @@ def test_tables_of_a_joint_fit(joint, fit, tmp_path):
     write_fit(tmp_path / "out", joint)
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     frame = pd.read_csv(tmp_path / "out" / "fit.csv", comment="#")
-    assert frame.groupby(["file", "signal"]).size().to_dict() == {
-        ("film", "R"): 41,
-        ("b,c", "psi"): 4,
-        ("b,c", "delta"): 4,
-    }
+    sizes = frame.groupby(["file", "signal"]).size().to_dict()
+    assert sizes == {("film", "R"): 41, ("b,c", "psi"): 4, ("b,c", "delta"): 4}
     np.testing.assert_allclose(frame["data"][:41], fit.curve.data, rtol=1e-9)
     assert set(frame["residual"][frame["signal"] == "delta"]) == {-2.0}
     without = [line for line in nk_csvs(joint)["nk.csv"].splitlines() if not line.startswith("#")]

@@ -6,7 +6,7 @@ import pytest
 from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.reporting import map_panels
 from pellicle.reporting.map_figures import figures
-from pellicle.reporting.map_panels import COLOURS, HATCHES, overlay
+from pellicle.reporting.map_panels import COLOURS, HATCHES
 from pellicle.reporting.map_places import Axis, MapAxes
 from tests.reporting.test_map_text import made as described
 
@@ -68,13 +68,6 @@ def test_statuses_have_their_own_colours_hatches_and_shares():
     drawn = legend.axes.images[0]
     colours = {to_hex(drawn.to_rgba(drawn.get_array())[i, 0]).upper() for i in range(3)}
     assert colours == {COLOURS[word] for word in ("ambiguous", "no-data", "converged")}
-
-
-def test_each_hatch_is_a_pattern_of_its_own():
-    status = np.array([[CODES[word]] * 2 for word in HATCHES])
-    layer = overlay(status)[..., 0]
-    rows = layer.reshape(len(HATCHES), -1, layer.shape[1])
-    assert len({row.tobytes() for row in rows}) == len(HATCHES)
 
 
 def test_outliers_do_not_set_the_colours():
@@ -176,16 +169,6 @@ def test_sites_are_points_without_interpolation():
     assert list(sure.get_array()) == [300, 302, 304]
     assert unsure.get_offsets().tolist() == [[30, 0]]
     assert unsure.get_hatch()
-
-
-def test_panels_of_sites_have_one_range_where_some_are_without_data():
-    x, y = np.arange(9.0), np.arange(9.0) ** 2
-    status = np.full(9, CODES["converged"])
-    status[-2:] = CODES["no-data"]
-    figure = dict(figures(made(status, ("site",), {"x": ("site", x), "y": ("site", y)})))["map"]
-    ranges = {(axes.get_xlim(), axes.get_ylim()) for axes in figure.axes if axes.get_xlabel().startswith("x")}
-    assert len(ranges) == 1
-    assert all(low < 0 and high > 64 for _, (low, high) in ranges)
 
 
 def test_a_series_has_its_first_middle_and_last_frame_and_its_mean():

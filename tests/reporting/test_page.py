@@ -76,13 +76,8 @@ def test_names_and_messages_are_text_and_nothing_else(fit, with_part):
     nasty = "</script><script>alert(1)</script><img src=x onerror=alert(2)>'\"&amp;"
     plain = Page(fit_page(fit, IMAGE))
     wrong = with_part(fit, data=replace(fit.parts[0].data, path=f"/data/{nasty}", notes=(nasty,)), name=nasty)
-    wrong = replace(
-        wrong,
-        verdict=nasty,
-        warnings=(nasty,),
-        rivals=(Rival({nasty: 1.0, "thickness": 3.0}, 2.0),),
-        correlation_names=(nasty, *fit.correlation_names[1:]),
-    )
+    words = {"verdict": nasty, "warnings": (nasty,), "correlation_names": (nasty, *fit.correlation_names[1:])}
+    wrong = replace(wrong, rivals=(Rival({nasty: 1.0, "thickness": 3.0}, 2.0),), **words)
     page = Page(fit_page(wrong, IMAGE, again=[(nasty, nasty)]))
     assert page.text.count(nasty) >= 6
     kinds = [tag for tag, _ in page.elements]

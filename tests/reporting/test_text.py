@@ -119,13 +119,8 @@ def test_no_line_is_longer_than_100_columns(fit, with_part):
     spectrum = replace(fit.spectrum, path="/a folder/" + 30 * "long/" + "film.csv")
     rival = Rival({f"parameter_{i}": 1.0 for i in range(9)}, 3.0)
     parameters = {name: Estimate(name, 1.0, 0.1, "", 0.0, 2.0, True) for name in rival.parameters}
-    long = replace(
-        with_part(fit, data=spectrum),
-        verdict=40 * "words ",
-        warnings=(60 * "and ",),
-        rivals=(rival,),
-        parameters=parameters,
-    )
+    words = {"verdict": 40 * "words ", "warnings": (60 * "and ",)}
+    long = replace(with_part(fit, data=spectrum), rivals=(rival,), parameters=parameters, **words)
     text = report(long)
     assert max(map(len, text.splitlines())) <= 100
     [path] = [line for line in block(text, "Verdict") if line.startswith("file    …")]

@@ -64,13 +64,8 @@ def test_a_plate_adds_its_orders():
     """N is that of the transmittances for s and p; the light of all orders is partly unpolarised."""
     plate = pl.Substrate(GLASS, 1.0)
     simulated = pl.simulate(scene(plate), NM)
-    powers = [
-        pl.simulate(
-            pl.Scene(pl.Layer(INDEX, 180.0), plate, light=pl.Light(angle=ANGLE, signal="T", polarisation=x)),
-            NM,
-        ).values
-        for x in "sp"
-    ]
+    lights = [pl.Light(angle=ANGLE, signal="T", polarisation=x) for x in "sp"]
+    powers = [pl.simulate(pl.Scene(pl.Layer(INDEX, 180.0), plate, light=x), NM).values for x in lights]
     length = np.sqrt(1 - simulated.depolarisation)
     n = (powers[0] - powers[1]) / (powers[0] + powers[1])
     np.testing.assert_allclose(length * np.cos(2 * np.deg2rad(simulated.values)), n, atol=1e-9)

@@ -39,13 +39,8 @@ def computed():
 
 def reference(i, letter):
     film, light = media(i)
-    return tmm.coh_tmm(
-        letter,
-        [light["ambient"], *film[2], film[3]],
-        [np.inf, *film[1], np.inf],
-        np.deg2rad(light["angle"]),
-        film[0],
-    )
+    indices, thickness = [light["ambient"], *film[2], film[3]], [np.inf, *film[1], np.inf]
+    return tmm.coh_tmm(letter, indices, thickness, np.deg2rad(light["angle"]), film[0])
 
 
 @pytest.mark.parametrize("letter", "sp")

@@ -17,14 +17,8 @@ from pellicle.materials import CLEAR, Material
 
 FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 BOTH = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
-FILM = {
-    "wavelength": 550.0,
-    "thickness": 130.0,
-    "layer": 2.1 + 0.1j,
-    "substrate": 3.9 + 0.02j,
-    "ambient": 1.33,
-    "angle": 40.0,
-}
+FILM = {"wavelength": 550.0, "thickness": 130.0, "layer": 2.1 + 0.1j, "substrate": 3.9 + 0.02j}
+FILM |= {"ambient": 1.33, "angle": 40.0}
 POSITIONAL = ("wavelength", "thickness", "layer", "substrate")
 
 
@@ -104,14 +98,8 @@ def test_an_absorbing_ambient_is_refused(function, ambient):
 def test_an_ambient_of_little_absorption_is_its_real_part():
     """What that leaves out, by the exact film in an ambient of k = CLEAR: R, N, C and S change by less."""
     wavelength, angle = np.array([450.0, 600.0, 800.0]), np.deg2rad(65.0)
-    water = Material(
-        Table(np.array([400.0, 900.0]), np.array([1.34, 1.33]), np.array([0.9, 0.9]) * CLEAR),
-        "water",
-        "water.csv",
-        "",
-        (400.0, 900.0),
-        True,
-    )
+    table = Table(np.array([400.0, 900.0]), np.array([1.34, 1.33]), np.array([0.9, 0.9]) * CLEAR)
+    water = Material(table, "water", "water.csv", "", (400.0, 900.0), True)
     n0, n1, n2 = np.interp(wavelength, [400, 900], [1.34, 1.33]), 1.46, 3.9 + 0.02j
     found = pl.reflectance(wavelength, 120.0, n1, n2, ambient=water, angle=65.0, polarisation="p")
     psi, delta = pl.ellipsometry(wavelength, 120.0, n1, n2, ambient=water, angle=65.0)

@@ -28,15 +28,9 @@ def test_content_and_options_change_it(path, values, tmp_path):
     assert read_cube(path, wavelengths=NM).fingerprint == first
     mask = np.ones((7, 5), bool)
     mask[0, 0] = False
-    others = [
-        read_cube(path, wavelengths=NM + 1),
-        read_cube(path, wavelengths=NM, signal="T"),
-        read_cube(path, wavelengths=NM, range=(450, 800)),
-        read_cube(path, wavelengths=NM, noise=0.01),
-        read_cube(path, wavelengths=NM, mask=mask),
-        read_cube(path, wavelengths=NM, angle=60.0),
-        read_cube(path, wavelengths=NM).coarse(2),
-    ]
+    options = [{"signal": "T"}, {"range": (450, 800)}, {"noise": 0.01}, {"mask": mask}, {"angle": 60.0}]
+    others = [read_cube(path, **{"wavelengths": NM} | each) for each in ({"wavelengths": NM + 1}, *options)]
+    others.append(read_cube(path, wavelengths=NM).coarse(2))
     values = values.copy()
     values[3, 4, 5] += 1e-6
     np.save(path, values)

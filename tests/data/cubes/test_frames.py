@@ -55,13 +55,9 @@ def test_frames_from_files(camera, values, tmp_path):
     np.save(tmp_path / "dark.npy", dark[0])
     stack = np.repeat(white, 7, 0).transpose(2, 0, 1)
     tifffile.imwrite(tmp_path / "white.tif", stack, photometric="minisblack")
-    cube = read_cube(
-        tmp_path / "raw.npy",
-        wavelengths=NM,
-        white_frame=tmp_path / "white.tif",
-        dark_frame=str(tmp_path / "dark.npy"),
-        white_reflectance=lambda nm: 0.5 + nm / 2000,
-    )
+    frames = {"white_frame": tmp_path / "white.tif", "dark_frame": str(tmp_path / "dark.npy")}
+    white = {"white_reflectance": lambda nm: 0.5 + nm / 2000}
+    cube = read_cube(tmp_path / "raw.npy", wavelengths=NM, **frames, **white)
     expected = 0.99 * values * (0.5 + NM / 2000)
     np.testing.assert_allclose(np.asarray(cube.arrays["values"]), expected, rtol=1e-6, atol=1e-12)
     assert any("white frame" in note and "an image" in note for note in cube.notes)

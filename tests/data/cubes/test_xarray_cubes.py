@@ -13,12 +13,8 @@ NM = np.linspace(400.0, 800.0, 9)
 
 @pytest.fixture
 def array(values):
-    return xr.DataArray(
-        values,
-        dims=("y", "x", "wavelength"),
-        coords={"wavelength": NM, "y": ("y", np.arange(7) * 0.1, {"units": "mm"})},
-        name="R",
-    )
+    coords = {"wavelength": NM, "y": ("y", np.arange(7) * 0.1, {"units": "mm"})}
+    return xr.DataArray(values, dims=("y", "x", "wavelength"), coords=coords, name="R")
 
 
 @pytest.mark.parametrize(

@@ -13,20 +13,10 @@ AXIS = np.arange(400.0, 512.0, 10.0)
 
 def jcamp(table, form="(X++(Y..Y))", kind="XYDATA", ending="##END=\n", **records):
     """A file of one block; records override those below, None leaves one out."""
-    stated = {
-        "TITLE": "oxide on silicon",
-        "JCAMP-DX": "4.24",
-        "DATA TYPE": "UV/VIS SPECTRUM",
-        "ORIGIN": "laboratory 3",
-        "LONGDATE": "2024/05/06 10:00:00",
-        "XUNITS": "NANOMETERS",
-        "YUNITS": "REFLECTANCE",
-        "XFACTOR": "1",
-        "YFACTOR": "0.001",
-        "FIRSTX": "400",
-        "LASTX": "510",
-        "NPOINTS": "12",
-    } | {key.replace("_", " "): value for key, value in records.items()}
+    stated = {"TITLE": "oxide on silicon", "JCAMP-DX": "4.24", "DATA TYPE": "UV/VIS SPECTRUM"}
+    stated |= {"ORIGIN": "laboratory 3", "LONGDATE": "2024/05/06 10:00:00", "XUNITS": "NANOMETERS"}
+    stated |= {"YUNITS": "REFLECTANCE", "XFACTOR": "1", "YFACTOR": "0.001", "FIRSTX": "400", "LASTX": "510"}
+    stated |= {"NPOINTS": "12"} | {key.replace("_", " "): value for key, value in records.items()}
     lines = [f"##{key}= {value}" for key, value in stated.items() if value is not None]
     return "\n".join([*lines, f"##{kind}= {form}", table]) + f"\n{ending}"
 
@@ -191,10 +181,8 @@ def test_contradictions_are_refused(name, refused):
 
 def test_pairs_with_a_mark_of_another_kind_are_refused(refused):
     """Decimal commas without a decimal comma in the limits above: 4 numbers in a line instead of 2."""
-    refused(
-        link(PROCESSED.replace("400,36\n", "400.36\n", 1).replace("401,02\n##N", "401.02\n##N")),
-        "NPOINTS states 3",
-    )
+    mixed = PROCESSED.replace("400,36\n", "400.36\n", 1).replace("401,02\n##N", "401.02\n##N")
+    refused(link(mixed), "NPOINTS states 3")
     refused(link(PROCESSED.replace("##LASTX= 401,02", "##LASTX= 499,02")), "LASTX is 499.02")
 
 
