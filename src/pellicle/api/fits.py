@@ -8,12 +8,11 @@ from typing import Any
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.errors import UsageError
-from pellicle.fitting.brdf.fit import fit as fit_brdf
+from pellicle.fitting import joint
+from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.film.fit import fit as fit_spectra
-from pellicle.fitting.joint import fit as fit_jointly
-from pellicle.fitting.joint import of_both_kinds
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.sampling.result import Posterior
@@ -66,12 +65,12 @@ def fit(
     """
     check_measurement(data)
     check_scene(scene, several=True)
-    if of_both_kinds(scene):
-        both: Any = data, scene
-        return fit_jointly(*both, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
+    if joint.of_both_kinds(scene):
+        rows: Any = data
+        scenes: Any = scene
+        return joint.fitted(rows, scenes, tolerance, progress, loss, residual)[0]
     if isinstance(scene, Surface):
-        samples = measured((BrdfSamples,), data)
-        return fit_brdf(samples, scene, residual=residual, tolerance=tolerance, loss=loss, progress=progress)
+        return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)
     films: Any = measured(OF_A_FILM, data), scene
     return fit_spectra(*films, tolerance=tolerance, loss=loss, progress=progress)

@@ -13,6 +13,7 @@ a bound on the total error (triangle inequality).
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple, final
 
 import equinox as eqx
@@ -49,9 +50,9 @@ class Stage(NamedTuple):
     changed: dict[str, Row]
 
     @property
-    def rows(self) -> tuple[Row, ...]:
-        """Every row of the plan, those of changed effects with their error bounds."""
-        return tuple(self.changed.get(row.effect, row) for row in self.plan.rows)
+    def labelled(self) -> Plan:
+        """The plan with the reasons and error bounds of the effects that the steps changed."""
+        return self.plan.with_rows(*self.changed.values())
 
 
 class Step(NamedTuple):
@@ -79,9 +80,9 @@ def reduced_plan(
     stage = Stage(full, scene, evaluation.signals(full), {})
     for move in moves:
         stages = (_after(step, stage, evaluation) for step in move(stage))
-        stage = next((s for s in stages if sum(row.error_bound for row in s.rows) <= tolerance), stage)
+        stage = next((s for s in stages if s.labelled.error_bound <= tolerance), stage)
     change = evaluation.slope_change(full, stage.plan, SLOPE_POINTS) if stage.changed else 0.0
-    return replace(stage.plan, rows=stage.rows, tolerance=tolerance, gradient_error=change)
+    return replace(stage.labelled, tolerance=tolerance, gradient_error=change)
 
 
 def _after(step: Step, stage: Stage, evaluation: Evaluation) -> Stage:
@@ -89,9 +90,8 @@ def _after(step: Step, stage: Stage, evaluation: Evaluation) -> Stage:
     bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.degrees)
     effect = step.row.effect
     bound += stage.changed[effect].error_bound if effect in stage.changed else 0.0
-    return Stage(
-        step.plan, step.scene, signals, stage.changed | {effect: replace(step.row, error_bound=bound)}
-    )
+    changed = stage.changed | {effect: replace(step.row, error_bound=bound)}
+    return Stage(step.plan, step.scene, signals, changed)
 
 
 def removal_steps(
@@ -135,12 +135,11 @@ class FilmRemoval:
 
 def _with(module: Any, **changed: Any) -> Any:
     """The module with some fields changed and without its checks: a scene may have no layer here."""
-    return eqx.tree_at(
-        lambda m: [getattr(m, name) for name in changed],
-        module,
-        [*changed.values()],
-        is_leaf=lambda x: x is None,
-    )
+
+    def where(m: Any) -> list[Any]:
+        return [getattr(m, name) for name in changed]
+
+    return eqx.tree_at(where, module, [*changed.values()], is_leaf=lambda x: x is None)
 
 
 def _each(scene: Scene, change: Callable[[Layer], Layer]) -> tuple[Layer | Interface | Plate, ...]:
@@ -215,10 +214,8 @@ def _polarisation(scene: Scene, _: FilmRemoval) -> Scene:
 
 def _absorption(scene: Scene, _: FilmRemoval) -> Scene:
     """Drop the extinction of every layer."""
-    return _with(
-        scene,
-        layers=_each(scene, lambda layer: _with(layer, material=each_medium(_lossless, layer.material))),
-    )
+    clear = _each(scene, lambda layer: _with(layer, material=each_medium(_lossless, layer.material)))
+    return _with(scene, layers=clear)
 
 
 def _lossless(material: AbstractDispersion) -> AbstractDispersion:
@@ -255,20 +252,16 @@ def _anisotropy(scene: Scene, _: FilmRemoval) -> Scene:
 
 def _dispersion(scene: Scene, _: FilmRemoval) -> Scene:
     """Give every fixed medium its index at the middle wavelength."""
-    at = scene.light.wavelength
+    flat = partial(_flat, wavelength=scene.light.wavelength)
 
-    def constant(layer: Layer) -> Layer:
-        return _with(layer, material=each_medium(lambda medium: _flat(medium, at), layer.material))
+    def constant(x: Any) -> Any:
+        return x if isinstance(x, Interface) else _with(x, material=each_medium(flat, x.material))
 
-    flat = _each(scene, constant)
-    plates = [_with(x, material=_flat(x.material, at)) if isinstance(x, Plate) else x for x in flat]
     back = scene.substrate.back
-    substrate = _with(
-        scene.substrate,
-        material=_flat(scene.substrate.material, at),
-        back=None if back is None else _flat(back, at),
-    )
-    return _with(scene, layers=tuple(plates), substrate=substrate, ambient=_flat(scene.ambient, at))
+    back = None if back is None else flat(back)
+    substrate = _with(scene.substrate, material=flat(scene.substrate.material), back=back)
+    layers = tuple(map(constant, scene.layers))
+    return _with(scene, layers=layers, substrate=substrate, ambient=flat(scene.ambient))
 
 
 def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:

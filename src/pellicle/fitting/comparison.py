@@ -72,11 +72,11 @@ class Comparison(ReportMixin):
         best, second, *_ = sorted(self.candidates, key=lambda c: c.bic)
         apart = second.bic - best.bic
         more, less = _extra(best.fit, second.fit), _extra(second.fit, best.fit)
-        birefringent = [_birefringent(one.fit) for one in (best, second)]
+        birefringent = [_matrices(one.fit) > 0 for one in (best, second)]
         if birefringent[0] != birefringent[1]:
             # its indices have other names than the one that they stand for
             more, less = [["birefringence"] if one else [] for one in birefringent]
-        elif (tilted := [_tilted(one.fit) for one in (best, second)])[0] != tilted[1]:
+        elif (tilted := [_matrices(one.fit) >= GENERAL for one in (best, second)])[0] != tilted[1]:
             named = [[name for name in names if AXIS not in name] for names in (more, less)]
             more, less = [
                 [*names, TILTED] if one else names for names, one in zip(named, tilted, strict=True)
@@ -142,8 +142,7 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         columns: list[np.ndarray | None] = []
         names: list[object] = [fit.layer_test and fit.layer_test.residual]
         for data in (part.data for part in fit.parts):
-            names += [type(data)]
-            names += [data.kind if isinstance(data, Spectrum) else ""]
+            names += [type(data), data.kind if isinstance(data, Spectrum) else ""]
             light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
                 light = "wavelength azimuth delta delta_sigma depolarisation depolarisation_sigma"
@@ -151,15 +150,16 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
         return names, columns
 
     (first, names, columns), *others = ((name, *about(fit)) for name, fit in fits.items())
-    for other, other_names, others_columns in others:
-        pairs = zip(columns, others_columns, strict=False)
-        if names != other_names or not all(
-            a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs
-        ):
+    for other, other_names, other_columns in others:
+        if names != other_names or not all(map(_equal, columns, other_columns)):
             raise UsageError(
                 f"{first} and {other} do not use the same points with the same noise: give both the same"
                 " range, noise and signal, or their criteria mean nothing"
             )
+
+
+def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    return one is other if one is None or other is None else np.array_equal(one, other)
 
 
 class _Residuals(NamedTuple):
@@ -202,14 +202,10 @@ def _deviance(residuals: Sequence[_Residuals], lengths: Sequence[float]) -> floa
     return total
 
 
-def _birefringent(fit: Fit) -> bool:
-    return any(row.effect == "anisotropy" and row.on for part in fit.parts for row in part.plan.rows)
-
-
-def _tilted(fit: Fit) -> bool:
-    return any(
-        row.effect == "anisotropy" and row.count >= GENERAL for part in fit.parts for row in part.plan.rows
-    )
+def _matrices(fit: Fit) -> int:
+    """Size of the matrices of anisotropic media, 0 where nothing is birefringent."""
+    rows = (row for part in fit.parts for row in part.plan.rows if row.effect == "anisotropy")
+    return max((row.count * row.on for row in rows), default=0)
 
 
 def _clearest_birefringence(fit: Fit) -> tuple[float, float, float] | None:
@@ -227,10 +223,8 @@ def _size_of_birefringence(fit: Fit) -> str:
     if (birefringence := _clearest_birefringence(fit)) is None:
         return ""
     wavelength, n, error = birefringence
-    text = f", {n:.3g} ± {error:.2g} at {wavelength:g} nm"
-    if abs(n) > _COMPATIBLE * error:
-        return text
-    return text + ": by noise alone it is there, but usual errors of instruments and samples would imitate it"
+    doubt = ": by noise alone it is there, but usual errors of instruments and samples would imitate it"
+    return f", {n:.3g} ± {error:.2g} at {wavelength:g} nm{doubt if abs(n) <= _COMPATIBLE * error else ''}"
 
 
 def _extra(one: Fit, other: Fit) -> list[str]:

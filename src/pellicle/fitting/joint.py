@@ -7,6 +7,7 @@ Both kinds of data are fitted apart first. The numbers that bear one name in the
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import jax
@@ -31,7 +32,7 @@ from pellicle.fitting.minima import minima
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Estimate, Fit, Part
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES
@@ -75,22 +76,6 @@ def apart(data: Sequence[Datum], scene: Sequence[Scene | Surface]) -> Apart:
     return Apart([d for d, _ in films], [s for _, s in films], [d for d, _ in samples], surfaces[0])
 
 
-def fit(
-    data: Sequence[Datum],
-    scene: Sequence[Scene | Surface],
-    *,
-    residual: str | None = None,
-    tolerance: float = 0.0,
-    loss: str = LEAST_SQUARES,
-    progress: Progress = quiet,
-) -> Fit:
-    """Fit spectra or colours and BRDF samples of one film; the arguments are those of `pellicle.fit`.
-
-    **Raises:** as `apart` does, and as fits of each kind do.
-    """
-    return fitted(data, scene, tolerance, progress, loss, residual)[0]
-
-
 def fitted(
     data: Sequence[Datum],
     scene: Sequence[Scene | Surface],
@@ -99,7 +84,12 @@ def fitted(
     loss: str = LEAST_SQUARES,
     residual: str | None = None,
 ) -> tuple[Fit, RankedMinima]:
-    """The result of `fit`, and the ranked minima that it rests on."""
+    """Fit spectra or colours and BRDF samples of one film; the arguments are those of `pellicle.fit`.
+
+    **Returns:** the fit, and the ranked minima that it rests on.
+
+    **Raises:** as `apart` does, and as fits of each kind do.
+    """
     began, own = time.perf_counter(), apart(data, scene)
     film, film_ranked = of_film.fitted(own.films, own.scenes, tolerance, progress, loss)
     brdf, brdf_ranked = of_samples.fitted(own.samples, own.surface, tolerance, progress, loss, residual)
@@ -157,14 +147,8 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
     """The problem of all data, and starts (starts, parameters) from pairs of minima."""
     first, second = film.searched, brdf.searched
     merged = _merged(first, second)
-    box = Box(
-        lower=merged.joined(merged.lower, second.box.lower),
-        upper=merged.joined(merged.upper, second.box.upper),
-        prior_mean=merged.joined(first.box.prior_mean, second.box.prior_mean),
-        prior_weight=merged.joined(first.box.prior_weight, second.box.prior_weight),
-        logarithmic=merged.joined(first.box.logarithmic, second.box.logarithmic),
-        reach=second.box.reach,
-    )
+    bounds, reach = first.box._replace(lower=merged.lower, upper=merged.upper), second.box.reach
+    box = Box(*[merged.joined(x, y) for x, y in zip(bounds[:5], second.box[:5], strict=True)], reach=reach)
     where, log, tilt = merged.positions, second.coordinates.log, second.coordinates.tilt
     coordinates = Coordinates(
         tuple(merged.joined(np.zeros(len(merged.lower), bool), log).tolist()) if log else (),
@@ -175,24 +159,16 @@ def _combined(film: RankedMinima, brdf: RankedMinima) -> tuple[Problem, np.ndarr
         replace(view, takes=tuple(where[i] for i in view.takes), name=view.name or f"brdf-{number}")
         for number, view in enumerate(second.views, start=1)
     ]
-    problem = Problem((*first.views, *views), merged.parameters, box, coordinates)
-    return problem, _starts(merged, film, brdf)
-
-
-def _starts(merged: _Merged, film: RankedMinima, brdf: RankedMinima) -> np.ndarray:
-    """Points (starts, parameters) of the unit cube from pairs of minima, with shared numbers of either."""
-    values = np.asarray(film.searched.values(film.minima.units))[:_MOST_FILMS]
-    units = brdf.minima.units[:_MOST_SURFACES]
-    span, starts = merged.upper - merged.lower, []
-    for own in values:
-        for unit, numbers in zip(units, np.asarray(brdf.searched.values(units)), strict=True):
-            of_surface = own.copy()
-            for j, i in merged.shared.items():
-                of_surface[i] = numbers[j]
-            for numbers_of_film in (own, of_surface):
-                inside = np.clip((numbers_of_film - merged.lower) / span, 0.0, 1.0)
-                starts.append(merged.joined(inside, unit))
-    return np.array(starts)
+    # starts from pairs of minima, with the shared numbers of either
+    films = np.asarray(first.values(film.minima.units))[:_MOST_FILMS]
+    units, starts = brdf.minima.units[:_MOST_SURFACES], []
+    for own, (unit, numbers) in product(films, zip(units, np.asarray(second.values(units)), strict=True)):
+        of_surface = own.copy()
+        of_surface[[*merged.shared.values()]] = numbers[[*merged.shared]]
+        for values in (own, of_surface):
+            inside = np.clip((values - merged.lower) / (merged.upper - merged.lower), 0.0, 1.0)
+            starts.append(merged.joined(inside, unit))
+    return Problem((*first.views, *views), merged.parameters, box, coordinates), np.array(starts)
 
 
 class JointMeasurements(NamedTuple):

@@ -4,7 +4,6 @@ The Guide to the expression of uncertainty in measurement (JCGM 100:2008, GUM) n
 """
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -34,6 +33,14 @@ class Agreement(StrEnum):
     AGREES = "agrees"
     LARGER = "larger"
     SMALLER = "smaller"
+
+
+_WORDS = {
+    Agreement.AGREES: "the stated noise error agrees with the scatter",
+    Agreement.LARGER: "the stated noise error is too small",
+    Agreement.SMALLER: "the repeats scatter less than the stated error;"
+    " the remainder is common to all of them",
+}
 
 
 @dataclass(frozen=True)
@@ -171,19 +178,11 @@ class Repeats(ReportMixin):
         times = f"{short(p.ratio)} times the stated noise error of {short(p.stated)}{unit}"
         sentence = f"{len(p.values)} repeats: {mean} (mean and its standard deviation)."
         sentence += f" They scatter by {short(p.sd)}{unit}, {times}:"
-        match p.agreement:
-            case Agreement.LARGER:
-                sentence += " the stated noise error is too small"
-                whole = math.hypot(p.stated, p.common)
-                if p.common and p.sd <= whole:
-                    sentence += f", though the whole stated error, {short(whole)}{unit}, covers the scatter"
-                sentence += "."
-            case Agreement.SMALLER:
-                sentence += (
-                    " the repeats scatter less than the stated error; the remainder is common to all of them."
-                )
-            case _:
-                sentence += " the stated noise error agrees with the scatter."
+        whole = math.hypot(p.stated, p.common)
+        sentence += f" {_WORDS[p.agreement]}"
+        if p.agreement is Agreement.LARGER and p.common and p.sd <= whole:
+            sentence += f", though the whole stated error, {short(whole)}{unit}, covers the scatter"
+        sentence += "."
         if p.shared:
             sentence += (
                 f" With {short(p.shared)}{unit} from effects that all repeats share, the mean is known to"
@@ -243,7 +242,13 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
     warnings += [f"{each.path}: its fit is {each.status}" for each in unclear]
     names, compared = dict.fromkeys(p.name for _, fit in used for p in fit.free), {}
     for name in names:
-        known = [(path, fit, p) for path, fit in used if (p := fit.parameters.get(name)) and _usable(p)]
+        # a parameter that rests on a bound does not scatter
+        known = [
+            (path, fit, p)
+            for path, fit in used
+            if (p := fit.parameters.get(name)) and p.free and not p.at_bound
+            if p.stderr_noise > 0 and math.isfinite(p.stderr)
+        ]
         if len(known) < 2:
             continue
         compared[name] = _repeated(name, [p for *_, p in known])
@@ -257,13 +262,8 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
 def _repeated(name: str, estimates: Sequence[Estimate]) -> RepeatedParameter:
     """A parameter with its estimates by all repeats. Logs their scatter."""
     shared = float(np.mean([max(p.stderr**2 - p.stderr_noise**2, 0.0) for p in estimates]))
-    repeated = RepeatedParameter(
-        name,
-        estimates[0].unit,
-        tuple(p.value for p in estimates),
-        tuple(p.stderr_noise for p in estimates),
-        math.sqrt(shared),
-    )
+    values, noise = zip(*((p.value, p.stderr_noise) for p in estimates), strict=True)
+    repeated = RepeatedParameter(name, estimates[0].unit, values, noise, math.sqrt(shared))
     log.info(
         "repeats: %s scatters by %.3g, stated noise error %.3g: chi-square %.3g on %d degrees of freedom",
         *(name, repeated.sd, repeated.stated, repeated.chi2, repeated.freedom),
@@ -271,36 +271,26 @@ def _repeated(name: str, estimates: Sequence[Estimate]) -> RepeatedParameter:
     return repeated
 
 
-def _usable(p: Estimate) -> bool:
-    """True for a free parameter with an error; one that rests on a bound does not scatter."""
-    return p.free and not p.at_bound and p.stderr_noise > 0 and math.isfinite(p.stderr)
-
-
 def _paths(fits: Sequence[Fit]) -> list[str]:
     """Names of repeats: their files, numbered where one file has several."""
-    names = [", ".join(part.data.path for part in fit.parts if part.data.path) for fit in fits]
-    names = [name or "repeat" for name in names]
-    seen: Counter[str] = Counter()
-    result = []
-    for name in names:
-        seen[name] += 1
-        result.append(f"{name} ({seen[name]})" if names.count(name) > 1 else name)
-    return result
+    names = [", ".join(part.data.path for part in fit.parts if part.data.path) or "repeat" for fit in fits]
+    numbers = [names[: i + 1].count(name) for i, name in enumerate(names)]
+    pairs = zip(names, numbers, strict=True)
+    return [f"{name} ({number})" if names.count(name) > 1 else name for name, number in pairs]
 
 
 def _reasons(fits: Sequence[Fit], paths: Sequence[str]) -> list[str]:
     """Reasons to leave out the numbers of each fit: it is not usable or a copy; empty where they are used."""
     reasons = []
     for i, fit in enumerate(fits):
-        copied = [path for path, earlier in zip(paths, fits[:i], strict=False) if _same_data(fit, earlier)]
         reason = f"its fit is {fit.status}" if fit.status in _UNUSABLE else ""
-        reasons.append(f"it holds the same numbers as {copied[0]}" if copied else reason)
+        for path, earlier in zip(paths[:i], fits[:i], strict=True):
+            pairs = zip(fit.parts, earlier.parts, strict=False)
+            if all(np.array_equal(a.data.values, b.data.values) for a, b in pairs):
+                reason = f"it holds the same numbers as {path}"
+                break
+        reasons.append(reason)
     return reasons
-
-
-def _same_data(one: Fit, other: Fit) -> bool:
-    pairs = zip(one.parts, other.parts, strict=False)
-    return all(np.array_equal(a.data.values, b.data.values) for a, b in pairs)
 
 
 def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list[str]:

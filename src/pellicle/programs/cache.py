@@ -23,7 +23,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, TypeAlias, get_type_hints
 
 import jax
 import numpy as np
@@ -117,10 +117,14 @@ def _is_private(handle: int) -> bool:
 
 log = logging.getLogger(__name__)
 
+Program: TypeAlias = Callable[..., Any]
+Options: TypeAlias = dict[str, str | bool]
+"""Options of XLA."""
+
 LIMIT = 256 * 2**20
 """Size of the folder (bytes) above which its oldest files are removed. A program takes 0.05 to 1 MB."""
 
-_OPTIONS: dict[str, str | bool] = {"xla_cpu_use_fusion_emitters": False}
+_OPTIONS: Options = {"xla_cpu_use_fusion_emitters": False}
 """XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
 most run as fast within 20 %, those of a slow scale and offset a third slower (jaxlib 0.10, by
 `benchmarks/fit.py` and `benchmarks/cold_start.py`). Derivatives of hundreds of spectra at once run at a third
@@ -131,7 +135,7 @@ _CALLS = re.compile(r"custom_call @([\w.]+)")
 
 
 @lru_cache(maxsize=1)
-def compiler_options() -> dict[str, str | bool]:
+def compiler_options() -> Options:
     """Options of XLA for the programs of a fit; none for a GPU, or for an XLA that lacks them."""
     if jax.default_backend() != "cpu":
         return {}
@@ -142,7 +146,7 @@ def compiler_options() -> dict[str, str | bool]:
     return _OPTIONS
 
 
-def load(path: Path, key: bytes) -> Callable[..., Any] | None:
+def load(path: Path, key: bytes) -> Program | None:
     """Load the program that `make` kept under the same path and key, or None if no trusted file exists."""
     content = read(path)
     if content is None:
@@ -157,11 +161,11 @@ def load(path: Path, key: bytes) -> Callable[..., Any] | None:
 def make(
     path: Path,
     key: bytes,
-    function: Callable[..., Any],
+    function: Program,
     inputs: Sequence[jax.ShapeDtypeStruct],
     cache: Path,
-    options: dict[str, str | bool],
-) -> Callable[..., Any] | None:
+    options: Options,
+) -> Program | None:
     """Compile a function of arrays and keep its machine code at `path`; None where it cannot be kept.
 
     `cache` is the folder of JAX's own compilation cache, `options` are those of XLA.
@@ -170,8 +174,7 @@ def make(
         return None
     # JAX makes no promise that a program from its own cache can be serialised again: a name of its own keeps
     # this one out of there.
-    name = f"program_{secrets.token_hex(8)}"
-    function.__name__ = name
+    name = function.__name__ = f"program_{secrets.token_hex(8)}"
     lowered = jax.jit(function).lower(*inputs)
     calls = set(_CALLS.findall(lowered.as_text()))
     if any(not call.startswith("lapack_") for call in calls):
@@ -208,11 +211,6 @@ def _loaded(content: bytes, key: bytes) -> Callable[..., Any]:
         # a lowered program that calls LAPACK lets JAX find its addresses, without which other calls crash
         jax.jit(jax.lax.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), float))
     return serialize_executable.deserialize_and_load(*program, execution_devices=jax.devices()[:1])
-
-
-Program = Callable[..., Any]
-Options = dict[str, str | bool]
-"""Options of XLA."""
 
 
 def kept(function: Program, *, many_calls: bool = False) -> Program:

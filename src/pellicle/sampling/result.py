@@ -46,12 +46,6 @@ class Prediction(NamedTuple):
     decades: bool = False
 
 
-def chosen(units: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """`DRAWS` draws (draws, parameters) from those of a chain (steps, walkers, parameters)."""
-    flat = units.reshape(-1, units.shape[-1])
-    return flat[random.integers(len(flat), size=DRAWS)]
-
-
 def predictions(
     problem: Problem, parts: tuple[Part, ...], units: np.ndarray, seed: int
 ) -> tuple[Prediction, ...]:
@@ -59,16 +53,20 @@ def predictions(
 
     `units` are draws (steps, walkers, parameters) in the unit cube of an affine problem.
     """
-    random = np.random.default_rng(seed)
-    drawn = chosen(units, random)
+    random, flat = np.random.default_rng(seed), units.reshape(-1, units.shape[-1])
+    drawn = flat[random.integers(len(flat), size=DRAWS)]
     with jax.enable_x64(True):
         values = np.asarray(problem.values(drawn))
-        pairs = zip(problem.views, parts, strict=True)
         result: list[Prediction] = []
-        for view, part in pairs:
+        for view, part in zip(problem.views, parts, strict=True):
             model = np.asarray(curves(view.form, view.arrays, problem.seen_by(view, values)).model)
             result += _OF[type(part.curve)](view, part, model, random)
         return tuple(result)
+
+
+def _names(part: Part) -> tuple[str, str]:
+    """Prefix of labels and suffix of names of a part among several."""
+    return (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
 
 
 def _spectrum(
@@ -77,7 +75,7 @@ def _spectrum(
     model = model[:, : view.points]
     sigma = 1 / np.asarray(view.data.weight)[: view.points]
     noisy = model + sigma * random.standard_normal(model.shape)
-    curve, (prefix, suffix) = part.spectral, (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    curve, (prefix, suffix) = part.spectral, _names(part)
     axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
     drawn, again = (view.signal.in_quantities(view.in_columns(columns)) for columns in (model, noisy))
     return [
@@ -97,20 +95,13 @@ def _samples(
     compared = compared + random.standard_normal(model.shape) / np.asarray(samples.weight)[rows]
     noisy = np.asarray(INVERSES[residual](compared, *where))
     rank = part.curve.model.argsort(axis=0).argsort(axis=0)
-    prefix, suffix = (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
-    channels = cast(BrdfSamples, part.data).channels
-    return [
-        Prediction(
-            name + suffix,
-            f"{prefix}{name} (1/sr)",
-            Axis(f"rank_{name}{suffix}", "samples, from the darkest to the brightest", rank[:, c]),
-            part.data.values[:, c],
-            model[..., c],
-            noisy[..., c],
-            decades=True,
-        )
-        for c, name in enumerate(channels)
-    ]
+    prefix, suffix = _names(part)
+    predicted = []
+    for c, name in enumerate(cast(BrdfSamples, part.data).channels):
+        at = Axis(f"rank_{name}{suffix}", "samples, from the darkest to the brightest", rank[:, c])
+        numbers = part.data.values[:, c], model[..., c], noisy[..., c]
+        predicted.append(Prediction(name + suffix, f"{prefix}{name} (1/sr)", at, *numbers, decades=True))
+    return predicted
 
 
 def _colours(
@@ -120,7 +111,7 @@ def _colours(
     data = cast(Colours, part.data)
     model = view.encoded(model)
     noisy = model + data.noise * random.standard_normal(model.shape)
-    prefix, suffix = (f"{part.name}: ", f"_{part.name}") if part.name else ("", "")
+    prefix, suffix = _names(part)
     at = Axis(f"colour{suffix}", "colour", np.arange(1.0, len(data) + 1))
     if data.angle is not None:
         at = Axis(f"angle_deg{suffix}", "angle of incidence (degrees)", data.angle)
@@ -192,18 +183,16 @@ class Posterior(PlotMixin):
 
     def marginals(self) -> dict[str, Marginal]:
         """Marginals by name, whatever the checks say."""
-        flat = self.draws.reshape(-1, len(self.names))
+        columns = dict(zip(self.names, self.draws.reshape(-1, len(self.names)).T, strict=True))
         home = self.modes.nearest(self.units.reshape(-1, len(self.names)))
-        result = {name: self._marginal(name, flat[:, i], home) for i, name in enumerate(self.names)}
-        return {name: result[name] for name in self.fit.parameters if name in result}
-
-    def _marginal(self, name: str, values: np.ndarray, home: np.ndarray) -> Marginal:
-        shares = [(mode, float(np.mean(home == mode))) for mode in np.unique(home)]
-        places = [Mode(float(np.median(values[home == mode])), mass) for mode, mass in shares]
-        q025, q50, q975 = np.quantile(values, [0.025, 0.5, 0.975])
-        mean, sd, low, middle, high = map(float, (values.mean(), values.std(ddof=1), q025, q50, q975))
-        ranked = tuple(sorted(places, key=lambda mode: -mode.mass))
-        return Marginal(name, self.fit.parameters[name].unit, mean, sd, low, middle, high, ranked)
+        members, result = [home == mode for mode in np.unique(home)], {}
+        for name, p in self.fit.parameters.items():
+            if (values := columns.get(name)) is not None:
+                places = [Mode(float(np.median(values[own])), float(np.mean(own))) for own in members]
+                figures = values.mean(), values.std(ddof=1), *np.quantile(values, [0.025, 0.5, 0.975])
+                ranked = tuple(sorted(places, key=lambda mode: -mode.mass))
+                result[name] = Marginal(name, p.unit, *map(float, figures), modes=ranked)
+        return result
 
     def __getitem__(self, name: str) -> Marginal:
         return self.parameters[name]

@@ -24,7 +24,7 @@ from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import fit as spectra
-from pellicle.fitting.film.colour_targets import arrays
+from pellicle.fitting.film.colour_measurements import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
@@ -245,30 +245,24 @@ def subject_of(
         raise UsageError(
             f"posteriors need {', '.join(absent)}, not installed here: {install_command('posterior')}"
         )
+    rows: Any = data
+    scenes: Any = scene
     if isinstance(scene, Surface):
-        fitted = _of_surface(data, scene, tolerance, residual, progress)
-    elif joint.of_both_kinds(scene):
-        fitted = _of_both_kinds(data, scene, tolerance, residual, progress)
-    else:
-        fitted = _of_film(data, scene, tolerance, progress)
+        return _of_surface(data, scene, tolerance, residual, progress)
+    if not joint.of_both_kinds(scene):
+        return _of_film(data, scene, tolerance, progress)
+    fit, ranked = joint.fitted(rows, scenes, tolerance, progress, residual=residual)
     with jax.enable_x64(True):
-        return _subject(fitted)
-
-
-class _Fitted(NamedTuple):
-    """A fit with its minima, the function from them to its measurements, the hash that identifies its
-    posterior, and what the posterior assumes beyond the fit."""
-
-    fit: Fit
-    ranked: RankedMinima
-    measurements: Callable[[RankedMinima], Any]
-    identity: str
-    assumption: str = ""
+        kinds = joint.apart(rows, scenes)
+        targets = spectra.measurements(kinds.films, kinds.scenes)
+        known = [*map(arrays, targets), *_columns(kinds.samples, kinds.surface)]
+        identity = fingerprint(known, kinds.surface.model, residual, tolerance)
+        return _subject(fit, ranked, partial(joint.together, kinds, targets), identity)
 
 
 def _of_surface(
     data: Any, scene: Surface, tolerance: float, residual: str | None, progress: Progress
-) -> _Fitted:
+) -> Subject:
     measurements = measured((BrdfSamples,), data)
     fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
     unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
@@ -276,28 +270,18 @@ def _of_surface(
     compared = fit.layer_test.residual if fit.layer_test else ""
     identity = fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
     assumption = "there is a layer" if unsure else ""
-    return _Fitted(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
-
-
-def _of_both_kinds(
-    data: Any, scene: Any, tolerance: float, residual: str | None, progress: Progress
-) -> _Fitted:
-    fit, ranked = joint.fitted(data, scene, tolerance, progress, residual=residual)
     with jax.enable_x64(True):
-        own = joint.apart(data, scene)
-        targets = spectra.measurements(own.films, own.scenes)
-        known = [*map(arrays, targets), *_columns(own.samples, own.surface)]
-        identity = fingerprint(known, own.surface.model, residual, tolerance)
-    return _Fitted(fit, ranked, partial(joint.together, own, targets), identity)
+        return _subject(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
 
 
-def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> _Fitted:
+def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> Subject:
     measurements = measured(OF_A_FILM, data)
     fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
     with jax.enable_x64(True):
         targets = spectra.measurements(measurements, scene)
         identity = fingerprint([arrays(target) for target in targets], tolerance)
-    return _Fitted(fit, ranked, partial(FilmMeasurements, spectra.listed(measurements), targets), identity)
+        known = partial(FilmMeasurements, spectra.listed(measurements), targets)
+        return _subject(fit, ranked, known, identity)
 
 
 def _columns(samples: Sequence[BrdfSamples], surface: Surface) -> list[tuple[Any, ...]]:
@@ -305,11 +289,21 @@ def _columns(samples: Sequence[BrdfSamples], surface: Surface) -> list[tuple[Any
     return [*columns, (dict(surface.numbers), tuple(surface.bands), surface.media)]
 
 
-def _subject(fitted: _Fitted) -> Subject:
-    """Subject of sampling: the log posterior with its systematic effects, its minima and its predictions."""
-    fit, ranked = fitted.fit, fitted.ranked.counted
+def _subject(
+    fit: Fit,
+    ranked: RankedMinima,
+    measurements: Callable[[RankedMinima], Any],
+    identity: str,
+    assumption: str = "",
+) -> Subject:
+    """Log posterior of a fit with its systematic effects, its minima and its predictions.
+
+    `measurements` makes those of the fit from its minima, `identity` is the hash of all that the posterior
+    depends on, `assumption` what it assumes beyond the fit.
+    """
+    ranked = ranked.counted
     jacobian, covariance = linearised(ranked)
-    residuals, problem = fitted.measurements(ranked).evidence(jacobian), ranked.problem.affine()
+    residuals, problem = measurements(ranked).evidence(jacobian), ranked.problem.affine()
     shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
     channels = [view.channels for view in problem.views]
     effects = systematics(residuals, shares, channels, len(problem.parameters))
@@ -321,10 +315,10 @@ def _subject(fitted: _Fitted) -> Subject:
         log_density(problem, effects),
         mixture,
         lambda units: problem.values_near(units, ranked.values),
-        fitted.identity,
+        identity,
         max(view.independent for view in problem.views),
         lambda units, seed: predictions(problem, fit.parts, units, seed),
-        fitted.assumption,
+        assumption,
         sandwich_stretch(covariance, slope, mixture),
     )
 

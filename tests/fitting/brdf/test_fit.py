@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.api.fits import fit
 from pellicle.brdf import direction, model
 from pellicle.errors import UsageError
-from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.result import Status
 from pellicle.reporting.json_record import to_json
 from pellicle.scene.free import Free

@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import brentq, least_squares
 
 import pellicle as pl
+from pellicle.api.fits import fit
 from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting import conclusion as shared
 from pellicle.fitting.brdf import fit as module
-from pellicle.fitting.brdf.fit import fit
 from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.progress import quiet

@@ -9,7 +9,7 @@ from pellicle.colour import sensor
 from pellicle.colour.encoding import camera_encoding, encoding
 from pellicle.data.colours import CameraMatrix, Colours
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.film.colour_targets import measured_colours
+from pellicle.fitting.film.colour_measurements import measured_colours
 from pellicle.fitting.film.problem import make
 
 from ...airy import airy

@@ -20,7 +20,7 @@ from pellicle.fitting.brdf.view import RESIDUALS
 from pellicle.fitting.conclusion import common_rms, ranked_minima
 from pellicle.fitting.minima import Minima, deviance_at, minima
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
@@ -36,28 +36,6 @@ _KEPT_EFFECTS = ("precision",)
 _FLAT, _PLAIN = "the surface without interference", "two lobes without a layer"
 
 
-def fit(
-    data: BrdfSamples | Sequence[BrdfSamples],
-    surface: Surface,
-    *,
-    residual: str | None = None,
-    tolerance: float = 0.0,
-    loss: str = LEAST_SQUARES,
-    progress: Progress = quiet,
-) -> Fit:
-    """Fit the free numbers of `surface`, in float64 whatever the caller's setting.
-
-    A list of samples of one surface is fitted jointly. `residual` names what is compared
-    (`residuals.RESIDUALS`): by default `linear` over σ where all samples have one, else `cube-root`. The same
-    samples are fitted without interference and with two lobes and no layer, all of them on four fifths of the
-    samples and judged on the rest. `tolerance`, here relative, and `loss` are those of fits of spectra.
-
-    **Raises:** UsageError where nothing is free, a residual, a loss or the wavelengths do not match, or the
-    samples are too few.
-    """
-    return fitted(data, surface, tolerance, progress, loss, residual)[0]
-
-
 def fitted(
     data: BrdfSamples | Sequence[BrdfSamples],
     surface: Surface,
@@ -66,13 +44,23 @@ def fitted(
     loss: str = LEAST_SQUARES,
     residual: str | None = None,
 ) -> tuple[Fit, RankedMinima]:
-    """The result of `fit`, and the ranked minima that it rests on."""
+    """Fit the free numbers of `surface`, in float64 whatever the caller's setting.
+
+    A list of samples of one surface is fitted jointly. `residual` names what is compared
+    (`residuals.RESIDUALS`): by default `linear` over σ where all samples have one, else `cube-root`. The same
+    samples are fitted without interference and with two lobes and no layer, all of them on four fifths of the
+    samples and judged on the rest. `tolerance`, here relative, and `loss` are those of fits of spectra.
+
+    **Returns:** the fit, and the ranked minima that it rests on.
+
+    **Raises:** UsageError where nothing is free, a residual, a loss or the wavelengths do not match, or the
+    samples are too few.
+    """
     check_loss(loss)
     samples = [data] if isinstance(data, BrdfSamples) else list(data)
     if not samples:
         raise UsageError("there are no samples to fit: give some, or a list of them")
-    known = all(each.sigma is not None for each in samples)
-    name = residual or ("linear" if known else "cube-root")
+    name = residual or ("linear" if all(each.sigma is not None for each in samples) else "cube-root")
     if name not in RESIDUALS:
         raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
     _check(samples, surface)

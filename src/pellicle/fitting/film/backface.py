@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.film.colour_targets import MeasuredColours
+from pellicle.fitting.film.colour_measurements import MeasuredColours
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Target

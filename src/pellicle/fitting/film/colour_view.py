@@ -71,18 +71,11 @@ class Local(NamedTuple):
 def local(form: ColourForm, scene: Scene, data: ColourData, values: Any) -> Local:
     """Colours, their Jacobian, and the layer's index at `values` (parameters,)."""
     linear = linearised(form, scene, data, values)
-    colours = linear.signal.reshape(-1, 3)
-    own = record(colours, data)
-    return Local(
-        colours,
-        linear.slope.reshape(-1, 3, len(values)),
-        own.model,
-        own.residual / jnp.sqrt(data.independent_fraction),
-        own.coefficients,
-        own.exposure,
-        linear.layer,
-        linear.layer_slope,
-    )
+    colours, slope = linear.signal.reshape(-1, 3), linear.slope.reshape(-1, 3, len(values))
+    model, residual, coefficients, exposure, *_ = record(colours, data)
+    residual /= jnp.sqrt(data.independent_fraction)
+    recorded = model, residual, coefficients, exposure
+    return Local(colours, slope, *recorded, linear.layer, linear.layer_slope)
 
 
 @dataclass(frozen=True)
@@ -163,8 +156,9 @@ class ColoursView:
 
     def response(self, at: Local) -> np.ndarray:
         """The matrix (3, 3) from colours of the sensor to recorded linear channels."""
-        own = self.data.response
-        return own.known * own.channels + at.exposure * np.einsum("k,kij->ij", at.coefficients, own.modes)
+        camera = self.data.response
+        modes = np.einsum("k,kij->ij", at.coefficients, camera.modes)
+        return camera.known * camera.channels + at.exposure * modes
 
     def weighted(self, at: Local, change: np.ndarray) -> np.ndarray:
         """A change of the recorded linear channels (colours, 3, ...) as the residuals have it."""
@@ -174,15 +168,13 @@ class ColoursView:
 
     def nuisances(self, at: Local) -> list[Factor]:
         """Exposure, white balance and the modes of a chart's matrix."""
-        own, unit = f".{self.name}" if self.name else "", float(at.exposure)
-        mean, sd = (np.asarray(x).tolist() for x in (self.data.response.mean, self.data.response.sd))
-        rows = zip(self.modes, np.asarray(at.coefficients).tolist(), mean, sd, strict=True)
+        suffix, unit = f".{self.name}" if self.name else "", float(at.exposure)
+        columns = (at.coefficients, self.data.response.mean, self.data.response.sd)
+        rows = zip(self.modes, *(np.asarray(x).tolist() for x in columns), strict=True)
+        # an unknown factor has next to no prior, and is in its own unit
         return [
-            # an unknown factor has next to no prior, and is in its own unit
-            Factor(f"instrument.{name}{own}", unit * c, unit * s, 0.0)
-            if m
-            else Factor(f"instrument.{name}{own}", c, s, c / s)
-            for name, c, m, s in rows
+            Factor(f"instrument.{name}{suffix}", *((unit * c, unit * s, 0.0) if mean else (c, s, c / s)))
+            for name, c, mean, s in rows
         ]
 
     def jacobian(self, at: Local) -> np.ndarray:
@@ -267,7 +259,7 @@ class ColourData(NamedTuple):
     limits: Array
     sensor: Array
     response: Response
-    independent_fraction: Array | np.floating
+    independent_fraction: Array | np.floating = np.float64(1.0)
 
 
 class Recorded(NamedTuple):
@@ -288,26 +280,21 @@ def camera_response(data: Colours, channels: np.ndarray, scale: float | Drift) -
 
     `channels` (3, 3) takes the sensor's colours to linear channels; `scale` is the exposure.
     """
-    rows = np.eye(3)
-    modes: list[np.ndarray] = []
-    names: list[str] = []
+    modes: dict[str, np.ndarray] = {}
     if data.white_balance == "free":
-        modes = [row[:, None] * channels for row in rows]
-        names = [f"white_balance_{letter}" for letter in data.channels]
+        rows = zip(data.channels, np.eye(3), strict=True)
+        modes = {f"white_balance_{letter}": row[:, None] * channels for letter, row in rows}
     elif isinstance(scale, Drift):
-        modes, names = [channels], ["scale"]
+        modes = {"scale": channels}
     mean, sd = np.ones(len(modes)), np.full(len(modes), LOOSE)
     if data.camera is not None:
         values, vectors = np.linalg.eigh(np.asarray(data.camera.covariance))
-        own = [v.reshape(3, 3) * x**0.5 for x, v in zip(values, vectors.T, strict=True) if x > 0]
-        modes += own
-        names += [f"camera_{i}" for i in range(1, len(own) + 1)]
-        mean, sd = np.append(mean, np.zeros(len(own))), np.append(sd, np.ones(len(own)))
-    known = 0.0
-    if not isinstance(scale, Drift) and data.white_balance == "fixed":
-        known = float(scale)
-    stacked = np.stack(modes) if modes else np.zeros((0, 3, 3))
-    return Response(channels, np.float64(known), stacked, mean, sd), names
+        errors = [v.reshape(3, 3) * x**0.5 for x, v in zip(values, vectors.T, strict=True) if x > 0]
+        modes |= {f"camera_{i}": error for i, error in enumerate(errors, start=1)}
+        mean, sd = np.append(mean, np.zeros(len(errors))), np.append(sd, np.ones(len(errors)))
+    known = 0.0 if isinstance(scale, Drift) or data.white_balance != "fixed" else float(scale)
+    stacked = np.reshape(list(modes.values()), (-1, 3, 3))
+    return Response(channels, np.float64(known), stacked, mean, sd), list(modes)
 
 
 def record(colours: Any, data: ColourData) -> Recorded:

@@ -61,8 +61,7 @@ def wider(
         views = zip(now.problem.views, now.fits, strict=True)
         missed = any(residual_structure.missed(view, fit) for view, fit in views)
         # where noise alone is left, nothing far away can be better
-        for slab in _slabs(before, moved) if missed else ():
-            beside = _within(problem, slab)
+        for beside in _slabs(problem, before) if missed else ():
             starts.append(np.asarray(beside.values(search(beside, progress).units)))
         again = rank(problem, minima(problem, _inside(problem, np.concatenate(starts))), loss)
         pinned = again.problem._replace(box=problem.box._replace(lower=values, upper=values))
@@ -72,8 +71,11 @@ def wider(
             break
         now, gains = again, gains + gain
     parameters, values = now.problem.parameters, np.asarray(now.problem.values(now.minima.units))
-    pairs = list(zip(old, parameters, values[0].tolist(), strict=True))
-    if any(_at_moved_bound(*each) for each in pairs):
+    ends = [p.on_ends(value) for p, value in zip(parameters, values[0].tolist(), strict=True)]
+    if any(
+        (low and p.lower < before.lower) or (high and p.upper > before.upper)
+        for before, p, (low, high) in zip(old, parameters, ends, strict=True)
+    ):
         resting = [p for p, value in zip(old, ranked.values.tolist(), strict=True) if _moved(p, value) != p]
         words = tuple(
             f"the best fit rests on the default bounds of {p.name}, and within wider ones on their end"
@@ -84,7 +86,7 @@ def wider(
     words = tuple(
         f"the default bounds of {p.name} were widened from {_range(p)} to {_range(q)}: the best fit lay on"
         f" them (Δχ² {gains:.3g})"
-        for p, q, _ in pairs
+        for p, q in zip(old, parameters, strict=True)
         if p != q
     )
     return Wider(parameters, values, words)
@@ -103,27 +105,18 @@ def _moved(p: Parameter, value: float) -> Parameter:
     return replace(p, lower=max(p.lower - span, least), upper=min(p.upper + span, most))
 
 
-def _at_moved_bound(old: Parameter, new: Parameter, value: float) -> bool:
-    """True where a value rests on a bound that is not the old one."""
-    low, high = new.on_ends(value)
-    return (low and new.lower < old.lower) or (high and new.upper > old.upper)
-
-
-def _slabs(before: Sequence[Parameter], moved: Sequence[Parameter]) -> Iterator[tuple[Parameter, ...]]:
-    """Bounds of what was added to the box on each side of each parameter, of the others all.
+def _slabs(problem: Problem, before: Sequence[Parameter]) -> Iterator[Problem]:
+    """What was added to the box of a problem on each side of each parameter, with all of the others' bounds.
 
     Thin slabs are left out: what they contain is near the minima that rest on the bound.
     """
-    for i, (p, q) in enumerate(zip(before, moved, strict=True)):
+    for i, (p, q) in enumerate(zip(before, problem.parameters, strict=True)):
         for lower, upper in ((q.lower, p.lower), (p.upper, q.upper)):
             if upper - lower > _THIN * (p.upper - p.lower):
-                yield (*moved[:i], replace(q, lower=lower, upper=upper), *moved[i + 1 :])
-
-
-def _within(problem: Problem, parameters: tuple[Parameter, ...]) -> Problem:
-    """The problem with the bounds of these parameters."""
-    own = box(*bounds(parameters), [p.prior for p in parameters])
-    return problem._replace(parameters=parameters, box=own)
+                part = replace(q, lower=lower, upper=upper)
+                slab = (*problem.parameters[:i], part, *problem.parameters[i + 1 :])
+                own = box(*bounds(slab), [p.prior for p in slab])
+                yield problem._replace(parameters=slab, box=own)
 
 
 def _inside(problem: Problem, values: np.ndarray) -> np.ndarray:
@@ -145,9 +138,9 @@ def measured_within(
 
 def joined(problem: Problem, searched: Minima, values: np.ndarray) -> Minima:
     """The minima of a search and those below `values` (starts, parameters), best first."""
-    own = minima(problem, _inside(problem, values))
+    below = minima(problem, _inside(problem, values))
     columns = ("units", "deviance", "converged")
-    both = {name: np.concatenate([getattr(searched, name), getattr(own, name)]) for name in columns}
+    both = {name: np.concatenate([getattr(searched, name), getattr(below, name)]) for name in columns}
     return distinct(problem, replace(searched, **both), MOST)
 
 
@@ -159,11 +152,10 @@ def remarks(ranked: RankedMinima, binding: Container[str]) -> list[str]:
         low, high = p.on_ends(value)
         if p.limits is None or p.name in binding or not (low or high) or (low and p.natural[0]):
             continue
-        words = f"{p.name} rests on {_amount(value, p)}"
+        bound = "a default bound: wider ones explain the data no better"
         if value in p.limits:
-            sentences.append(f"{words}, the {'least' if low else 'largest'} value that physics allows")
-        else:
-            sentences.append(f"{words}, a default bound: wider ones explain the data no better")
+            bound = f"the {'least' if low else 'largest'} value that physics allows"
+        sentences.append(f"{p.name} rests on {_amount(value, p)}, {bound}")
     return sentences
 
 

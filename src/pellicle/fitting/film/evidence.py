@@ -8,7 +8,7 @@ import numpy as np
 
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Evidence
-from pellicle.fitting.film.colour_summary import colours_evidence
+from pellicle.fitting.film.colour_measurements import colours_evidence
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.targets import Target

@@ -25,8 +25,7 @@ from pellicle.fitting.film import (
     parts,
     summary,
 )
-from pellicle.fitting.film.colour_summary import with_probabilities
-from pellicle.fitting.film.colour_targets import measured_colours
+from pellicle.fitting.film.colour_measurements import measured_colours, with_probabilities
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search

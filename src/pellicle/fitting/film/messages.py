@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
-from pellicle.fitting.film.colour_targets import MeasuredColours
+from pellicle.fitting.film.colour_measurements import MeasuredColours
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.problem import Problem
 from pellicle.forward_model.plan import Plan

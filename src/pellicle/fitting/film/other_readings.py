@@ -6,6 +6,8 @@ fourth Stokes parameter. A reading by which the scene would explain the data is 
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
+from typing import TypeGuard
 
 import numpy as np
 
@@ -33,13 +35,13 @@ def remarks(spectra: Data, rms: Sequence[float], fitted: Callable[[Data], Fit]) 
     `rms` has the residuals of each spectrum, in its own unit; `fitted` fits the data of another reading.
     """
     sentences = []
-    if (other := as_folded(spectra)) is not None and (value := _explaining(fitted(other))):
+    if (other := _read_as(as_folded, spectra)) and (value := _explaining(fitted(other))):
         sentences.append(
             f"delta lies within 0 to 180, and read as folded it would fit, with {value}: give `folded=True`"
         )
-    if (other := _with_other_signs(spectra)) is not None and (value := _explaining(fitted(other))):
-        each = [reversed_elements(s.elements) for s in other if isinstance(s, Spectrum)]
-        names = ", ".join(dict.fromkeys(name for elements in each for name in elements))
+    if (other := _read_as(_reversed, spectra)) and (value := _explaining(fitted(other))):
+        elements = [reversed_elements(s.elements) for s in other if isinstance(s, Spectrum)]
+        names = ", ".join(dict.fromkeys(chain.from_iterable(elements)))
         sentences.append(
             f"with the opposite signs of {names} it would fit, with {value}: the file follows the other "
             "convention of the fourth Stokes parameter; reverse the signs of these columns"
@@ -62,30 +64,27 @@ def _explaining(other: Fit) -> str:
     return f"{named[0].name} {named[0].value:.6g} {named[0].unit}".rstrip()
 
 
-def as_folded(spectra: Sequence[Spectrum | Colours]) -> Data | None:
-    """The spectra with each Δ as folded that can be; None where none can."""
-    folded = [
-        replace(s, folded=True, sweeps=tuple(replace(sweep, folded=True) for sweep in s.sweeps))
-        if isinstance(s, Spectrum)
-        and s.delta is not None
-        and not (s.folded or s.ratios)
-        and can_be_folded(s.delta)
-        else s
-        for s in spectra
-    ]
-    return None if all(a is b for a, b in zip(folded, spectra, strict=True)) else folded
+def _read_as(reading: Callable[[Spectrum], Spectrum], spectra: Data) -> Data:
+    """The data with each spectrum in another reading; empty where none has another."""
+    read = [reading(s) if isinstance(s, Spectrum) else s for s in spectra]
+    return [] if all(a is b for a, b in zip(read, spectra, strict=True)) else read
 
 
-def _with_other_signs(spectra: Sequence[Spectrum | Colours]) -> Data | None:
-    """The spectra with the opposite sign of m14, m24, m34, m41, m42, m43; None where none has one of them."""
-    turned = [
-        _reversed(s) if isinstance(s, Spectrum) and reversed_elements(s.elements) else s for s in spectra
-    ]
-    return None if all(a is b for a, b in zip(turned, spectra, strict=True)) else turned
+def as_folded(spectrum: Spectrum) -> Spectrum:
+    """The spectrum with its Δ as folded, if it can be."""
+    unfolded = not (spectrum.folded or spectrum.ratios)
+    if spectrum.delta is None or not unfolded or not can_be_folded(spectrum.delta):
+        return spectrum
+    sweeps = tuple(replace(sweep, folded=True) for sweep in spectrum.sweeps)
+    return replace(spectrum, folded=True, sweeps=sweeps)
 
 
 def _reversed(spectrum: Spectrum) -> Spectrum:
-    signs = np.where(np.isin(spectrum.elements, reversed_elements(spectrum.elements)), -1.0, 1.0)
+    """The spectrum with the opposite sign of m14, m24, m34, m41, m42, m43, if it has one of them."""
+    names = reversed_elements(spectrum.elements)
+    if not names:
+        return spectrum
+    signs = np.where(np.isin(spectrum.elements, names), -1.0, 1.0)
     sweeps = tuple(_reversed(sweep) for sweep in spectrum.sweeps)
     return replace(spectrum, values=spectrum.values * signs, sweeps=sweeps)
 
@@ -96,17 +95,16 @@ def conventions(spectra: Sequence[Spectrum | Colours], rms: Sequence[float]) -> 
 
     A folded Δ is within 0 to 180 degrees in one other convention only.
     """
-    measured = [
-        (s, size) for s, size in zip(spectra, rms, strict=True) if isinstance(s, Spectrum) and _has_delta(s)
-    ]
+    measured = [(s, size) for s, size in zip(spectra, rms, strict=True) if _has_delta(s)]
     if not any(size > _LARGE for _, size in measured):
         return
     for words in ("180 - delta",) if any(s.folded for s, _ in measured) else _CONVENTIONS:
-        yield words, [_read(s, words) if isinstance(s, Spectrum) and _has_delta(s) else s for s in spectra]
+        yield words, [_read(s, words) if _has_delta(s) else s for s in spectra]
 
 
-def _has_delta(spectrum: Spectrum) -> bool:
-    return spectrum.delta is not None and not spectrum.ratios
+def _has_delta(data: Spectrum | Colours) -> TypeGuard[Spectrum]:
+    """True for a spectrum of one Δ."""
+    return isinstance(data, Spectrum) and data.delta is not None and not data.ratios
 
 
 def _read(spectrum: Spectrum, words: str) -> Spectrum:

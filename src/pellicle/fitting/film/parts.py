@@ -13,8 +13,8 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.curves import ColourCurve, Curve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy
-from pellicle.fitting.film.colour_summary import accuracy as colours_accuracy
-from pellicle.fitting.film.colour_summary import colour_curve, colours_part
+from pellicle.fitting.film.colour_measurements import accuracy as colours_accuracy
+from pellicle.fitting.film.colour_measurements import colour_curve, colours_part
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.fringes import Fringes

@@ -7,7 +7,7 @@ import numpy as np
 from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.fitting.coordinates import box
-from pellicle.fitting.film.colour_targets import MeasuredColours, colours_view
+from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_view
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.parameters import anonymous, bounds, shared
 from pellicle.fitting.film.sweeps import sweeps_of

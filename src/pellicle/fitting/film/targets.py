@@ -10,7 +10,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
-from pellicle.fitting.film.colour_targets import MeasuredColours
+from pellicle.fitting.film.colour_measurements import MeasuredColours
 from pellicle.fitting.problem import Noise
 from pellicle.forward_model.film_signal import depolarises
 from pellicle.scene.film import Light, Scene

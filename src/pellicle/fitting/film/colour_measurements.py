@@ -1,0 +1,252 @@
+"""Colours in a fit: their target and view, their part and curve, evidence of a discrepancy, probabilities."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from pellicle.colour.encoding import camera_encoding, encoding
+from pellicle.colour.spaces import delta_e76, lab
+from pellicle.data.colours import Colours
+from pellicle.effects.differences import largest_index
+from pellicle.effects.film_plan import plan
+from pellicle.errors import DataError, UsageError
+from pellicle.fitting.covariance import errors, scaled
+from pellicle.fitting.curves import ColourCurve
+from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence
+from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
+from pellicle.fitting.film.parameters import anonymous
+from pellicle.fitting.film.systematic_effects import named_for, simulated_effects
+from pellicle.fitting.misfit import Accuracy
+from pellicle.fitting.problem import Noise
+from pellicle.fitting.reported_layer import layer_errors, principal_indices
+from pellicle.fitting.result import Part, Rival
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.forward_model.film_signal import tabulated
+from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength
+from pellicle.scene.free import is_free
+from pellicle.scene.instrument import Drift
+
+_APART = 8.0
+"""Standard deviations by which no two measurements of one colour differ."""
+
+
+class MeasuredColours(NamedTuple):
+    """Colours of one film, and the scene that is to explain them, with the wavelengths of the sensor."""
+
+    scene: Scene
+    colours: Colours
+    name: str = ""  # that of one among several
+
+    noise = Noise(given=True)
+
+    @property
+    def wavelength(self) -> np.ndarray:
+        """Wavelengths of the sensor (nm)."""
+        return self.colours.sensor[0]
+
+
+def arrays(target: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A target as a pytree of all that it depends on: of colours their arrays and words."""
+    if not isinstance(target, MeasuredColours):
+        return target
+    c = target.colours
+    numbers = c.values, c.noise, c.sensor, c.camera, c.gamma
+    return target.scene, *numbers, c.space, c.white_balance, target.name
+
+
+def measured_colours(data: Colours, scene: Scene, name: str = "") -> MeasuredColours:
+    """Colours with the scene in their light. Raises UsageError as `fit` does."""
+    angle: Any = scene.light.angle
+    stated, place = data.angle, f"{data.source}: " if data.source else ""
+    several = stated is not None and np.ptp(stated) > 0
+    if several and is_free(angle):
+        raise UsageError(f"{place}has several angles of incidence, and one free angle cannot stand for them")
+    if stated is not None and not is_free(angle):
+        if np.ndim(angle) == 0 and angle and not np.isclose(stated, angle, atol=1e-3).any():
+            raise UsageError(
+                f"{place}has its own angles of incidence, which contradict `angle={float(angle):g}`;"
+                " leave that out"
+            )
+        angle = np.repeat(stated, len(data.sensor[0])) if several else float(stated[0])
+    apart = np.ptp(data.values, axis=0) / np.median(data.noise, axis=0)
+    if not several and np.max(apart) > _APART:
+        ignored = next((note for note in data.notes if note.startswith("ignored: ")), "")
+        unknown = f" ({ignored})" if ignored else ""
+        raise DataError(
+            f"{place}{len(data)} colours of one film at one angle of incidence differ by up to"
+            f" {np.max(apart):.2g} standard deviations{unknown}: give each its angle, in a column angle_deg,"
+            " or tell the films apart by a column name"
+        )
+    instrument = scene.instrument
+    if isinstance(instrument.scale, Drift) and instrument.scale.degree:
+        raise UsageError(
+            f'{data.source}: a colour has one scale, its exposure: give `scale="free"` or a number'
+        )
+    if isinstance(instrument.offset, Drift) or instrument.offset != 0.0:
+        raise UsageError(f"{place}a colour has no offset: leave it out")
+    if np.ndim(scene.light.azimuth):
+        raise UsageError(f"{place}colours are of one azimuth of the sample: give the scene one")
+    unpolarised = data.polarisation == "unpolarised"
+    polarisation = scene.light.polarisation if unpolarised else data.polarisation
+    wavelength = np.tile(data.sensor[0], len(data))
+    light = Light(wavelength, angle, data.signal, polarisation, scene.light.azimuth)
+    return MeasuredColours(eqx.tree_at(lambda s: s.light, scene, light), data, name)
+
+
+def colours_view(
+    measured: MeasuredColours, takes: tuple[int, ...], tolerance: float, kept: tuple[str, ...]
+) -> ColoursView:
+    """The view of measured colours. `kept` names effects that a tolerance does not remove.
+
+    Errors are taken to first order from the space of the colours to linear channels.
+    """
+    scene, colours = measured.scene, measured.colours
+    chosen, white = plan(scene, tolerance, kept), colours.sensor[1].sum(axis=0)
+    if colours.space == "rgb":
+        camera = np.diag(1 / white) if colours.camera is None else np.asarray(colours.camera.matrix)
+        code = camera_encoding(colours.gamma)._replace(linear=camera)
+    else:
+        code = encoding(colours.space, white)
+    linear = code.decoded(colours.values)
+    response, modes = camera_response(colours, code.linear, scene.instrument.scale)
+    values = colours.values
+    limits = np.where(values >= 1, 1.0, np.where(values <= 0, -1.0, 0.0)) * code.clips
+    if colours.space == "rgb":  # exact 0 and 1 are where a camera clips
+        limits = np.where((values == 0) | (values == 1), limits, 0.0)
+    data = ColourData(
+        values=linear,
+        frame=code.rise(linear) / colours.noise[:, :, None],
+        weight=np.ones(linear.shape),
+        limits=limits,
+        sensor=colours.sensor[1],
+        response=response,
+    )
+    densest = max(
+        (largest_index(x.material, measured.wavelength) for x in coherent_layers(scene)), default=1.0
+    )
+    shifts = chosen.on("coherence") or scene.instrument.wavelength_shift is not None
+    sampled = tabulated(with_wavelength(scene, np.asarray(scene.light.wavelength)), shifts)
+    return ColoursView(measured.name, chosen, anonymous(sampled), data, takes, code, tuple(modes), densest)
+
+
+def colours_part(colours: Colours, view: ColoursView, fit: ViewFit, covariance: np.ndarray) -> Part:
+    """The part of a fit that colours are; `covariance` is that of the parameters of the view."""
+    return Part(
+        name=view.name,
+        data=colours,
+        curve=colour_curve(colours, view, fit.at, covariance),
+        plan=view.plan,
+        rms=view.rms(fit.at),
+        chi2_reduced=fit.chi2 / fit.freedom,
+        effective_points=view.rows / fit.length,
+        sigma_from="usual" if colours.sigma is None else "given",
+    )
+
+
+def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.ndarray) -> ColourCurve:
+    """Data and model in the space of the data, and the layer's index at the wavelengths of the sensor."""
+    nm, sensor = colours.sensor
+    n_stderr, k_stderr = layer_errors(at, covariance, len(nm))
+    n, k = np.asarray(at.layer)[:2, : len(nm)]
+    difference = None  # where the channels are those of a camera
+    if colours.space != "rgb" or colours.camera is not None:
+        to_xyz, white = np.linalg.inv(view.encoding.linear), sensor.sum(axis=0)
+        both = (np.asarray(lab(np.asarray(x) @ to_xyz.T, white)) for x in (view.data.values, at.model))
+        difference = np.asarray(delta_e76(*both))
+    return ColourCurve(
+        data=colours.values,
+        sigma=colours.noise,
+        model=view.encoded(at.model),
+        difference=difference,
+        wavelength=nm,
+        n=n,
+        k=k,
+        n_stderr=n_stderr,
+        k_stderr=k_stderr,
+        principal=principal_indices(view.scene, at, covariance, nm),
+    )
+
+
+LARGEST = 0.03
+"""Difference of a channel, in units of its range, that no calibrated camera makes: a ΔE*ab of about 3."""
+
+
+def colours_evidence(
+    view: ColoursView, values: np.ndarray, at: Local, scene: Scene, block: np.ndarray
+) -> Evidence:
+    """Evidence of colours at `values` (the parameters of the view,), in units of their σ.
+
+    `block` are their rows of the scaled Jacobian, by the σ of their weights.
+    """
+    weight = np.asarray(view.data.weight)
+    columns = block.reshape(view.rows, 3, -1) / weight[:, :, None]
+    residual, one = view.residuals(at) / weight, np.ones(weight.shape)
+    effects = [
+        row.effect(_change(view, at, (weights @ change).reshape(-1, 3)) / weight)
+        for row, weights, change in simulated_effects(view, values, scene)
+    ]
+    effects = named_for([*effects, *_of_exposure(view, at, scene, weight)], view.name)
+    counted = weight * np.sqrt(view.independent_fraction)
+    return Evidence(residual, columns, one, 1.0, counted, effects, view.correlation_length)
+
+
+def accuracy(view: ColoursView, sigma: float) -> Accuracy:
+    """The residuals, in units of the median `sigma` of the data, that no camera makes."""
+    span = 100.0 if view.encoding.mix[0, 1] else 1.0  # L*, a*, b*
+    return Accuracy(largest=LARGEST * span / sigma)
+
+
+def _change(view: ColoursView, at: Local, colours: np.ndarray) -> np.ndarray:
+    """A change of the sensor's colours (colours, 3) as the residuals have it."""
+    return view.weighted(at, colours @ view.response(at).T)
+
+
+def _of_exposure(view: ColoursView, at: Local, scene: Scene, weight: np.ndarray) -> list[Effect]:
+    """Errors of a known exposure and of a known white balance."""
+    size = scene.uncertainty.scale
+    rows = {"scale": np.ones(3), "balance of red and blue": np.array([1.0, 0.0, -1.0])}
+    if not size or any(name.startswith("white_balance") for name in view.modes):
+        return []
+    if isinstance(scene.instrument.scale, Drift):
+        del rows["scale"]
+    changes = {name: size * np.asarray(at.model) * factor for name, factor in rows.items()}
+    return [
+        Effect(name, size, "", view.weighted(at, change) / weight, shared=False)
+        for name, change in changes.items()
+    ]
+
+
+def with_probabilities(
+    rivals: tuple[Rival, ...], ranked: RankedMinima, discrepancy: Discrepancy
+) -> tuple[tuple[Rival, ...], float]:
+    """The rivals with their share of the posterior and the standard errors there, the most probable first,
+    and the share of the best minimum.
+
+    Orders of interference that the data do not tell apart are weighed by their normal approximations: the
+    share is ∝ exp(−Δχ²/2) |C|^½, with C the covariance of the parameters there and Δχ² as the `discrepancy`
+    lets it count (D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5).
+    """
+    problem, minima = ranked.problem, ranked.minima
+    count, variance = len(problem.parameters), [fit.variance for fit in ranked.fits]
+    span = np.asarray(problem.box.upper) - np.asarray(problem.box.lower)
+    log = -0.5 * discrepancy.evidence_share * (minima.deviance - minima.deviance[0])
+    stderr = np.empty((len(log), count))
+    for i, unit in enumerate(minima.units):
+        values = np.asarray(problem.values(unit))
+        at = [view.local(problem.seen_by(view, values)) for view in problem.views]
+        information = np.linalg.inv(errors(scaled(problem, unit, at, variance)).covariance[:count, :count])
+        # a parameter that the data do not see is known to its bounds
+        information += np.diag(12 / span**2)
+        stderr[i] = np.sqrt(np.diag(np.linalg.inv(information)))
+        log[i] -= 0.5 * np.linalg.slogdet(information)[1]
+    share = np.exp(log - log.max())
+    share /= share.sum()
+    # the rivals are the minima after the first
+    rows = zip(rivals, share[1:].tolist(), stderr[1:].tolist(), strict=False)
+    weighed = [
+        replace(rival, probability=probability, stderr=dict(zip(rival.parameters, errors_there, strict=True)))
+        for rival, probability, errors_there in rows
+    ]
+    return tuple(sorted(weighed, key=lambda rival: -(rival.probability or 0.0))), float(share[0])
