@@ -84,22 +84,20 @@ def compare_intervals(
     def problem(one: DataSet) -> RankedMinima:
         return rank(one.problem, search(one.problem, quiet)).counted
 
-    how = OnData("intervals", problem, partial(partial, _score_of_intervals), _summary_of_intervals)
+    def score(one: DataSet, ends: Interval) -> tuple[np.ndarray, np.ndarray]:
+        """Which true values the intervals contain, and how wide they are."""
+        lower, upper = ends
+        inside = (lower <= one.truth) & (one.truth <= upper)
+        return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
+
+    def summary(scores: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, dict[str, Any]]:
+        inside, widths = (np.concatenate(x) for x in zip(*scores, strict=True))
+        coverage, doubt = float(np.mean(inside)), math.sqrt(NOMINAL * (1 - NOMINAL) / len(inside))
+        details = {"coverage": coverage, "doubt": doubt, "width": float(np.median(widths))}
+        return abs(coverage - NOMINAL), details
+
+    how = OnData("intervals", problem, partial(partial, score), summary)
     return measure_on_data(comparison, methods, data, how, progress, time_limit)
-
-
-def _score_of_intervals(data: DataSet, ends: Interval) -> tuple[np.ndarray, np.ndarray]:
-    """Score of intervals: which true values they contain, and how wide they are."""
-    lower, upper = ends
-    inside = (lower <= data.truth) & (data.truth <= upper)
-    return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
-
-
-def _summary_of_intervals(scores: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, dict[str, Any]]:
-    inside, widths = (np.concatenate(x) for x in zip(*scores, strict=True))
-    coverage = float(np.mean(inside))
-    doubt = math.sqrt(NOMINAL * (1 - NOMINAL) / len(inside))
-    return abs(coverage - NOMINAL), {"coverage": coverage, "doubt": doubt, "width": float(np.median(widths))}
 
 
 STEPS = 100
@@ -211,24 +209,21 @@ def compare_solvers(
 ) -> Comparison:
     """Fit every data set with every solver in turn; see `measure_on_data`."""
     comparison = Comparison("inverse", noise=noise, requested=len(data))
-    how = OnData("data sets", lambda one: one, _score, _summary)
-    return measure_on_data(comparison, solvers, data, how, progress, time_limit)
 
-
-def _score(data: DataSet) -> Callable[[np.ndarray], tuple[float, bool]]:
-    """Score of a solver's answer: the largest error of any parameter, and whether it missed the minimum."""
-    least = _deviance(data, from_truth(data))
-
-    def score(unit: np.ndarray) -> tuple[float, bool]:
+    def score(one: DataSet, least: float, unit: np.ndarray) -> tuple[float, bool]:
+        """The largest error of any parameter, and whether the solver missed the minimum."""
         inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
-        return float(np.max(np.abs(inside - data.truth))), bool(_deviance(data, inside) > least + RIVAL)
+        return float(np.max(np.abs(inside - one.truth))), bool(_deviance(one, inside) > least + RIVAL)
 
-    return score
+    def summary(scores: list[tuple[float, bool]]) -> tuple[float, dict[str, Any]]:
+        errors, failures = zip(*scores, strict=True)
+        return float(np.mean(errors)), {"median_error": float(np.median(errors)), "failures": sum(failures)}
 
+    def scored(one: DataSet) -> Callable[[np.ndarray], tuple[float, bool]]:
+        return partial(score, one, _deviance(one, from_truth(one)))
 
-def _summary(scores: list[tuple[float, bool]]) -> tuple[float, dict[str, Any]]:
-    errors, failures = zip(*scores, strict=True)
-    return float(np.mean(errors)), {"median_error": float(np.median(errors)), "failures": sum(failures)}
+    how = OnData("data sets", lambda one: one, scored, summary)
+    return measure_on_data(comparison, solvers, data, how, progress, time_limit)
 
 
 TOLERANCE, TOLERANCE_IN_DEGREES = 1e-3, 0.1

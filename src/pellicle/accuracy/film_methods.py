@@ -141,8 +141,9 @@ def _collection(reflections: int | None, case: Case) -> Variant | str:
     return changed(replace(case.scene, substrate=substrate))
 
 
-def _closed_form(case: Case) -> Variant | str:
-    return Variant(with_effect(with_effect(case.plan, "coherence", False), "orders", False), case.scene)
+def _damping(case: Case, on: bool, count: int = 0) -> Variant:
+    """Fringes damped order by order, or not at all."""
+    return Variant(with_effect(with_effect(case.plan, "coherence", on), "orders", on, count), case.scene)
 
 
 def _orders(count: int, case: Case) -> Variant | str:
@@ -153,7 +154,7 @@ def _orders(count: int, case: Case) -> Variant | str:
         return "layers in which s and p mix have no series of orders"
     if case.plan.on("orders"):
         return "fringes narrower than the sampling have no orders" if count else "this is the full plan"
-    return Variant(with_effect(with_effect(case.plan, "coherence", True), "orders", True, count), case.scene)
+    return _damping(case, True, count)
 
 
 def _nodes(count: int, case: Case) -> Variant | str:
@@ -212,7 +213,7 @@ METHODS = (
     Method(
         "closed form",
         "the damping of fringes",
-        having("coherence", "the full plan is the closed form", _closed_form),
+        having("coherence", "the full plan is the closed form", partial(_damping, on=False)),
     ),
     *(Method(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
     Method("incoherent", "interference", partial(_orders, 0)),

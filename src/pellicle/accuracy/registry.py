@@ -131,16 +131,17 @@ class Comparison:
         Of solvers it is the fastest among those that failed least, of intervals the fastest whose coverage is
         95 % within two of its standard deviations.
         """
-        return min(self.results, key=self._rank).name if self.results else None
 
-    def _rank(self, result: Result) -> tuple[float, float]:
-        details = result.details
-        if self.kind == "inverse":
-            return details["failures"] / details["datasets"], result.seconds
-        if self.kind == "interval":
-            return result.error > 2 * details["doubt"], result.seconds
-        good = result.error <= self.tolerance
-        return not good, result.seconds if good else result.error
+        def rank(result: Result) -> tuple[float, float]:
+            details = result.details
+            if self.kind == "inverse":
+                return details["failures"] / details["datasets"], result.seconds
+            if self.kind == "interval":
+                return result.error > 2 * details["doubt"], result.seconds
+            good = result.error <= self.tolerance
+            return not good, result.seconds if good else result.error
+
+        return min(self.results, key=rank).name if self.results else None
 
     def finish(self, results: Iterable[Result]) -> Comparison:
         """Add the results, sorted by their time, and mark those that no other one beats."""

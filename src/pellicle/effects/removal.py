@@ -146,11 +146,6 @@ def _each(scene: Scene, change: Callable[[Layer], Layer]) -> tuple[Layer | Inter
     return tuple(change(x) if isinstance(x, Layer) else x for x in scene.layers)
 
 
-def _angle_spread(scene: Scene, _: FilmRemoval) -> Scene:
-    """Take the axis of the light's cone for all its rays."""
-    return _with(scene, instrument=_with(scene.instrument, angle_spread=None, numerical_aperture=None))
-
-
 def _coherence(scene: Scene, _: FilmRemoval) -> Scene:
     """Drop bandwidth and thickness spreads."""
     instrument = _with(scene.instrument, bandwidth=None, thickness_spread=None)
@@ -175,14 +170,9 @@ def _opaque(scene: Scene, removal: FilmRemoval) -> Scene:
     return _with(scene, layers=scene.layers[: removal.depth], substrate=substrate)
 
 
-def _gradient(scene: Scene, _: FilmRemoval) -> Scene:
-    """Give every graded layer its mean permittivity."""
-
-    def mean(layer: Layer) -> Layer:
-        graded = isinstance(layer.material, Graded)
-        return _with(layer, material=MeanOverDepth(layer.material)) if graded else layer
-
-    return _with(scene, layers=_each(scene, mean))
+def _material(change: Callable[[AbstractDispersion], AbstractDispersion], scene: Scene) -> Scene:
+    """The scene with the material of every layer changed."""
+    return _with(scene, layers=_each(scene, lambda layer: _with(layer, material=change(layer.material))))
 
 
 @final
@@ -195,27 +185,10 @@ class MeanOverDepth(AbstractDispersion):
         return self.base.index(wavelength)
 
 
-def _oblique(scene: Scene, _: FilmRemoval) -> Scene:
-    """Take normal incidence."""
-    instrument = _with(scene.instrument, angle_shift=None)
-    return _with(scene, light=_with(scene.light, angle=0.0), instrument=instrument)
-
-
 def _roughness(scene: Scene, _: FilmRemoval) -> Scene:
     """Make every face smooth."""
     smooth = _each(scene, lambda layer: _with(layer, roughness=None))
     return _with(scene, layers=smooth, substrate=_with(scene.substrate, roughness=None))
-
-
-def _polarisation(scene: Scene, _: FilmRemoval) -> Scene:
-    """Take s alone for the mean of s and p."""
-    return _with(scene, light=replace(scene.light, polarisation="s"))
-
-
-def _absorption(scene: Scene, _: FilmRemoval) -> Scene:
-    """Drop the extinction of every layer."""
-    clear = _each(scene, lambda layer: _with(layer, material=each_medium(_lossless, layer.material)))
-    return _with(scene, layers=clear)
 
 
 def _lossless(material: AbstractDispersion) -> AbstractDispersion:
@@ -286,12 +259,28 @@ def in_single_precision(scene: Any) -> Any:
     return jax.tree_util.tree_map(single, scene, is_leaf=is_free)
 
 
-_BY_FUNCTION = (
-    *(_angle_spread, _coherence, _back_face, _opaque, _anisotropy, _oblique, _roughness, _gradient),
-    *(_polarisation, _absorption, _dispersion),
-)
 _REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
-    **{removal.__name__[1:].replace("_", "-"): removal for removal in _BY_FUNCTION},
+    # the axis of the light's cone for all its rays
+    "angle-spread": lambda scene, _: _with(
+        scene, instrument=_with(scene.instrument, angle_spread=None, numerical_aperture=None)
+    ),
+    "coherence": _coherence,
+    "back-face": _back_face,
+    "opaque": _opaque,
+    "anisotropy": _anisotropy,
+    # normal incidence
+    "oblique": lambda scene, _: _with(
+        scene, light=_with(scene.light, angle=0.0), instrument=_with(scene.instrument, angle_shift=None)
+    ),
+    "roughness": _roughness,
+    # the mean permittivity of every graded layer
+    "gradient": lambda scene, _: _material(
+        lambda material: MeanOverDepth(material) if isinstance(material, Graded) else material, scene
+    ),
+    # s alone for the mean of s and p
+    "polarisation": lambda scene, _: _with(scene, light=replace(scene.light, polarisation="s")),
+    "absorption": lambda scene, _: _material(partial(each_medium, _lossless), scene),
+    "dispersion": _dispersion,
     "precision": lambda scene, _: in_single_precision(scene),
 }
 

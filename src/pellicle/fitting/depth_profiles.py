@@ -71,8 +71,9 @@ def _profile(fit: Fit, scene: Scene, position: int, wavelength: float) -> Fitted
     def curves(numbers: Any) -> Any:
         material = insert(free.material, list(numbers))
         index = material.at(z, np.array([wavelength]))
-        fraction = jnp.broadcast_to(material.profile.fraction(z), z.shape)
-        return jnp.stack([fraction, *(jnp.broadcast_to(f(index)[..., 0], z.shape) for f in (real, _imag))])
+        n, k = real(index), imag(index) + jnp.zeros_like(real(index))
+        rows = material.profile.fraction(z), n[..., 0], k[..., 0]
+        return jnp.stack([jnp.broadcast_to(row, z.shape) for row in rows])
 
     indices = np.asarray(curves(jnp.asarray(values[own])))
     stderr = np.zeros_like(indices)
@@ -82,10 +83,6 @@ def _profile(fit: Fit, scene: Scene, position: int, wavelength: float) -> Fitted
         stderr = np.sqrt(np.maximum(variance, 0.0))
     depth = z * float(np.asarray(layer.thickness))
     return FittedProfile(name(scene, position), wavelength, depth, *indices, *stderr)
-
-
-def _imag(index: Any) -> Any:
-    return imag(index) + jnp.zeros_like(real(index))
 
 
 def _covariance(fit: Fit, names: list[str]) -> np.ndarray:

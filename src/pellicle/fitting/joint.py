@@ -97,8 +97,17 @@ def fitted(
         targets = of_film.measurements(own.films, own.scenes)
         problem, starts = _combined(film_ranked, brdf_ranked)
         ranked = rank(problem, minima(problem, starts, progress), loss)
-        both = together(own, targets, ranked)
-        return _concluded(both, own.scenes, film, brdf, began), ranked
+        judged = assemble(together(own, targets, ranked), began)
+        worst, conclusion = judged.worst, judged.conclusion
+        return judged.fit(
+            verdict=verdict(
+                conclusion.status, conclusion.parameters, conclusion.rivals, worst.rms, worst.name
+            ),
+            rms=None,
+            warnings=tuple(dict.fromkeys([*_apart_warning(film, brdf), *film.warnings, *brdf.warnings])),
+            scene=(*own.scenes, own.surface),
+            budget=budget(judged.discrepancy, problem.parameters),
+        ), ranked
 
 
 class _Merged(NamedTuple):
@@ -214,19 +223,6 @@ def together(apart: Apart, targets: list[Target], ranked: RankedMinima) -> Joint
         FilmMeasurements(apart.films, targets, one),
         BrdfMeasurements(apart.samples, apart.surface, other),
         ranked,
-    )
-
-
-def _concluded(both: JointMeasurements, scenes: list[Scene], film: Fit, brdf: Fit, began: float) -> Fit:
-    """The joint fit at the best of the ranked minima."""
-    judged = assemble(both, began)
-    worst, conclusion = judged.worst, judged.conclusion
-    return judged.fit(
-        verdict=verdict(conclusion.status, conclusion.parameters, conclusion.rivals, worst.rms, worst.name),
-        rms=None,
-        warnings=tuple(dict.fromkeys([*_apart_warning(film, brdf), *film.warnings, *brdf.warnings])),
-        scene=(*scenes, both.samples.surface),
-        budget=budget(judged.discrepancy, both.ranked.problem.parameters),
     )
 
 

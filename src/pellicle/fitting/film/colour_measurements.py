@@ -183,8 +183,9 @@ def colours_evidence(
     weight = np.asarray(view.data.weight)
     columns = block.reshape(view.rows, 3, -1) / weight[:, :, None]
     residual, one = view.residuals(at) / weight, np.ones(weight.shape)
+    response = view.response(at)
     effects = [
-        row.effect(_change(view, at, (weights @ change).reshape(-1, 3)) / weight)
+        row.effect(view.weighted(at, (weights @ change).reshape(-1, 3) @ response.T) / weight)
         for row, weights, change in simulated_effects(view, values, scene)
     ]
     effects = named_for([*effects, *_of_exposure(view, at, scene, weight)], view.name)
@@ -196,11 +197,6 @@ def accuracy(view: ColoursView, sigma: float) -> Accuracy:
     """The residuals, in units of the median `sigma` of the data, that no camera makes."""
     span = 100.0 if view.encoding.mix[0, 1] else 1.0  # L*, a*, b*
     return Accuracy(largest=LARGEST * span / sigma)
-
-
-def _change(view: ColoursView, at: Local, colours: np.ndarray) -> np.ndarray:
-    """A change of the sensor's colours (colours, 3) as the residuals have it."""
-    return view.weighted(at, colours @ view.response(at).T)
 
 
 def _of_exposure(view: ColoursView, at: Local, scene: Scene, weight: np.ndarray) -> list[Effect]:
