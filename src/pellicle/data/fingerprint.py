@@ -52,14 +52,14 @@ def file_fingerprint(files: Iterable[Path]) -> tuple[str, int]:
         inside = sorted(f for f in file.rglob("*") if f.is_file())
         members += [(str(f.relative_to(file)), f) for f in inside] if file.is_dir() else [(file.name, file)]
     total = sum(file.stat().st_size for _, file in members)
-    samples = -1 if total <= WHOLE else _SAMPLES if len(members) <= _SAMPLES else 0
-    return fingerprint([(name, _content(file, samples)) for name, file in members]), total
+    samples = _SAMPLES if len(members) <= _SAMPLES else 0
+    return fingerprint([(name, _content(file, total <= WHOLE, samples)) for name, file in members]), total
 
 
-def _content(file: Path, samples: int) -> str:
-    """Hash of a whole file for −1 `samples`, else of its size, its date and so many samples."""
+def _content(file: Path, whole: bool, samples: int) -> str:
+    """Hash of a whole file, or of its size, its date and so many samples."""
     with file.open("rb") as opened:
-        if samples < 0:
+        if whole:
             return hashlib.file_digest(opened, "sha256").hexdigest()
         stat = file.stat()
         digest = hashlib.sha256(f"{stat.st_size} {stat.st_mtime_ns}".encode())

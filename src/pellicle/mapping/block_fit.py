@@ -1,8 +1,7 @@
 """Fit of one block of pixels of a map: read from the cube, fitted, and written into the store."""
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from pellicle.data.cube import Cube
@@ -35,30 +34,23 @@ def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fi
 
     `block` is the part of the cube, read by another process; None where this one reads it.
     """
+    import jax.monitoring as monitoring
+
+    compiling: list[float] = []  # seconds of every compilation
+
+    def listen(event: str, duration_secs: float, **_: Any) -> None:
+        if event.startswith("/jax/core/compile/"):
+            compiling.append(duration_secs)
+
     where, began = job.store.blocks.where(place), time.monotonic()
-    with _compilation() as seconds:
+    monitoring.register_event_duration_secs_listener(listen)
+    try:
         if block is None:
             fits = job.fit(job.model, job.cube, where)
         else:
             fits = job.fit(job.model, block, tuple(slice(0, n) for n in block.shape))
-    job.store.write(place, fits)
-    compiling = sum(seconds)
-    return Fitted(job.store.blocks.count(place), time.monotonic() - began - compiling, compiling)
-
-
-@contextmanager
-def _compilation() -> Iterator[list[float]]:
-    """Collect the seconds of every compilation in the block."""
-    import jax.monitoring as monitoring
-
-    seconds: list[float] = []
-
-    def listen(event: str, duration_secs: float, **_: Any) -> None:
-        if event.startswith("/jax/core/compile/"):
-            seconds.append(duration_secs)
-
-    monitoring.register_event_duration_secs_listener(listen)
-    try:
-        yield seconds
     finally:
         monitoring.unregister_event_duration_listener(listen)
+    job.store.write(place, fits)
+    seconds = sum(compiling)
+    return Fitted(job.store.blocks.count(place), time.monotonic() - began - seconds, seconds)

@@ -47,10 +47,9 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
     table = table_of(path)
     if table is None:
         raise _no_table(path)
-    columns = _columns(table)
-    names, where, units, notes = _rows(table, columns)
+    names, where, units, notes = _rows(table)
     there = [i for i, name in enumerate(names) if (table.parent / name).is_file()]
-    absent = [name for name in names if not (table.parent / name).is_file()]
+    absent = [name for i, name in enumerate(names) if i not in there]
     if len(there) < len(absent):
         raise DataError(
             f"{table}: {len(absent)} of its {len(names)} files do not exist, the first is "
@@ -91,9 +90,8 @@ def _no_table(path: Path) -> DataError:
     if headers:
         told = f"is a folder of ENVI files: name one of them, {_shortened(headers)}"
     elif len(images) > 1:
-        told = (
-            f"is a folder of {len(images)} images: write them into one TIFF stack, a page for each wavelength"
-        )
+        remedy = "write them into one TIFF stack, a page for each wavelength"
+        told = f"is a folder of {len(images)} images: {remedy}"
     elif not files:
         told = "is an empty folder: name that of a zarr store or of spectra, or a file"
     else:
@@ -129,10 +127,9 @@ def _cells(line: str) -> Sequence[str]:
     return next(csv.reader(io.StringIO(line), delimiter=delimiter), [])
 
 
-def _rows(
-    table: Path, columns: dict[str, tuple[int, str]]
-) -> tuple[list[str], dict[str, list[float | str]], dict[str, str], list[str]]:
+def _rows(table: Path) -> tuple[list[str], dict[str, list[float | str]], dict[str, str], list[str]]:
     """Files and positions of a table, units of the positions, and notes."""
+    columns = _columns(table)
     with open_binary(table) as file:
         lines = decoded(file.read()).splitlines()
     kept = [(i, x) for i, x in enumerate(lines, 1) if x.strip() and not x.startswith("#")][1:]
@@ -163,8 +160,7 @@ def _compare(one: Spectrum, first: Spectrum, first_name: str, file: Path) -> Non
             f"{file}: has {one.signal} in {one.polarisation} light and {first_name} has {first.signal} in "
             f"{first.polarisation}: map files of one quantity"
         )
-    same = len(one) == len(first) and np.allclose(one.wavelength, first.wavelength, _TOLERANCE, 0)
-    if not same:
+    if len(one) != len(first) or not np.allclose(one.wavelength, first.wavelength, _TOLERANCE, 0):
         raise DataError(
             f"{file}: its {len(one)} wavelengths from {one.wavelength[0]:g} to {one.wavelength[-1]:g} nm "
             f"differ from those of {first_name}, {len(first)} from {first.wavelength[0]:g} to "
