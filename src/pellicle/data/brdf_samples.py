@@ -135,7 +135,7 @@ class BrdfSamples:
                 f"`noise` has {len(given)} numbers for {len(self.channels)} channels "
                 f"({', '.join(self.channels)}); give one or each"
             )
-        levels = [noise_level(each) for each in given] * (len(self.channels) // len(given))
+        levels = [noise_level(level) for level in given] * (len(self.channels) // len(given))
         share = np.array([level.value * level.relative for level in levels])
         same = np.array([level.value * (not level.relative) for level in levels])
         floor = max(DARKEST * float(np.median(self.values)), 1e-12)

@@ -202,8 +202,8 @@ def read_chart(path: str | os.PathLike[str]) -> Chart:
             f"{', '.join(map(repr, names))}"
         )
     plain = [bare_name(name)[0].lower().replace("_", " ") for name in names]
-    each = [plain.index(name) for name in ("sigma r", "sigma g", "sigma b") if name in plain]
-    errors = each if len(each) == 3 else [plain.index("sigma")] if "sigma" in plain else []
+    single = [plain.index(name) for name in ("sigma r", "sigma g", "sigma b") if name in plain]
+    errors = single if len(single) == 3 else [plain.index("sigma")] if "sigma" in plain else []
     wanted = [*sets["rgb"], *sets["xyz"], *errors]
     table = cells.table(wanted)
     numbers = table.numbers(wanted)

@@ -169,18 +169,20 @@ def _recognised(cells: ColourCells) -> _Columns:
     if twice is not None:
         raise DataError(f"{path}: the header names {twice!r} twice; rename one")
     plain = [re.sub(r"[\s_]+", " ", name).lower() for name in bare]
-    one = [plain.index("sigma")] if "sigma" in plain else []
-    each = [plain.index(name) for i in channels if (name := f"sigma {bare[i].lower()}") in plain]
-    if each and (len(each) != 3 or one):
+    common = [plain.index("sigma")] if "sigma" in plain else []
+    single = [plain.index(name) for i in channels if (name := f"sigma {bare[i].lower()}") in plain]
+    if single and (len(single) != 3 or common):
         raise DataError(f"{path}: needs sigma, or one of each channel ({listed}); add the missing columns")
-    if kind == "xyY" and (one or each):
+    if kind == "xyY" and (common or single):
         raise UsageError(f"{path}: has standard deviations of x, y, Y: convert them to X, Y, Z")
     angle, name = ([plain.index(x) for x in known if x in plain][:1] for known in (_ANGLES, _NAMES))
-    used = {*channels, *one, *each, *angle, *name}
+    used = {*channels, *common, *single, *angle, *name}
     ignored = [name for i, name in enumerate(names) if i not in used and name.strip() not in ("", "_")]
     if len({units[i] for i in channels}) > 1:
         raise DataError(f"{path}: the channels are in different units ({listed}); write them in one")
-    return _Columns(kind, channels, each or one, angle, next(iter(name), None), units[channels[0]], ignored)
+    return _Columns(
+        kind, channels, single or common, angle, next(iter(name), None), units[channels[0]], ignored
+    )
 
 
 def _space(file: TextFile, kind: str, requested: str | None) -> str:

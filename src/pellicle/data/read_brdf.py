@@ -81,9 +81,9 @@ def _from_csv(table: Table, requested: str | Sequence[str] | None) -> BrdfSample
         )
     values = _required(table, columns, channels)
     # a standard deviation for each channel, or one for all
-    each = [name for name in sigma_names(channels) if only(table, columns, name)]
-    one = only(table, columns, "sigma")
-    errors = _required(table, columns, sigma_names(channels)) if each else [one] if one else []
+    single = any(only(table, columns, name) for name in sigma_names(channels))
+    common = None if single else only(table, columns, "sigma")
+    errors = _required(table, columns, sigma_names(channels)) if single else [common] if common else []
     read = [*directions, *values, *errors]
     for column in read:
         unit = "percent" if column.unit == "percent" else column.unknown_unit

@@ -266,7 +266,7 @@ def _region_colour(
     sigma = None
     if len(pixels) > 1:
         scatter = np.hypot(pixels.std(axis=0, dtype=float, ddof=1), photograph.step / np.sqrt(12))
-        slope = [np.diagonal(coding.rise(at), axis1=-2, axis2=-1) for at in (mean, exposed)]
+        slope = [np.diagonal(coding.rise(x), axis1=-2, axis2=-1) for x in (mean, exposed)]
         sigma = scatter / slope[0] / white * slope[1]
     if np.any(exposed > 1 + 1e-6):
         notes.append(

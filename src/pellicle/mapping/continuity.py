@@ -11,7 +11,7 @@ import json
 import math
 from dataclasses import asdict, dataclass
 from logging import getLogger
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from pellicle.errors import UsageError
 from pellicle.forward_model.plan import Row
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 from pellicle.mapping.unwrapping import Field, Neighbourhood, field_of, grow, neighbourhood
+
+if TYPE_CHECKING:
+    from xarray import DataArray, Dataset
 
 log = getLogger(__name__)
 
@@ -87,17 +90,17 @@ def record_of(effect: Row) -> dict[str, Any]:
     return {"effect": effect.effect, "on": bool(effect.on), "why": effect.why, "error_bound": error}
 
 
-def evidence(dataset: Any) -> Continuity | None:
+def evidence(dataset: Dataset) -> Continuity | None:
     """Read the decisions by neighbours from a map's dataset; None where they were not asked."""
     text = dataset.attrs.get("neighbours")
     return None if text is None else Continuity(**json.loads(text))
 
 
 def decided_by_neighbours(
-    dataset: Any,
+    dataset: Dataset,
     *,
     limit: float = LIMIT,
-) -> Any:
+) -> Dataset:
     """Choose the orders of undecided pixels of a map by their neighbours.
 
     Undecided are ambiguous pixels, and converged ones with a rival within `MARGIN`. Their neighbours are
@@ -147,13 +150,13 @@ def decided_by_neighbours(
     return _with_choice(dataset, names, choice, result)
 
 
-def _distance_of_minima(dataset: Any, name: str) -> float:
+def _distance_of_minima(dataset: Dataset, name: str) -> float:
     """Largest distance of the two best minima of a pixel in a parameter."""
     minima = np.asarray(dataset[f"order_{name}"][..., :2], float)
     return float(np.nanmax(np.abs(minima[..., 1:] - minima[..., :1]), initial=0.0))
 
 
-def _neighbourhood(dataset: Any) -> Neighbourhood:
+def _neighbourhood(dataset: Dataset) -> Neighbourhood:
     """The neighbours of the pixels of a map; a map of sites has their coordinates. Raises UsageError."""
     dims = tuple(map(str, dataset["status"].dims))
     shape = tuple(dataset.sizes[dim] for dim in dims)
@@ -171,7 +174,7 @@ def _neighbourhood(dataset: Any) -> Neighbourhood:
     return neighbourhood(shape, ordered, dims.index("site"), where)
 
 
-def _field(dataset: Any, name: str, near: Neighbourhood) -> tuple[np.ndarray, Field, float]:
+def _field(dataset: Dataset, name: str, near: Neighbourhood) -> tuple[np.ndarray, Field, float]:
     """Flat positions of the undecided pixels, the field of the decided ones, and the share on its planes."""
     state = np.asarray(dataset["status"]).ravel()
     thickness, stderr, rival = (
@@ -196,7 +199,7 @@ class _Decisions(NamedTuple):
 
 
 def _choice(
-    dataset: Any,
+    dataset: Dataset,
     name: str,
     pixels: np.ndarray,
     field: Field,
@@ -216,7 +219,7 @@ def _choice(
     return _Decisions(pixels[changes], order, delta[changes, order], choice.number[changes])
 
 
-def _with_choice(dataset: Any, names: list[str], choice: _Decisions, result: Continuity) -> Any:
+def _with_choice(dataset: Dataset, names: list[str], choice: _Decisions, result: Continuity) -> Dataset:
     """The dataset with these decisions, in its plan too."""
     made = exchanged(dataset, names, choice.pixels, choice.order)
     status = np.array(dataset["status"])
@@ -236,7 +239,7 @@ def _with_choice(dataset: Any, names: list[str], choice: _Decisions, result: Con
     return made
 
 
-def _hidden_test(dataset: Any, name: str, field: Field, near: Neighbourhood) -> dict[str, Any]:
+def _hidden_test(dataset: Dataset, name: str, field: Field, near: Neighbourhood) -> dict[str, Any]:
     """Hide decided pixels and seek their orders by their neighbours alone, a tenth of the map at a time.
 
     The pixels are hidden in patches, the same for the same map. Returns the fields of `Continuity` on them.
@@ -266,13 +269,13 @@ def _hidden_test(dataset: Any, name: str, field: Field, near: Neighbourhood) -> 
     return {"hidden": tried, "found": found, "wrong": wrong, "weight": weight}
 
 
-def minima_at(dataset: Any, name: str, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def minima_at(dataset: Dataset, name: str, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Thickness and Δχ² (pixels, orders) of the minima of some pixels, in increasing flat order."""
     thickness, delta = (_read(dataset[key], pixels) for key in (f"order_{name}", "order_delta_chi2"))
     return thickness, np.where(np.isfinite(thickness) & ~np.isnan(delta), delta, np.inf)
 
 
-def _read(array: Any, pixels: np.ndarray) -> np.ndarray:
+def _read(array: DataArray, pixels: np.ndarray) -> np.ndarray:
     """Rows (pixels, orders) of an array (*map, orders), a slab at a time: it may be larger than memory."""
     rows = int(np.prod(array.shape[1:-1], dtype=int))
     slab = max(1, _READ // max(rows * array.shape[-1], 1))
@@ -285,7 +288,7 @@ def _read(array: Any, pixels: np.ndarray) -> np.ndarray:
     return read
 
 
-def exchanged(dataset: Any, names: list[str], pixels: np.ndarray, order: np.ndarray) -> Any:
+def exchanged(dataset: Dataset, names: list[str], pixels: np.ndarray, order: np.ndarray) -> Dataset:
     """The dataset with the chosen minimum of each pixel as its answer, and the former answer as its rival."""
     made = dataset.copy()
     kept = dataset["order_delta_chi2"]

@@ -12,12 +12,17 @@ to 8 % of the processor time of a fit (4096 pixels of 100 bands), and finds the 
 (enlargement of errors by the square root of the reduced chi-square).
 """
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
+
+if TYPE_CHECKING:
+    from xarray import DataArray, Dataset
 
 TIME = "time"
 RATES = ("no-data", "constant", "not-constant")
@@ -47,11 +52,11 @@ class Line(NamedTuple):
 
 
 def growth(
-    dataset: Any,
+    dataset: Dataset,
     *,
     window: int | None = None,
     unit: str | None = None,
-) -> Any:
+) -> Dataset:
     """Compute rates of change of a map's thicknesses, with errors and the χ² of a constant rate.
 
     Times are used where a pixel has converged or its neighbours decide. Orders that jump from one time to the
@@ -92,7 +97,7 @@ def growth(
 
 
 def _rate_variables(
-    dataset: Any, name: str, time: np.ndarray, unit: str, window: int | None
+    dataset: Dataset, name: str, time: np.ndarray, unit: str, window: int | None
 ) -> dict[str, tuple[Any, np.ndarray, dict[str, Any]]]:
     """Variables of the rate of one parameter: axes, values and attributes by name."""
     dims = dataset["status"].dims
@@ -179,7 +184,7 @@ def _rates(
     return line.rate, enlarged, line.noise, reduced, line.points, status
 
 
-def _times(array: Any, unit: str | None) -> tuple[np.ndarray, str]:
+def _times(array: DataArray, unit: str | None) -> tuple[np.ndarray, str]:
     """Times since the first one, and their unit."""
     if unit is not None and unit not in _SECONDS:
         raise UsageError(f"`unit` must be one of {', '.join(_SECONDS)}, got {unit!r}")

@@ -172,9 +172,9 @@ def _compare(one: Spectrum, first: Spectrum, first_name: str, file: Path) -> Non
 
 
 def _arrays(
-    spectra: Sequence[Spectrum], table: Path, at: np.ndarray, sites: int
+    spectra: Sequence[Spectrum], table: Path, rows: np.ndarray, sites: int
 ) -> tuple[dict[str, Stored], np.ndarray | None]:
-    """Arrays (sites, bands[, angles]) with the spectra `at` these sites and NaN at others, and the angles."""
+    """Arrays (sites, bands[, angles]) with the spectra at some `rows` and NaN at others, and the angles."""
     first = spectra[0]
     angle = None if first.angle is None else np.unique(first.angle)
     axes: tuple[str, ...] = ("site", WAVELENGTH)
@@ -188,5 +188,5 @@ def _arrays(
         read = [getattr(one, name) for one in spectra]
         if all(values is not None for values in read):
             arrays[name] = Stored(np.full((sites, *shape), np.nan), axes)
-            arrays[name].data[at] = np.reshape(read, (len(spectra), *shape))
+            arrays[name].data[rows] = np.reshape(read, (len(spectra), *shape))
     return arrays, angle
