@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.explorer import background, dropped_files
+from pellicle.explorer import background
+from pellicle.explorer import session as sessions
 from pellicle.explorer.session import Session
 from pellicle.scene.free import Free
 
@@ -109,7 +110,7 @@ def test_only_files_of_the_folder_are_read(session, tmp_path, write):
 
 
 def test_large_files_are_refused(session, monkeypatch, tmp_path):
-    monkeypatch.setattr(dropped_files, "LARGEST_FILE", 100)
+    monkeypatch.setattr(sessions, "LARGEST_FILE", 100)
     assert "more than" in session.answer("data", {"name": "a.csv", "text": GOOD})["error"]
     (tmp_path / "recipe" / "own.csv").write_text(GOOD)
     assert "more than" in session.answer("data", {"file": "own.csv"})["error"]

@@ -146,8 +146,8 @@ def cost(
         return colour_cost(scene, angle, tolerance=tolerance, methods=colours, progress=progress)
     refuse("spectra, whose angle is that of the scene's light", angle=angle)
     if wavelength is None:
-        own = scene.light.wavelength
-        wavelength = default_wavelengths(scene) if own is None else own
+        stated = scene.light.wavelength
+        wavelength = default_wavelengths(scene) if stated is None else stated
     return film_cost(
         scene,
         np.asarray(wavelength, dtype=float),

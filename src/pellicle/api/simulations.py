@@ -114,16 +114,15 @@ def simulate(
     check_scene(scene)
     if isinstance(noise, float | int) and not noise >= 0:
         raise UsageError(f"`noise` must not be negative, got {noise:g}")
+    of_spectra: dict[str, Any] = {"depolarisation_noise": depolarisation_noise, "elements": elements}
     if isinstance(scene, Surface):
-        refuse("a Surface", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
-        refuse("a Surface", sensor=sensor, space=space, angle=angle, elements=elements)
+        refuse("a Surface", wavelength=wavelength, sensor=sensor, space=space, angle=angle, **of_spectra)
         return simulate_samples(scene, directions, noise, seed).samples
     refuse("a Scene", directions=directions)
     if not isinstance(noise, float | int):
         raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
     if sensor is not None or space is not None:
-        refuse("colours", wavelength=wavelength, depolarisation_noise=depolarisation_noise)
-        refuse("colours", elements=elements)
+        refuse("colours", wavelength=wavelength, **of_spectra)
         camera = None
         if isinstance(sensor, Colours):
             space, gamma, camera = sensor.space, sensor.gamma, sensor.camera
@@ -132,14 +131,7 @@ def simulate(
             scene, sensor, space or "srgb", angle, gamma=gamma, camera=camera, noise=noise, seed=seed
         )[0]
     refuse("a spectrum, whose angle is that of the scene's light", angle=angle)
-    return simulate_spectrum(
-        scene,
-        wavelength,
-        noise=noise,
-        seed=seed,
-        depolarisation_noise=depolarisation_noise,
-        elements=elements,
-    )
+    return simulate_spectrum(scene, wavelength, noise=noise, seed=seed, **of_spectra)
 
 
 def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike | None = None) -> DepthProfile:

@@ -145,12 +145,13 @@ class Batch:
             return
         from pellicle.cli.session import in_order
 
-        own = [
+        batches = [
             replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[]) for files in groups
         ]
         with Progress(f"{len(tasks)} files") as progress:
             progress("fit", 0, len(tasks))
-            for done, result in enumerate(in_order(_captured, zip(own, folders, strict=True), self.jobs), 1):
+            results = in_order(_captured, zip(batches, folders, strict=True), self.jobs)
+            for done, result in enumerate(results, 1):
                 progress.clear()
                 with suppress(BrokenPipeError):
                     print(result.err, end="", file=sys.stderr, flush=True)

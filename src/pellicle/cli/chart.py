@@ -96,9 +96,7 @@ def _chart(
 
     inverse, (nm, angles) = None, ranges
     if invert is not None:
-        from pellicle.reporting.colour_figures import invert_chart
-
-        inverse = invert_chart(scene, invert, nm, angles[0], **how, source=recipe.name)
+        inverse = colour_figures.invert_chart(scene, invert, nm, angles[0], **how, source=recipe.name)
     outside = colour_figures.chart(scene, out, nm, angles, **how, title=recipe.stem, inverse=inverse)
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
     if outside > 0.005:
@@ -127,24 +125,20 @@ def _objects(
     if view == "methods" and (layer is not None or eye != {"observer": "1931", "illuminant": "D65"}):
         raise UsageError("methods are compared on one layer under D65: leave out the other flags")
     start()
-    if view == "methods":
-        from pellicle.reporting.renderings import draw_methods
+    from pellicle.reporting import renderings
 
-        for method in draw_methods(scene, out, nm, title):
+    if view == "methods":
+        for method in renderings.draw_methods(scene, out, nm, title):
             say(
                 f"{method.name}: ΔE2000 {method.delta_e.mean():.2g} in the mean,"
                 f" {method.delta_e.max():.2g} at most, {method.seconds * 1e9:.0f} ns a colour"
             )
     elif view == "bubble":
-        from pellicle.reporting.renderings import bubbles
-
-        bubbles(
-            scene, out, [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)], layer, title, **eye
-        )
+        thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
+        renderings.bubbles(scene, out, thicknesses, layer, title, **eye)
     else:
-        from pellicle.reporting.renderings import balls
-
-        balls(scene, out, [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)], layer, title, **eye)
+        thicknesses = [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)]
+        renderings.balls(scene, out, thicknesses, layer, title, **eye)
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
     return 0
 

@@ -86,16 +86,16 @@ def _of_recipe(path: str) -> Session:
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
         return Session(recipe.scene(), Path(path).parent, title=title)
-    own = recipe.each[0] if recipe.each else recipe
-    scene, data = own.scene(), own.tables.data
+    first = recipe.first
+    scene, data = first.scene(), first.tables.data
     spectra = []
     if recipe.files and data.signal not in SPACES:
         try:
-            spectra = read(recipe.files[0], FileOptions(**own.reading), scene)
+            spectra = read(recipe.files[0], FileOptions(**first.reading), scene)
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
-    given = None if data.wavelengths is None else wavelengths(own, scene)
-    reading = {name: x for name, x in own.options.items() if name not in ("angle", "polarisation")}
+    given = None if data.wavelengths is None else wavelengths(first, scene)
+    reading = {name: x for name, x in first.options.items() if name not in ("angle", "polarisation")}
     about = {"title": title, "spectra": spectra, "reading": reading}
     return Session(scene, Path(path).parent, wavelength=given, **about)
 

@@ -151,10 +151,10 @@ def _as_repeats(files: Inputs, repeats: bool) -> Inputs:
         raise UsageError(
             "repeats are fitted one by one, and a joint fit takes all files together: choose one"
         )
-    each = [sweep for file in files.files for sweep in _sweeps(file)]
-    if len(each) < 2:
+    sweeps = [sweep for file in files.files for sweep in _sweeps(file)]
+    if len(sweeps) < 2:
         raise UsageError("repeats are two files or more, or several sweeps in one; leave --repeats out")
-    return replace(files, files=each, repeats=True)
+    return replace(files, files=sweeps, repeats=True)
 
 
 def _sweeps(file: Input) -> list[Input]:
@@ -199,23 +199,23 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
         raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
     files = _files(files, recipe)
     recipes = recipe.each or [recipe] * len(files)
-    each = [
-        (file, FileOptions.of(own.reading | reading.given()))
-        for file, own in zip(files, recipes, strict=True)
-    ]
-    check_camera(reading, each)
+    options = [FileOptions.of(one.reading | reading.given()) for one in recipes]
+    check_camera(reading, zip(files, options, strict=True))
     inputs = []
-    for (file, options), own in zip(each, recipes, strict=True):
-        scene = own.scene(fitted=True)
-        scene = eqx.tree_at(lambda s: s.light, scene, light(options, scene.light.azimuth))
-        own_scale = any(table.rescales for table in own.tables.data.file)
-        inputs += _film_inputs(file, scene, options, own_scale)
+    for file, how, one in zip(files, options, recipes, strict=True):
+        scene = one.scene(fitted=True)
+        scene = eqx.tree_at(lambda s: s.light, scene, light(how, scene.light.azimuth))
+        own_scale = any(table.rescales for table in one.tables.data.file)
+        inputs += _film_inputs(file, scene, how, own_scale)
     data = recipe.tables.data
     result = Inputs(inputs, data.joint, FitOptions.of(data.given()), repeats=data.repeats)
     if not recipe.each:
         return replace(result, written=_without_light(recipe.reading | reading.given()))
     tables = [
-        table.model_dump(exclude_unset=True) | recipe.with_files(table) | {"path": file} | reading.given()
+        table.model_dump(exclude_unset=True)
+        | recipe.with_paths(table)
+        | {"path": file, "camera": recipe.with_paths(table.camera)}
+        | reading.given()
         for file, table in zip(files, data.file, strict=True)
     ]
     return replace(result, written=_without_light(recipe.reading), base=recipe.scene(), tables=tables)
@@ -258,29 +258,20 @@ def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool 
     each of several spectra."""
     from pellicle.data.read_spectrum import ALL
 
-    if is_of_colours(path, reading):
-        try:
-            films = read_films(path, reading)
-        except ValueError:
-            return [Input(path, partial(read_films, path, reading), scene, own_scale, path)]
-        if len(films) == 1:
-            return [Input(path, partial(list, films), scene, own_scale, path)]
-        return [
-            Input(film.source, partial(list, [film]), scene, own_scale, path, film.name) for film in films
-        ]
-    refuse_camera(path, reading)
-    read_file = partial(read, path, reading, scene)
-    if reading.spectrum == ALL:
-        try:
-            spectra = read_file()
-        except ValueError:
-            spectra = []  # reported when it is fitted
-        if len(spectra) > 1:
-            return [
-                Input(f"{path} [{one.name}]", partial(list, [one]), scene, own_scale, path, one.name)
-                for one in spectra
-            ]
-    return [Input(path, read_file, scene, own_scale, path)]
+    of_colours = is_of_colours(path, reading)
+    if not of_colours:
+        refuse_camera(path, reading)
+    read_file = partial(read_films, path, reading) if of_colours else partial(read, path, reading, scene)
+    whole = Input(path, read_file, scene, own_scale, path)
+    if not of_colours and reading.spectrum != ALL:
+        return [whole]
+    try:
+        parts = read_file()
+    except ValueError:
+        return [whole]  # the error is reported when it is fitted
+    if len(parts) == 1:
+        return [whole._replace(read=partial(list, parts))]
+    return [whole._replace(path=one.source, read=partial(list, [one]), name=one.name) for one in parts]
 
 
 def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> list[BrdfSamples]:

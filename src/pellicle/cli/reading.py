@@ -156,15 +156,15 @@ def check_camera(given_flags: FileOptions, files: Iterable[tuple[str, FileOption
     from pellicle.data.photographs import image_format
 
     wrong = [name for name in given_flags.given() if name in CameraOptions.declared()]
-    each = list(files)
-    if not wrong or not each or any(is_of_colours(path, reading) for path, reading in each):
+    listed = list(files)
+    if not wrong or not listed or any(is_of_colours(path, reading) for path, reading in listed):
         return
     try:
-        for path, _ in each:
+        for path, _ in listed:
             image_format(path)
     except ValueError:
         return
-    raise UsageError(f"{each[0][0]}: {', '.join(named(wrong))}: of colours, and it has none; leave it out")
+    raise UsageError(f"{listed[0][0]}: {', '.join(named(wrong))}: of colours, and it has none; leave it out")
 
 
 def refuse_camera(path: str, reading: FileOptions) -> None:
@@ -220,7 +220,7 @@ def recipe_angles(recipe: FilmRecipe) -> np.ndarray:
     """Angles of incidence (colours,) of a recipe: its list, those of its first file, or its one angle."""
     import numpy as np
 
-    options = FileOptions(**(recipe.each[0] if recipe.each else recipe).reading)
+    options = FileOptions(**recipe.first.reading)
     if recipe.files and not isinstance(options.angle, list):
         stated = read_films(recipe.files[0], options)[0].angle
         if stated is not None:
@@ -237,7 +237,7 @@ MOST = 1_000_000
 def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     """The scene in the light of the recipe and its wavelengths: the recipe's, or those of its first file."""
     data = recipe.tables.data
-    if (recipe.each[0] if recipe.each else recipe).tables.data.signal in SPACES:
+    if recipe.first.tables.data.signal in SPACES:
         return _in_colours(recipe)
     if recipe.files and data.wavelengths is None:
         scene, nm = _as_measured(recipe)
@@ -258,8 +258,8 @@ def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
         raise DataError(
             f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
         )
-    own = recipe.each[0] if recipe.each else recipe
-    scene, nm, angles = own.scene(), own.sight().sensor.wavelength, recipe_angles(recipe)
+    scene, angles = recipe.first.scene(), recipe_angles(recipe)
+    nm = recipe.first.sight().sensor.wavelength
     say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")
     angle: Any = scene.light.angle if len(angles) == 1 else np.repeat(angles, len(nm))
     light = replace(scene.light, wavelength=None, angle=angle)
@@ -276,16 +276,15 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     from pellicle.scene.film import Light
 
     path = recipe.files[0]
-    own = recipe if recipe.tables.data.files else recipe.each[0]  # the first [[data.file]] has its own keys
-    scene, options = own.scene(), FileOptions(**own.reading)
+    scene, options = recipe.first.scene(), FileOptions(**recipe.first.reading)
     spectrum = read(path, options, scene)[0]
     say(f"wavelengths: those of {path} (the recipe gives none)")
     stated, first = light(options), spectrum.settings[0]
     angle = stated.angle if spectrum.angle is None else first.angle
     azimuth = scene.light.azimuth if first.azimuth is None else first.azimuth or None
     polarised = spectrum.polarisation if spectrum.polarisation != "unpolarised" else stated.polarisation
-    own_light = Light(None, angle, spectrum.signal, polarised, azimuth, spectrum.transmission)
-    return eqx.tree_at(lambda s: s.light, scene, own_light), np.sort(spectrum.wavelength[first.rows])
+    seen = Light(None, angle, spectrum.signal, polarised, azimuth, spectrum.transmission)
+    return eqx.tree_at(lambda s: s.light, scene, seen), np.sort(spectrum.wavelength[first.rows])
 
 
 def each_setting(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
@@ -298,12 +297,12 @@ def each_setting(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
     if not np.ndim(angles) and not np.ndim(azimuths):
         return scene, nm
     several, turns = np.size(angles), np.size(azimuths)
-    each = {}
+    repeated = {}
     if np.ndim(angles):
-        each["angle"] = np.repeat(angles, turns * len(nm))
+        repeated["angle"] = np.repeat(angles, turns * len(nm))
     if np.ndim(azimuths):
-        each["azimuth"] = np.tile(np.repeat(azimuths, len(nm)), several)
-    return with_wavelength(scene, scene.light.wavelength, **each), np.tile(nm, several * turns)
+        repeated["azimuth"] = np.tile(np.repeat(azimuths, len(nm)), several)
+    return with_wavelength(scene, scene.light.wavelength, **repeated), np.tile(nm, several * turns)
 
 
 def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:

@@ -127,10 +127,10 @@ def _check_depolarisation(described: FilmRecipe | SurfaceRecipe, noise: float | 
 def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, depth: str, json: bool) -> None:
     """Write the absorption and the field at the wavelengths that --depth lists."""
     try:
-        at = [float(word) for word in depth.split(",")]
+        chosen = [float(word) for word in depth.split(",")]
     except ValueError:
-        at = [0.0]
-    if not all(0 < nm < inf for nm in at):
+        chosen = [0.0]
+    if not all(0 < nm < inf for nm in chosen):
         raise UsageError(f"--depth {depth}: expected wavelengths in nm, as in --depth 450,600")
     from pellicle.recipes.read import SurfaceRecipe
 
@@ -144,7 +144,7 @@ def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, depth: st
 
     scene = recipe.scene()
     log_scene(scene)
-    profile = depth_profile(scene, at, wavelengths(recipe, scene))
+    profile = depth_profile(scene, chosen, wavelengths(recipe, scene))
     source = f"recipe {Path(recipe.path).name}, pellicle {version('pellicle')}"
     angle, light = getattr(scene.light.angle, "start", scene.light.angle), scene.light.polarisation
     comments = [

@@ -53,9 +53,9 @@ def to_linear_srgb(xyz: np.ndarray) -> np.ndarray:
 
 def ball_rendering(xyz: np.ndarray, size: int) -> bytes:
     """Draw a ball that reflects the XYZ (`COSINES`, 3) of a film as a PNG of `size` × `size` pixels."""
-    table, at = to_linear_srgb(xyz), _lookup(size)
-    colour = (1 - at.share) * table[at.row] + at.share * table[at.row + 1]
-    rendering = at.pixels.rendering(colour * at.seen)
+    table, lookup = to_linear_srgb(xyz), _lookup(size)
+    colour = (1 - lookup.share) * table[lookup.row] + lookup.share * table[lookup.row + 1]
+    rendering = lookup.pixels.rendering(colour * lookup.seen)
     return png(display(rendering, exposure(rendering, percentile=WHITE_PERCENTILE), BACKGROUND))
 
 
@@ -103,7 +103,7 @@ def curve_to_json(curve: Curve) -> dict[str, Any]:
 
 def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str, Any]:
     """Convert XYZ, (3,) or (angles, 3) at angles of incidence in degrees, of a `light` in words."""
-    each = [
+    colours = [
         {
             "hex": "#" + "".join(f"{round(255 * float(x)):02x}" for x in encode(to_linear_srgb(own))),
             "lab": np.asarray(lab(own, sensor().white)).round(2).tolist(),
@@ -111,15 +111,16 @@ def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str
         for own in xyz.reshape(-1, 3)
     ]
     words = [
-        ", ".join(f"{n} {x:.1f}" for n, x in zip(("L*", "a*", "b*"), own["lab"], strict=True)) for own in each
+        ", ".join(f"{n} {x:.1f}" for n, x in zip(("L*", "a*", "b*"), own["lab"], strict=True))
+        for own in colours
     ]
-    text = f"{each[0]['hex']}: {light} under D65: {words[0]}"
-    if len(each) > 1:
-        rows = zip(angles.tolist(), each, words, strict=True)
-        at = [f"{named(angle)} {own['hex']}: {numbers}" for angle, own, numbers in rows]
-        listed = "; ".join(at) if len(at) <= _LISTED else f"{at[0]}; to {at[-1]}"
+    text = f"{colours[0]['hex']}: {light} under D65: {words[0]}"
+    if len(colours) > 1:
+        rows = zip(angles.tolist(), colours, words, strict=True)
+        words_at = [f"{named(angle)} {own['hex']}: {numbers}" for angle, own, numbers in rows]
+        listed = "; ".join(words_at) if len(words_at) <= _LISTED else f"{words_at[0]}; to {words_at[-1]}"
         text = f"{light} under D65 at each angle of incidence, from left to right: {listed}"
-    return {**each[0], "each": [own["hex"] for own in each], "text": text}
+    return {**colours[0], "each": [own["hex"] for own in colours], "text": text}
 
 
 def fit_to_json(fit: Fit, controls: Collection[Control]) -> dict[str, Any]:
@@ -184,8 +185,8 @@ def _curves(
     elif spectrum.angle is None or len(every) < 2:  # one angle has no name
         drawn = [(np.arange(len(spectrum)), spectrum.wavelength, "")]
     else:
-        at = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
-        drawn = [(rows, spectrum.wavelength, setting) for rows, setting in at if rows.size]
+        by_angle = [(np.flatnonzero(spectrum.angle == angle), named(angle)) for angle in thinned(every)]
+        drawn = [(rows, spectrum.wavelength, setting) for rows, setting in by_angle if rows.size]
     return [
         Curve(label, x[rows], np.asarray(values)[rows], setting, spectrum.name)
         for rows, x, setting in drawn
@@ -199,10 +200,10 @@ def data_text(spectra: Sequence[Spectrum]) -> list[str]:
     for spectrum in spectra:
         nm, angles = spectrum.wavelength, measured_angles([spectrum])
         across = f"from {nm.min():g} to {nm.max():g} nm" if np.ptp(nm) > 0 else f"at {nm[0]:g} nm"
-        at = ", ".join(f"{angle:g}" for angle in angles)
+        listed = ", ".join(f"{angle:g}" for angle in angles)
         if len(angles) > MOST:
-            at = f"{len(angles)} angles from {angles[0]:g} to {angles[-1]:g}"
-        about = f"{spectrum.signal}, {len(nm)} points {across}{f', at {at}°' if at else ''}"
+            listed = f"{len(angles)} angles from {angles[0]:g} to {angles[-1]:g}"
+        about = f"{spectrum.signal}, {len(nm)} points {across}{f', at {listed}°' if listed else ''}"
         sentences += [f"{spectrum.path}: {about}", *spectrum.notes]
     count = len(measured_angles(spectra))
     if count > MOST and any(np.ptp(spectrum.wavelength) > 0 for spectrum in spectra):

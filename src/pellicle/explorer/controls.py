@@ -172,8 +172,8 @@ def _present(scene: Scene) -> dict[tuple[Any, ...], Any]:
     present = {}
     for path, leaf in leaves:
         key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
-        own = path in shown or (path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k")
-        if is_free(leaf) or (number and own):
+        slides = path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k"
+        if is_free(leaf) or (number and (path in shown or slides)):
             present[path] = leaf
     return present
 
@@ -208,13 +208,14 @@ def _bounds(path: tuple[Any, ...], value: Any) -> Free:
     """Bounds of a slider: those of a free number, else usual ones that include a fixed number."""
     if isinstance(value, Free):
         return Free(value.lower, value.upper, start=value.start)
-    key, at = getattr(path[-1], "name", ""), float(value)
+    key, number = getattr(path[-1], "name", ""), float(value)
     if key == "thickness":
-        return Free(0.0, _round_up(max(2 * at, 1000.0)), start=at)
+        return Free(0.0, _round_up(max(2 * number, 1000.0)), start=number)
     if key in _OPTIONAL:
         most = 89.0 if key == "angle" else math.inf
-        return Free(0.0, min(max(_OPTIONAL[key], _round_up(1.2 * at) if at else 0.0), most), start=at)
-    return Free(min(max(at - 0.5, 0.05), max(1.0, at - 0.5)), at + 0.5, start=at)
+        wide = _round_up(1.2 * number) if number else 0.0
+        return Free(0.0, min(max(_OPTIONAL[key], wide), most), start=number)
+    return Free(min(max(number - 0.5, 0.05), max(1.0, number - 0.5)), number + 0.5, start=number)
 
 
 def _round_up(number: float) -> float:

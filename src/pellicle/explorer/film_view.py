@@ -173,9 +173,9 @@ class FilmView:
     def measured(self, spectra: Sequence[Spectrum]) -> FilmView | None:
         """Return the view with the light, the angles and the range of the first spectrum and of those like
         it; None where it has them."""
-        data, own = spectra[0], self.scene.light
+        data, stated = spectra[0], self.scene.light
         alike = [x for x in spectra if (x.signal, x.polarisation) == (data.signal, data.polarisation)]
-        polarised = data.polarisation if data.polarisation != "unpolarised" else own.polarisation
+        polarised = data.polarisation if data.polarisation != "unpolarised" else stated.polarisation
         nm = np.unique(np.concatenate([spectrum.wavelength for spectrum in alike]))
         angles = measured_angles(alike)
         angle = self._measured_angle(data.path, thinned(angles) if len(nm) > 1 else angles)
@@ -184,16 +184,16 @@ class FilmView:
             nm = np.linspace(nm[0], nm[-1], _POINTS if curves <= _MANY else _FEW_POINTS)
         if data.azimuth is not None and np.ptp(data.azimuth) > 0:
             raise UsageError(f"{data.path}: has several azimuths of the sample, and the explorer draws one")
-        azimuth = own.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
+        azimuth = stated.azimuth if data.azimuth is None else float(data.azimuth[0]) or None
         light = Light(None, angle, data.signal, polarised, azimuth, data.transmission)
         view = FilmView(with_value(self.scene, (GetAttrKey("light"),), light), nm, data.kind.folded)
         same = data.kind.folded == self.folded and np.array_equal(nm, self.wavelength)
-        same = same and eqx.tree_equal(view.scene.light, own) is True
+        same = same and eqx.tree_equal(view.scene.light, stated) is True
         return None if same else view
 
     def _measured_angle(self, path: str, angles: np.ndarray) -> Any:
         """The angle of a light as data state it, or the scene's own where they state none or that."""
-        own = self.scene.light.angle
+        stated = self.scene.light.angle
         if not angles.size:
             if len(self.angles) > 1:
                 several = ", ".join(map(named, self.angles))
@@ -201,15 +201,16 @@ class FilmView:
                     f"{path}: states no angle of incidence, and the scene has {several}: leave one of them,"
                     " or add a column angle_deg"
                 )
-            return float(self.angles[0]) if self.angles.size else own
+            return float(self.angles[0]) if self.angles.size else stated
         if len(angles) > 1:
-            if isinstance(own, Free):
+            if isinstance(stated, Free):
                 raise UsageError(
                     f"{path}: has several angles of incidence, and one free angle cannot stand for them: fix"
                     " it, and free angle_shift of the instrument for an error of all angles"
                 )
             return angles
-        return own if not self.angles.size and getattr(own, "start", own) == angles[0] else float(angles[0])
+        same = not self.angles.size and getattr(stated, "start", stated) == angles[0]
+        return stated if same else float(angles[0])
 
     def rendering(self, colours: np.ndarray, size: int) -> bytes:
         """Draw a ball with the `colours` that the program "sphere" computed, as a PNG."""

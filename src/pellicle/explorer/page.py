@@ -52,13 +52,13 @@ def style() -> str:
     has a mode of its own.
     """
     light, dark = re.findall(r":root \{([^{}]*)\}", palette())
-    own = ".pellicle-explorer"
+    element = ".pellicle-explorer"
     return "\n".join(
         (
-            f"{own} {{{light}}}",
-            f"@media (prefers-color-scheme: dark) {{ {own} {{{dark}}} }}",
-            f"{own}[data-theme=light] {{{light} color-scheme: light; }}",
-            f"{own}[data-theme=dark] {{{dark} color-scheme: dark; }}",
+            f"{element} {{{light}}}",
+            f"@media (prefers-color-scheme: dark) {{ {element} {{{dark}}} }}",
+            f"{element}[data-theme=light] {{{light} color-scheme: light; }}",
+            f"{element}[data-theme=dark] {{{dark} color-scheme: dark; }}",
             _text("explorer.css"),
         )
     )

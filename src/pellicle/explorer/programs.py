@@ -180,21 +180,21 @@ def angle_program(
     **Raises:** as `colour_program`.
     """
     bands = integration_bands(BANDS)
-    own, fixed = [], scene
+    moved, fixed = [], scene
     for control in controls:
         of_film = control.path[0].name in ("layers", "substrate", "ambient")
         if of_film and not any(getattr(step, "name", "") in _OF_THE_INSTRUMENT for step in control.path):
-            own.append(control)
+            moved.append(control)
         elif control.free is not None:
             fixed = with_value(fixed, control.path, control.value)
     substrate = replace(fixed.substrate, back=None, back_collected=None, back_reflections=None)
     layers = tuple(replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers)
     light = Light(bands.wavelength, Free(0.0, 90.0), azimuth=fixed.light.azimuth)
     bare = replace(fixed, layers=layers, substrate=substrate, light=light, instrument=Instrument())
-    names = [control.name for control in own if not control.optional or control.name in active]
+    names = [control.name for control in moved if not control.optional or control.name in active]
     degrees = np.rad2deg(np.arccos(np.arange(1, COSINES + 1) / COSINES))
     compute = _compiled(
-        template(bare, own, active), names, after=lambda r: r @ bands.weights, count=len(degrees)
+        template(bare, moved, active), names, after=lambda r: r @ bands.weights, count=len(degrees)
     )
     return lambda values, _: compute(values, degrees)
 
@@ -215,9 +215,9 @@ def _compiled(
     assert len(names) == len(paths) - bool(count)
     with jax.enable_x64(True):
         simulate, evaluated = build(exact(scene).static_key), tabulated(scene)
-        start, at = start_values(scene), paths.index(ANGLE) if count else 0
+        start, position = start_values(scene), paths.index(ANGLE) if count else 0
         if count:
-            start = np.delete(start, at)
+            start = np.delete(start, position)
 
         @jax.jit
         def program(numbers: Any, angles: Any, evaluated: Any) -> Any:
@@ -225,7 +225,7 @@ def _compiled(
                 return after(simulate(insert(evaluated, list(numbers))))
 
             def seen(angle: Any) -> Any:
-                return after(simulate(insert(evaluated, [*numbers[:at], angle, *numbers[at:]])))
+                return after(simulate(insert(evaluated, [*numbers[:position], angle, *numbers[position:]])))
 
             return jax.vmap(seen)(angles)
 

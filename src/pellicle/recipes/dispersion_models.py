@@ -182,8 +182,7 @@ def sum_of_oscillators(eps_inf: Parameter, terms: Iterable[AbstractOscillator]) 
 def check_dispersion(dispersion: AbstractDispersion, label: str) -> AbstractDispersion:
     """Run the checks of a dispersion again and return it. Raises UsageError with `label` in front."""
     try:
-        for part in _modules(dispersion):
-            getattr(part, "__check_init__", lambda: None)()
+        _check_parts(dispersion)
     except ValueError as error:
         raise UsageError(f"{label}: {error}") from None
     return dispersion
@@ -259,12 +258,14 @@ def _checked(build: Callable[[], _Built]) -> _Built:
         raise UsageError(str(error)) from None
 
 
-def _modules(tree: object) -> list[eqx.Module]:
-    """Every module of a dispersion, itself included, without the free parameters."""
-    if is_free(tree):
-        return []
+def _check_parts(tree: object) -> None:
+    """Run the checks of every module of a dispersion, itself included, but of free parameters."""
     if isinstance(tree, tuple):
-        return [x for part in tree for x in _modules(part)]
-    if not isinstance(tree, eqx.Module):
-        return []
-    return [tree, *(x for part in vars(tree).values() for x in _modules(part))]
+        parts = [*tree]
+    elif isinstance(tree, eqx.Module) and not is_free(tree):
+        getattr(tree, "__check_init__", lambda: None)()
+        parts = [*vars(tree).values()]
+    else:
+        parts = []
+    for part in parts:
+        _check_parts(part)

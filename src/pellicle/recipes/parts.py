@@ -94,9 +94,9 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
     if isinstance(dispersion, Constant):
         return _constant(dispersion, name)
     if isinstance(dispersion, Anisotropic):
-        own = dispersion.arguments
-        axis = [written_number(angle, f"{name}: axis") for angle in own.pop("axis")]
-        return {key: written_medium(x, name, folder) for key, x in own.items()} | {"axis": axis}
+        media = dispersion.arguments
+        axis = [written_number(angle, f"{name}: axis") for angle in media.pop("axis")]
+        return {key: written_medium(x, name, folder) for key, x in media.items()} | {"axis": axis}
     if isinstance(dispersion, Graded):
         media = [written_medium(each, name, folder) for each in (dispersion.first, dispersion.second)]
         profile = {"profile": _NAME[type(dispersion.profile)], **_numbers(dispersion.profile, name)}
@@ -107,9 +107,9 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         fraction = written_number(dispersion.fraction, f"{name}: fraction")
         return {"mix": _NAME[kind], **both, "fraction": fraction}
     if isinstance(dispersion, Sellmeier) and len(dispersion.B) <= 3:
-        pairs = zip(dispersion.B, dispersion.C, strict=True)
-        each = {f"{key}{i}": x for i, pair in enumerate(pairs, 1) for key, x in zip("BC", pair, strict=True)}
-        return {"model": "sellmeier", **{key: written_number(x, f"{name}: {key}") for key, x in each.items()}}
+        terms = enumerate(zip(dispersion.B, dispersion.C, strict=True), 1)
+        keys = {f"{key}{i}": x for i, pair in terms for key, x in zip("BC", pair, strict=True)}
+        return {"model": "sellmeier"} | {key: written_number(x, f"{name}: {key}") for key, x in keys.items()}
     if isinstance(dispersion, Oscillators):
         return _oscillators(dispersion, name)
     if kind in KINDS.values() and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:

@@ -162,6 +162,11 @@ class FilmRecipe:
         return [FilmRecipe(self.path, _of_file(self.tables, file)) for file in self.tables.data.file]
 
     @property
+    def first(self) -> FilmRecipe:
+        """The recipe of the first file: this one, or that of the first `[[data.file]]`."""
+        return next(iter(self.each), self)
+
+    @property
     def camera(self) -> dict[str, Any]:
         """The keys of `[camera]` that the recipe gives, with paths of files."""
         return self.with_paths(self.tables.camera)
@@ -176,12 +181,6 @@ class FilmRecipe:
     def options(self) -> dict[str, Any]:
         """The options of reading and fitting that the recipe gives."""
         return self.reading | FitOptions.of(self.tables.data.given()).given()
-
-    def with_files(self, table: FileTable) -> dict[str, Any]:
-        """The files that a table of `[[data.file]]` names, from the working folder."""
-        files = {name for name, (_, option) in table.declared().items() if option.is_file}
-        paths = {name: x for name, x in self.with_paths(table).items() if name in files}
-        return paths | ({"camera": camera} if (camera := self.with_paths(table.camera)) else {})
 
     def with_paths(self, table: Options) -> dict[str, Any]:
         """The options that a table gives, with paths of files from the working folder."""
@@ -245,22 +244,17 @@ _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
 
 def _of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
-    words = {name: getattr(file, name) for name in ReadingTable.model_fields}
-    said = {name: value for name, value in words.items() if value is not None}
-    data = tables.data.model_copy(update={**said, "file": [file]})
-    own = {name: getattr(file.instrument, name) for name in file.instrument.model_fields_set}
-    instrument = tables.instrument.model_copy(update=own)
-    camera = tables.camera.model_copy(
-        update={name: getattr(file.camera, name) for name in file.camera.model_fields_set}
-    )
+    reading = {name: x for name in ReadingTable.model_fields if (x := getattr(file, name)) is not None}
     scene, plate = tables.scene, tables.scene.substrate
     if file.back is False and isinstance(plate, PlateTable):
-        scene = scene.model_copy(
-            update={"substrate": plate.model_copy(update=dict.fromkeys(("back", *BACK)))}
-        )
-    return tables.model_copy(
-        update={"data": data, "instrument": instrument, "camera": camera, "scene": scene}
-    )
+        bare = plate.model_copy(update=dict.fromkeys(("back", *BACK)))
+        scene = scene.model_copy(update={"substrate": bare})
+    parts = {"data": tables.data.model_copy(update={**reading, "file": [file]}), "scene": scene}
+    for name in ("instrument", "camera"):
+        table = getattr(file, name)
+        given = {key: getattr(table, key) for key in table.model_fields_set}
+        parts[name] = getattr(tables, name).model_copy(update=given)
+    return tables.model_copy(update=parts)
 
 
 @dataclass(frozen=True)

@@ -65,11 +65,11 @@ def _profile_schema(schema: dict[str, Any]) -> None:
     """Add to the schema which numbers each profile has, for editors."""
     kinds: dict[str, Any] = {"values": {"type": "array", "minItems": 2, "items": _NUMBER}}
     kinds["knots"] = {"type": "array", "minItems": 2, "items": {"type": "number"}}
-    own, tables = schema.pop("properties"), []
+    shared, tables = schema.pop("properties"), []
     for name, kind in PROFILES.items():
         numbers = {field.name: kinds.get(field.name, _NUMBER) for field in fields(kind)}
         required = ["graded"] if name == "linear" else ["graded", "profile"]  # linear is the default
-        tables.append(_table_schema({**own, "profile": {"const": name}, **numbers}, *required))
+        tables.append(_table_schema({**shared, "profile": {"const": name}, **numbers}, *required))
     _choose(schema, tables)
     schema.pop("required", None)
 

@@ -68,33 +68,33 @@ def recipe_text(
     fitted; `tables` are those of `[[data.file]]`. Paths in both are relative to the working folder.
     """
     check_scene(scene)
-    at = Path(folder)
-    names = [_relative(file, at) for file in files]
-    data, camera = _options(reading, at)
+    place = Path(folder)
+    names = [_relative(file, place) for file in files]
+    data, camera = _options(reading, place)
     data = ({"files": names} if names else {}) | data
     if isinstance(scene, Surface):
-        text = _document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, at)})
-        again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
+        text = _document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, place)})
+        again: Any = checked(tomllib.loads(text), str(place / "recipe")).scene()
         _check_surface(scene, again)
         return text
-    ambient = written_medium(scene.ambient, "the ambient", at)
+    ambient = written_medium(scene.ambient, "the ambient", place)
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
             "data": _data(scene) | sampled | data,
-            "data.file": [_file(table, at) for table in tables],
+            "data.file": [_file(table, place) for table in tables],
             "scene": {
                 **({} if ambient == 1.0 else {"ambient": ambient}),
-                "substrate": parts.substrate_keys(scene.substrate, at),
+                "substrate": parts.substrate_keys(scene.substrate, place),
                 **parts.uncertainty_keys(scene.uncertainty),
             },
-            "scene.layer": [parts.layer_keys(layer, i, at) for i, layer in enumerate(scene.layers)],
-            **({} if scene.reference is None else parts.reference_tables(scene.reference, at)),
+            "scene.layer": [parts.layer_keys(layer, i, place) for i, layer in enumerate(scene.layers)],
+            **({} if scene.reference is None else parts.reference_tables(scene.reference, place)),
             "instrument": parts.instrument_keys(scene.instrument, scene.uncertainty),
             "camera": camera,
         }
     )
-    again: Any = checked(tomllib.loads(text), str(at / "recipe")).scene()
+    again: Any = checked(tomllib.loads(text), str(place / "recipe")).scene()
     _check_film(with_wavelength(scene, None), again)
     return text
 
@@ -159,9 +159,9 @@ def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
     if scene.sensor is not None:
         keys |= _sensor(scene, folder)
     for part in ("film", "base"):
-        own = getattr(scene, part)
-        if own is not None:
-            keys[part] = written_medium(medium_of(own), part, folder)
+        medium = getattr(scene, part)
+        if medium is not None:
+            keys[part] = written_medium(medium_of(medium), part, folder)
     for key, value in scene.numbers.items():
         several = not isinstance(value, Free) and np.ndim(value) == 1
         keys[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
