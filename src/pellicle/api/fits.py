@@ -46,9 +46,8 @@ def fit(
       default "linear" where the samples have a σ, else "cube-root".
     - `progress`: called with the name of a stage, the number of steps done and their total.
 
-    **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum.
-    `print(fit)` is short; `fit.report()`, `fit.plot()` and `fit.save(folder)` are the full report, the
-    figure, and files of both.
+    **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum. `print(fit)` is
+    short; `fit.report()` is the full report, `fit.plot()` the figure, `fit.save(folder)` writes both.
 
     **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
     where an uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
@@ -66,9 +65,8 @@ def fit(
     check_measurement(data)
     check_scene(scene, several=True)
     if joint.of_both_kinds(scene):
-        rows: Any = data
-        scenes: Any = scene
-        return joint.fitted(rows, scenes, tolerance, progress, loss, residual)[0]
+        both: Any = data, scene
+        return joint.fitted(*both, tolerance, progress, loss, residual)[0]
     if isinstance(scene, Surface):
         return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)

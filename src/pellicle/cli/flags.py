@@ -36,9 +36,9 @@ def flag(group: Group, help: str | None = None, **how: Any) -> Parameter:
     return Parameter(group=group, **how) if help is None else Parameter(group=group, help=help, **how)
 
 
-def switch(group: Group, help: str | None = None) -> Parameter:
-    """A flag without a value, and without a --no- form."""
-    return flag(group, help, negative="")
+def switch(group: Group, help: str | None = None, **how: Any) -> Parameter:
+    """A flag without a --no- form, such as one without a value."""
+    return flag(group, help, negative="", **how)
 
 
 def named(names: Iterable[str]) -> list[str]:
@@ -231,9 +231,8 @@ FEWEST_STEPS = 10
 class SamplerFlags(Flags):
     """Flags of the sampling of a posterior."""
 
-    walkers: Annotated[
-        int | None, flag(SAMPLER, "Number of walkers, even (four per parameter, at least 32).")
-    ] = None
+    walkers: Annotated[int | None, flag(SAMPLER)] = None
+    """Number of walkers, even (four per parameter, at least 32)."""
     steps: Annotated[int | None, flag(SAMPLER, "Maximum number of steps (20000).")] = None
     seed: Annotated[int, flag(SAMPLER, "Seed of the random numbers.")] = 0
 
@@ -307,18 +306,15 @@ class CubeFlags(CubeOnlyFlags):
     """fraction, percent, absorbance, or the stored number that stands for 1."""
     angle: Annotated[float | None, flag(READING, "Angle of incidence in degrees (the recipe's).")] = None
     polarisation: Annotated[str | None, flag(READING, "s, p or unpolarised.")] = None
-    range: Annotated[
-        str | tuple[float, float] | None, Parameter(group=READING, metavar="LO:HI", negative="", n_tokens=1)
-    ] = None
+    range: Annotated[str | tuple[float, float] | None, switch(READING, metavar="LO:HI", n_tokens=1)] = None
     """Wavelengths to use in nm."""
     noise: Annotated[
         float | str | None,
-        flag(
+        switch(
             READING,
             'Standard deviation of every point (degrees for psi-delta), "2 %" of the signal, or the '
             "name of a variable.",
             metavar="SIGMA",
-            negative="",
         ),
     ] = None
 

@@ -18,6 +18,10 @@ def widget(session: Session) -> Any:
 
     **Raises:** UsageError without anywidget.
     """
+    try:
+        import anywidget  # noqa: F401
+    except ImportError:
+        raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
     return _widget_class()(session)
 
 
@@ -37,11 +41,8 @@ def _defaults(session: Session, angles: list[float]) -> dict[str, float]:
 
 @cache
 def _widget_class() -> Any:
-    try:
-        import anywidget
-        import traitlets
-    except ImportError:
-        raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
+    import anywidget
+    import traitlets
 
     class Explorer(anywidget.AnyWidget):
         """Sliders of a film beside its spectrum, colour and plan, in a cell of a notebook.

@@ -319,8 +319,8 @@ def instrument(table: InstrumentTable) -> Instrument:
     return _part(Instrument, table, scale=table.scale, offset=table.offset)
 
 
-def instrument_keys(instrument: Instrument, uncertainty: Uncertainty) -> dict[str, Any]:
-    """The table of an instrument and its uncertainties, the inverse of `instrument`. Raises UsageError."""
+def instrument_keys(instrument: Instrument) -> dict[str, Any]:
+    """The table of an instrument, the inverse of `instrument`. Raises UsageError."""
     keys = {}
     for key, slow in (("scale", SLOW_SCALE), ("offset", SLOW_OFFSET)):
         value = getattr(instrument, key)
@@ -328,41 +328,32 @@ def instrument_keys(instrument: Instrument, uncertainty: Uncertainty) -> dict[st
             if value not in (slow, ONE_NUMBER):
                 raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
             keys[key] = "slow" if value == slow else "free"
-    rest = [field.name for field in fields(Uncertainty) if field.name not in _OF_THE_SCENE]
-    return keys | _keys(instrument, "instrument", keys) | _uncertainty_keys(uncertainty, rest)
+    return keys | _keys(instrument, "instrument", keys)
 
 
 def uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:
     """The usual uncertainties, or none, with those that a recipe gives in their place."""
-    stated = {}
-    for name in (field.name for field in fields(Uncertainty)):
-        for table in (scene, instrument):
-            value = getattr(table, f"{name}_uncertainty", None)
-            if value is not None:
-                stated[name] = value
+    stated = {
+        field.name: value
+        for field in fields(Uncertainty)
+        for table in (scene, instrument)
+        if (value := getattr(table, f"{field.name}_uncertainty", None)) is not None
+    }
     return replace(Uncertainty() if scene.uncertainty == "usual" else Uncertainty.none(), **stated)
 
 
-def uncertainty_keys(uncertainty: Uncertainty) -> dict[str, Any]:
-    """Keys of `[scene]` of the uncertainties, the inverse of `uncertainty` beside `instrument_keys`."""
-    none = {} if _base(uncertainty) == Uncertainty() else {"uncertainty": "none"}
-    return none | _uncertainty_keys(uncertainty, _OF_THE_SCENE)
+def uncertainty_keys(uncertainty: Uncertainty) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Keys of `[scene]` and of `[instrument]`, the inverse of `uncertainty`.
 
+    They are those that differ from the usual uncertainties or from none, whichever are fewer.
+    """
 
-def _base(uncertainty: Uncertainty) -> Uncertainty:
-    """The usual uncertainties or none, whichever leaves fewer to state."""
+    def stated(base: Uncertainty) -> dict[str, Any]:
+        return {name: float(x) for name, x in vars(uncertainty).items() if x != getattr(base, name)}
 
-    def stated(base: Uncertainty) -> int:
-        return sum(getattr(uncertainty, f.name) != getattr(base, f.name) for f in fields(Uncertainty))
-
-    return min((Uncertainty(), Uncertainty.none()), key=stated)
-
-
-def _uncertainty_keys(uncertainty: Uncertainty, names: Iterable[str]) -> dict[str, Any]:
-    """Uncertainties `names` that differ from the usual ones or none."""
-    base = _base(uncertainty)
-    return {
-        f"{name}_uncertainty": float(getattr(uncertainty, name))
-        for name in names
-        if getattr(uncertainty, name) != getattr(base, name)
-    }
+    usual, none = stated(Uncertainty()), stated(Uncertainty.none())
+    fewest = usual if len(usual) <= len(none) else none
+    keys = {f"{name}_uncertainty": x for name, x in fewest.items()}
+    of_scene = {key: x for key, x in keys.items() if key.removesuffix("_uncertainty") in _OF_THE_SCENE}
+    word = {} if fewest is usual else {"uncertainty": "none"}
+    return word | of_scene, {key: x for key, x in keys.items() if key not in of_scene}

@@ -78,6 +78,7 @@ def recipe_text(
         _check_surface(scene, again)
         return text
     ambient = written_medium(scene.ambient, "the ambient", place)
+    of_scene, of_instrument = parts.uncertainty_keys(scene.uncertainty)
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
@@ -86,11 +87,11 @@ def recipe_text(
             "scene": {
                 **({} if ambient == 1.0 else {"ambient": ambient}),
                 "substrate": parts.substrate_keys(scene.substrate, place),
-                **parts.uncertainty_keys(scene.uncertainty),
+                **of_scene,
             },
             "scene.layer": [parts.layer_keys(layer, i, place) for i, layer in enumerate(scene.layers)],
             **({} if scene.reference is None else parts.reference_tables(scene.reference, place)),
-            "instrument": parts.instrument_keys(scene.instrument, scene.uncertainty),
+            "instrument": parts.instrument_keys(scene.instrument) | of_instrument,
             "camera": camera,
         }
     )
