@@ -109,78 +109,35 @@ def table(
     instrument, data, points = view.scene.instrument, view.data, len(weight)
     gain_sd = scale_prior(instrument.scale)[1] if isinstance(instrument.scale, Drift) else np.zeros(0)
     offset_sd = offset_prior(instrument.offset)[1] if isinstance(instrument.offset, Drift) else np.zeros(0)
-    gains, free_scale = len(gain_sd), isinstance(instrument.scale, Drift)
-    count = len(problem.parameters)
-    depth = problem.thickness_axis
-    order = tuple(sorted(range(count), key=lambda i: i != depth))
-    grid = np.zeros(1) if depth is None else thickness_grid(problem, len(design_points(problem)))
-    if depth is not None:
-        grid = np.linspace(0.0, 1.0, _FINER * (len(grid) - 1) + 1)
-    most = _MOST_NUMBERS // ((max(gains, 1) + count) * len(grid) * points)
-    design = design_points(problem)
-    if len(design) > most:
-        design = design_points(problem, most)
+    depth, free_scale, gains = problem.thickness_axis, isinstance(instrument.scale, Drift), len(gain_sd)
+    order = tuple(sorted(range(len(problem.parameters)), key=lambda i: i != depth))
+    design, grid = _design(problem, max(gains, 1) * points + len(order) * points)
     units = np.repeat(design, len(grid), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
-    near = _reach(design, depth, grid)
+    near = _reach(design, depth, grid)[:, list(order)]
     signal, slope = _simulated(problem, view, units)
-    # rows of the data, then of the priors of the offset and of the scale
-    terms = np.array([np.broadcast_to(t, points) for t in chebyshev(data.position, max(gains, 3))])
-    weight = weight * np.sqrt(float(data.independent_fraction))
-    extra = len(offset_sd) + max(gains - 1, 0)
-    rotation = np.zeros((points + extra, len(offset_sd)))
-    rotation[:points] = (weight * terms[: len(offset_sd)]).T
-    rotation[points : points + len(offset_sd)] = np.diag(1 / (offset_sd * (1.0 if free_scale else level)))
-    rotation, _ = np.linalg.qr(rotation)
     scale = 1.0 if isinstance(instrument.scale, Drift) else float(instrument.scale)
     mean = np.zeros(points) if free_scale else signal.mean(axis=0)
-    nodes, width = len(units), max(gains, 1) + count
-    columns = np.zeros((points + rotation.shape[1], width, nodes), np.float32)
-    square, gain = np.zeros(nodes), np.ones(nodes)
-    moved, limit, back = np.zeros((nodes, count)), np.zeros((nodes, count)), np.zeros((nodes, count, count))
-    for first in range(0, nodes, _BATCH):
-        own = slice(first, first + _BATCH)
-        away = weight * scale * (signal[own] - mean)
-        vectors = np.zeros((len(away), points + extra, gains + count))
-        if free_scale:
-            size = np.median(np.abs(signal[own]), axis=1)
-            for j, term in enumerate([*range(1, gains), 0]):
-                vectors[:, :points, j] = weight * terms[term] * signal[own]
-                if term:
-                    vectors[:, points + len(offset_sd) + term - 1, j] = size / gain_sd[term]
-        vectors[:, :points, gains:] = np.swapaxes(weight * scale * slope[own][:, list(order)], 1, 2)
-        basis, triangle = _orthonormal(vectors, rotation)
-        basis = basis[:, :points]
-        tangents = triangle[:, gains:, gains:]
-        length = np.diagonal(tangents, axis1=1, axis2=2)
-        seen = length > 0
-        limit[own] = length * near[own][:, list(order)]
-        safe = tangents + np.where(seen, 0.0, 1.0)[:, :, None] * np.eye(count)
-        back[own] = np.linalg.inv(safe) * seen[:, :, None] * seen[:, None]
-        if free_scale:
-            gain[own] = triangle[:, gains - 1, gains - 1]
-            limit[own] /= gain[own, None]
-            chosen = basis
-        else:
-            common = away @ rotation[:points]
-            square[own] = np.sum(away**2, axis=1) - np.sum(common**2, axis=1)
-            moved[own] = np.einsum("npt,np->nt", basis, away)
-            chosen = np.concatenate([away[:, :, None], basis], axis=2)
-        columns[:points, :, own] = np.moveaxis(chosen, 0, 2)
-        below = np.einsum("po,npc->ocn", rotation[:points], chosen)
-        if not free_scale:
-            below[:, 0] = 0.0  # what is left of the data is orthogonal to the offset already
-        columns[points:, :, own] = below
-    values = np.asarray(problem.values(units))
-    prior = np.sum(np.asarray(problem.box.prior_rows(values)) ** 2, axis=1)
-    layout = Layout(
-        len(design), len(grid), gains, order, free_scale, _SINGLE if len(design) == 1 else _SEVERAL
+    weight = weight * np.sqrt(float(data.independent_fraction))
+    terms = np.array([np.broadcast_to(t, points) for t in chebyshev(data.position, max(gains, 3))])
+    offset_sd = offset_sd * (1.0 if free_scale else level)
+    basis = _Basis(weight, scale, mean, terms, gain_sd, _offset_columns(weight, terms, offset_sd, gains))
+    blocks = [
+        basis.block(signal[first : first + _BATCH], slope[first : first + _BATCH][:, list(order)], near_by)
+        for first, near_by in ((i, near[i : i + _BATCH]) for i in range(0, len(units), _BATCH))
+    ]
+    columns = np.concatenate([block.columns for block in blocks], axis=2)
+    square, moved, limit, back, gain = (
+        np.concatenate([getattr(block, name) for block in blocks]) for name in _Block._fields[1:]
     )
+    prior = np.sum(np.asarray(problem.box.prior_rows(np.asarray(problem.values(units)))) ** 2, axis=1)
+    candidates = _SINGLE if len(design) == 1 else _SEVERAL
+    layout = Layout(len(design), len(grid), gains, order, free_scale, candidates)
     lookup = Lookup(
         units=units,
         weight=weight,
-        rotation=rotation[:points],
+        rotation=basis.rotation[:points],
         known=weight * scale * mean,
         columns=columns.reshape(len(columns), -1),
         square=square,
@@ -190,9 +147,88 @@ def table(
         gain=gain,
         prior=prior,
     )
-    log.info("lookup: %d nodes of %d columns, %.3g MB", nodes, width, columns.nbytes / 1e6)
+    log.info("lookup: %d nodes of %d columns, %.3g MB", len(units), columns.shape[1], columns.nbytes / 1e6)
     p = None if depth is None else problem.parameters[depth]
     return lookup, layout, np.zeros(0) if p is None else p.lower + grid * (p.upper - p.lower)
+
+
+def _design(problem: Problem, numbers: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the unit cube beside the thickness (designs, parameters), as many as `numbers` for each node
+    allow, and the thicknesses (nodes,) in the unit cube."""
+    design, grid = design_points(problem), np.zeros(1)
+    if problem.thickness_axis is not None:
+        grid = np.linspace(0.0, 1.0, _FINER * (len(thickness_grid(problem, len(design))) - 1) + 1)
+    most = _MOST_NUMBERS // (numbers * len(grid))
+    return (design if len(design) <= most else design_points(problem, most)), grid
+
+
+def _offset_columns(weight: np.ndarray, terms: np.ndarray, sd: np.ndarray, gains: int) -> np.ndarray:
+    """Orthonormal columns (rows, terms) of the offset: rows of the data, then of the priors of the offset and
+    of a scale of so many `gains`."""
+    points = len(weight)
+    columns = np.zeros((points + len(sd) + max(gains - 1, 0), len(sd)))
+    columns[:points] = (weight * terms[: len(sd)]).T
+    columns[points : points + len(sd)] = np.diag(1 / sd)
+    return np.linalg.qr(columns)[0]
+
+
+class _Block(NamedTuple):
+    """Fields of a `Lookup` for some of its nodes; `columns` (rows, columns, nodes)."""
+
+    columns: np.ndarray
+    square: np.ndarray
+    moved: np.ndarray
+    limit: np.ndarray
+    back: np.ndarray
+    gain: np.ndarray
+
+
+class _Basis(NamedTuple):
+    """What the columns of all nodes share: see `Lookup`. `terms` (terms, points) are those of the nuisances,
+    `gain_sd` the priors of the scale's, and `rotation` are the offset's columns."""
+
+    weight: np.ndarray
+    scale: float
+    mean: np.ndarray
+    terms: np.ndarray
+    gain_sd: np.ndarray
+    rotation: np.ndarray
+
+    def block(self, signal: np.ndarray, slope: np.ndarray, near: np.ndarray) -> _Block:
+        """The columns of nodes by their signals (nodes, points), slopes (nodes, parameters, points) and the
+        distance to the next ones (nodes, parameters)."""
+        nodes, points = signal.shape
+        gains, count, offsets = len(self.gain_sd), slope.shape[1], self.rotation.shape[1]
+        away = self.weight * self.scale * (signal - self.mean)
+        vectors = np.zeros((nodes, len(self.rotation), gains + count))
+        if gains:
+            size = np.median(np.abs(signal), axis=1)
+            for j, term in enumerate([*range(1, gains), 0]):
+                vectors[:, :points, j] = self.weight * self.terms[term] * signal
+                if term:
+                    vectors[:, points + offsets + term - 1, j] = size / self.gain_sd[term]
+        vectors[:, :points, gains:] = np.swapaxes(self.weight * self.scale * slope, 1, 2)
+        basis, triangle = _orthonormal(vectors, self.rotation)
+        basis = basis[:, :points]
+        tangents = triangle[:, gains:, gains:]
+        length = np.diagonal(tangents, axis1=1, axis2=2)
+        seen, limit = length > 0, length * near
+        safe = tangents + np.where(seen, 0.0, 1.0)[:, :, None] * np.eye(count)
+        back = np.linalg.inv(safe) * seen[:, :, None] * seen[:, None]
+        square, gain, moved, chosen = np.zeros(nodes), np.ones(nodes), np.zeros((nodes, count)), basis
+        if gains:
+            gain = triangle[:, gains - 1, gains - 1]
+            limit = limit / gain[:, None]
+        else:
+            common = away @ self.rotation[:points]
+            square = np.sum(away**2, axis=1) - np.sum(common**2, axis=1)
+            moved = np.einsum("npt,np->nt", basis, away)
+            chosen = np.concatenate([away[:, :, None], basis], axis=2)
+        below = np.einsum("po,npc->ocn", self.rotation[:points], chosen)
+        if not gains:
+            below[:, 0] = 0.0  # what is left of the data is orthogonal to the offset already
+        columns = np.concatenate([np.moveaxis(chosen, 0, 2), below]).astype(np.float32)
+        return _Block(columns, square, moved, limit, back, gain)
 
 
 def _simulated(problem: Problem, view: SpectrumView, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
