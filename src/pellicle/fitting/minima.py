@@ -139,10 +139,12 @@ def distinct(problem: Problem, minima: Minima, most: int) -> Minima:
     columns = zip(problem.parameters, units.T, strict=True)
     resolution = np.stack([p.resolutions_at(column) for p, column in columns], axis=1)
     kept: list[int] = []
-    for i in order[np.isfinite(minima.deviance[order])]:
-        if np.all(np.any(np.abs(units[i] - units[kept]) > resolution[i], axis=1)):
-            kept.append(int(i))
-    kept = (kept or [int(order[0])])[:most]
+    for i in order[np.isfinite(minima.deviance[order])].tolist():
+        if (np.abs(units[i] - units[kept]) > resolution[i]).any(axis=1).all():
+            kept.append(i)
+        if len(kept) == most:
+            break
+    kept = kept or [int(order[0])]
     return replace(
         minima, units=minima.units[kept], deviance=minima.deviance[kept], converged=minima.converged[kept]
     )

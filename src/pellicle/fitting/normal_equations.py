@@ -102,6 +102,8 @@ def held_within(free: np.ndarray, covariance: np.ndarray, lower: np.ndarray, upp
     columns). Coefficients h that are held at b move the others as by Gaussian conditioning:
     x = free + Σ[:, h] Σ[h, h]⁻¹ (b − free[h]).
     """
+    if np.all((free >= lower) & (free <= upper)):
+        return free
     bounded = np.flatnonzero((np.isfinite(lower) | np.isfinite(upper)).any(axis=0))
     solution, held = free.copy(), np.zeros((len(free), len(bounded)), bool)
     bounds = np.zeros(held.shape)

@@ -118,11 +118,11 @@ def rank(
         candidates = minima(weighted, candidates.units, most=most, followed=followed)
         again = _noise(problem, candidates.units[0], robust)
         near = 1e-3 if robust is None else 1e-6
-        # the relative weights of the views, and under a robust loss their noise too, agree within 2 %
         a, b = (np.concatenate([own.scale for own in each]) for each in (noise, again))
-        alike = np.allclose(a / a[0], b / b[0], rtol=0.02)
-        alike = alike and (robust is None or np.allclose(a, b, rtol=0.02))
-        if alike and np.allclose(candidates.units[0], best, atol=near):
+        # the relative weights of the views, and under a robust loss their noise too, agree within 2 %
+        pairs = [(a / a[0], b / b[0])] if robust is None else [(a / a[0], b / b[0]), (a, b)]
+        alike = all(np.all(np.abs(x - y) <= 0.02 * np.abs(y)) for x, y in pairs)
+        if alike and np.all(np.abs(candidates.units[0] - best) <= near + 1e-5 * np.abs(best)):
             break
         noise = again
     weighted = _reweighted(problem, noise)

@@ -77,9 +77,11 @@ def search(problem: Problem, progress: Progress) -> Minima:
 
 def _lowest_within(values: np.ndarray, reach: int) -> np.ndarray:
     """Mask of the local minima of `values` (..., thickness) within `reach` steps on both sides."""
-    padded = np.pad(values, [(0, 0)] * (values.ndim - 1) + [(reach, reach)], constant_values=np.inf)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=-1)
-    return values <= windows.min(-1)
+    lowest = np.ones(values.shape, bool)
+    for step in range(1, reach + 1):
+        lowest[..., step:] &= values[..., step:] <= values[..., :-step]
+        lowest[..., :-step] &= values[..., :-step] <= values[..., step:]
+    return lowest
 
 
 def _near_fringes(problem: Problem, units: np.ndarray, lowest: np.ndarray) -> np.ndarray:

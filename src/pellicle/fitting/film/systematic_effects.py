@@ -1,6 +1,7 @@
 """Systematic effects of a spectrum: what each that a scene takes for granted does to the signal."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -33,7 +34,7 @@ class SimulatedEffect(NamedTuple):
     name: str
     size: float
     unit: str
-    number: Number
+    number: Any  # `Number` that changes; None where the scene cannot have it
     changes: tuple[tuple[float, float], ...]  # of the number, and the weight of its signal
     power: int = 1
     positive: bool = False
@@ -106,62 +107,71 @@ def simulations_of(
     view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene
 ) -> tuple[ExtendedScene, list[SimulatedEffect]] | None:
     """The extended scene, and every effect that it simulates; None where there are none."""
+    extension = extended(view, values)
+    every = [*_of_light(view, scene, extension), *_of_media(scene, extension, extension.start(values))]
+    rows = [row for row in every if row.number is not None and row.size > 0]
+    return (extension, rows) if rows else None
+
+
+def _linear(name: str, size: float, unit: str, number: Number | None, **kind: Any) -> SimulatedEffect:
+    step, weight = _STEP * size, 0.5 / _STEP
+    return SimulatedEffect(name, size, unit, number, ((step, weight), (-step, -weight)), **kind)
+
+
+def _width(
+    name: str, size: float, unit: str, number: Number | None, sd: float, **kind: Any
+) -> SimulatedEffect:
+    # a normal distribution by three nodes, for a variance of the prior's root mean square
+    reach = math.sqrt(3) * sd
+    nodes = (reach, HALF_NORMAL / 6), (-reach, HALF_NORMAL / 6), (0.0, -HALF_NORMAL / 3)
+    return SimulatedEffect(name, size, unit, number, nodes, power=2, **kind)
+
+
+def _of_light(
+    view: SpectrumView | ColoursView, scene: Scene, extension: ExtendedScene
+) -> Iterator[SimulatedEffect]:
+    """Effects of the light and the instrument; those of no size or without a number are left out later."""
     allowed, instrument = scene.uncertainty, scene.instrument
-    extension, rows = extended(view, values), []
-    start = extension.start(values)
-
-    def add(name: str, size: float, unit: str, number: Number | None, changes: Any, **kind: Any) -> None:
-        if number is not None and size > 0:
-            rows.append(SimulatedEffect(name, size, unit, number, tuple(changes), **kind))
-
-    def linear(name: str, size: float, unit: str, number: Number | None, **kind: Any) -> None:
-        step, weight = _STEP * size, 0.5 / _STEP
-        add(name, size, unit, number, [(step, weight), (-step, -weight)], **kind)
-
-    def width(name: str, size: float, unit: str, number: Number | None, sd: float, **kind: Any) -> None:
-        # a normal distribution by three nodes, for a variance of the prior's root mean square
-        reach = math.sqrt(3) * sd
-        nodes = [(reach, HALF_NORMAL / 6), (-reach, HALF_NORMAL / 6), (0.0, -HALF_NORMAL / 3)]
-        add(name, size, unit, number, nodes, power=2, **kind)
-
-    linear("wavelength shift", allowed.wavelength, "nm", extension.wavelength, shared=False)
+    yield _linear("wavelength shift", allowed.wavelength, "nm", extension.wavelength, shared=False)
     if instrument.bandwidth is None:
         sd = allowed.bandwidth / FWHM
-        width("bandwidth", allowed.bandwidth, "nm", extension.wavelength, sd, shared=False)
+        yield _width("bandwidth", allowed.bandwidth, "nm", extension.wavelength, sd, shared=False)
     free = is_free(view.scene.light.angle)
     oblique = free or bool(np.any(np.asarray(view.scene.light.angle)))
     if oblique and not free:
-        linear("angle of incidence", allowed.angle, "deg", extension.angle, shared=False)
+        yield _linear("angle of incidence", allowed.angle, "deg", extension.angle, shared=False)
     if not instrument.has_cone:
         # at normal incidence both directions of the cone turn the light away from the normal
         sd = allowed.angle_spread * _ROUND_PUPIL * (1.0 if oblique else math.sqrt(2))
-        width("angle spread", allowed.angle_spread, "deg", extension.angle, sd, shared=False)
-    several = len(scene.layers) > 1
+        yield _width("angle spread", allowed.angle_spread, "deg", extension.angle, sd, shared=False)
+
+
+def _of_media(scene: Scene, extension: ExtendedScene, start: np.ndarray) -> Iterator[SimulatedEffect]:
+    """Effects of layers, substrate and faces; `start` are all numbers of the extended scene."""
+    allowed, instrument, substrate = scene.uncertainty, scene.instrument, scene.substrate
     for i, layer in enumerate(scene.layers):
         if not isinstance(layer, Layer):
             continue
-        of = f" of {layer.name or f'layer{i + 1}'}" if several else ""
+        of = f" of {layer.name or f'layer{i + 1}'}" if len(scene.layers) > 1 else ""
         if i in extension.index:
-            own = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
-            linear(f"index{of or ' of the layer'}", own, "", extension.index[i], material=True)
+            size = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
+            yield _linear(f"index{of or ' of the layer'}", size, "", extension.index[i], material=True)
         if i in extension.shape:
-            linear(f"dispersion{of}", allowed.dispersion, "", extension.shape[i])
+            yield _linear(f"dispersion{of}", allowed.dispersion, "", extension.shape[i])
         if instrument.thickness_spread is None and layer.thickness_spread is None:
-            size = min(allowed.thickness_spread * start[extension.thickness[i].position], _WIDEST_SPREAD)
-            relative = allowed.thickness_spread
-            width(f"thickness spread{of}", size, "nm", extension.thickness[i], size, relative=relative)
-    substrate = scene.substrate
-    own = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
-    linear("index of the substrate", own, "", extension.substrate_index, material=True)
+            relative, number = allowed.thickness_spread, extension.thickness[i]
+            size = min(relative * start[number.position], _WIDEST_SPREAD)
+            yield _width(f"thickness spread{of}", size, "nm", number, size, relative=relative)
+    size = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
+    yield _linear("index of the substrate", size, "", extension.substrate_index, material=True)
     reach = allowed.roughness
-    both = [(reach, HALF_NORMAL), (0.0, -HALF_NORMAL)]
-    add("roughness", reach, "nm", extension.roughness, both, power=2)
+    both = (reach, HALF_NORMAL), (0.0, -HALF_NORMAL)
+    yield SimulatedEffect("roughness", reach, "nm", extension.roughness, both, power=2)
     for name, size, number in (
         ("native oxide", allowed.interlayer, extension.oxide),
         ("mixed interface with the substrate", allowed.interlayer / 2, extension.mixture),
     ):
-        add(name, size, "nm", number, [(size, 1.0), (0.0, -1.0)], positive=True)
-    return (extension, rows) if rows else None
+        yield SimulatedEffect(name, size, "nm", number, ((size, 1.0), (0.0, -1.0)), positive=True)
 
 
 def effects_on_signal(view: SpectrumView, at: Local, scene: Scene) -> list[Effect]:
