@@ -42,7 +42,7 @@ from film_packages import (
 )
 
 import pellicle as pl
-from pellicle.optics.elementary import sincos
+from pellicle.optics.special import sincos
 
 jax.config.update("jax_enable_x64", True)
 

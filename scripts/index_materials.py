@@ -7,7 +7,7 @@ import csv
 import re
 from pathlib import Path
 
-from pellicle.materials.page import contents, csv_contents, load_yaml, plain_text
+from pellicle.materials.formats.refractiveindex_info import contents, csv_contents, load_yaml, plain_text
 
 DATA = Path(__file__).parents[1] / "src/pellicle/materials/data"
 SHELVES = ("glass", "main", "organic", "other", "popular_glass", "specs")

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.brdf import blinn_phong_film, film_colour, lobes
+from pellicle.brdf import film_colour, lobes
 from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import cosine_to_half, direction
 from pellicle.brdf.models import MODELS, PRESETS, RGB, model
@@ -82,7 +82,7 @@ SHADER = {"ambient_n": 1.0, "n": 1.5, "base_n": 2.0, "thickness": 250.0, "wavele
 def test_the_published_shader_counts_the_phase_twice():
     """0.0942 as published, 0.0239 by tmm."""
     up = jnp.array(0.0)
-    assert float(blinn_phong_film.published(SHADER, up)[0]) == pytest.approx(0.0942, abs=5e-5)
+    assert float(film_colour.published_shader(SHADER, up)[0]) == pytest.approx(0.0942, abs=5e-5)
     [truth] = films("s", 550.0, [1, 1.5, 2], [250.0])
     assert truth == pytest.approx(0.0239, abs=5e-5)
     assert float(film_colour.reflectance(SHADER, up)[0]) == pytest.approx(truth, rel=1e-12)
@@ -95,7 +95,7 @@ def test_phase_average_is_the_mean_over_a_period(angle):
     heights = np.arange(200) / 200 * 550 / (2 * 1.5 * cosine)
     angles = jnp.full(200, angle)
     mean = film_colour.reflectance({**SHADER, "thickness": heights}, angles).mean()
-    average = blinn_phong_film.phase_average(SHADER, jnp.array(angle))
+    average = film_colour.phase_average(SHADER, jnp.array(angle))
     assert float(average[0]) == pytest.approx(float(mean), rel=1e-12)
 
 
@@ -118,7 +118,7 @@ def test_an_opaque_film_reflects_like_one_face():
 
 def test_total_reflection_is_total():
     glass = {**SHADER, "ambient_n": 1.5, "n": 1.3, "base_n": 1.0}
-    for reflectance in (film_colour.reflectance, blinn_phong_film.published, blinn_phong_film.phase_average):
+    for reflectance in (film_colour.reflectance, film_colour.published_shader, film_colour.phase_average):
         assert float(reflectance(glass, jnp.array(1.2))[0]) == pytest.approx(1, rel=1e-12)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pellicle.colour import sensor
-from pellicle.colour.encoding import camera_encoding, encoding
+from pellicle.colour.spaces import camera_encoding, encoding
 
 WHITE = sensor("1931", "D50").white
 

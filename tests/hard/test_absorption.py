@@ -17,8 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.optics.absorption import absorptances
-from pellicle.optics.field import fields
+from pellicle.optics.field import absorptances, fields
 from pellicle.optics.interface import transverse
 from pellicle.optics.pair import Pair
 

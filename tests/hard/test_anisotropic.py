@@ -17,7 +17,7 @@ from mpmath import mp, mpc, mpf
 from pellicle.optics.anisotropy import tensor, uniaxial
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import polarised, transmittances
-from pellicle.optics.mueller import mueller_elements
+from pellicle.optics.ellipsometry import mueller_elements
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.waves import ratio_sums_of_mueller

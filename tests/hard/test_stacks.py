@@ -21,9 +21,9 @@ from mpmath import mp
 import pellicle as pl
 from pellicle.forward_model.film_signal import build
 from pellicle.optics import coherent, response
+from pellicle.optics.coherent import stack
 from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.pair import to_pair
-from pellicle.optics.stack import stack
 from pellicle.scene.free import insert
 
 TABLE = json.loads(Path(__file__).with_name("stacks.json").read_text(encoding="utf-8"))

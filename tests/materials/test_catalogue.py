@@ -12,7 +12,13 @@ from pellicle.errors import DataError
 from pellicle.materials import Material, UnknownMaterial, material, names, pages
 from pellicle.materials import catalogue as catalogue_module
 from pellicle.materials import contents as index
-from pellicle.materials.page import contents, csv_contents, database_entries, entry_contents, load_yaml
+from pellicle.materials.formats.refractiveindex_info import (
+    contents,
+    csv_contents,
+    database_entries,
+    entry_contents,
+    load_yaml,
+)
 from pellicle.optics.pair import imag, is_real, real
 
 NAMES = [entry.name for entry in names()]

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pellicle.errors import DataError
-from pellicle.materials.page import contents, load_yaml, plain_text, table, to_nm
+from pellicle.materials.formats.optical_constants import table
+from pellicle.materials.formats.refractiveindex_info import contents, load_yaml, plain_text, to_nm
 from pellicle.optics.pair import imag, is_real, real
 
 

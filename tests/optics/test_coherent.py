@@ -7,7 +7,7 @@ import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.optics import coherent, film, interface, response, stack
+from pellicle.optics import coherent, film, interface, response
 from pellicle.optics.pair import Pair, to_complex
 
 AMBIENT, SUBSTRATE, ANGLE = 1.3, Pair(np.array([1.7, 4.0]), np.array([0.0, 0.1])), 0.7
@@ -32,7 +32,7 @@ def test_one_smooth_layer_takes_the_closed_form(propagating):
 def test_few_layers_agree_with_the_loop(count, angle, propagating):
     layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
     few = coherent.few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
-    for one, many in zip(few, stack.stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
+    for one, many in zip(few, coherent.stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
         for power in POWERS:
             np.testing.assert_allclose(power(one), power(many), rtol=1e-13)
         for name in ("reflected", "below"):
@@ -60,7 +60,7 @@ def random_stack(rng: np.random.Generator, count: int):
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_agrees_with_tmm(count):
     rng = np.random.default_rng(count)
-    run = jax.jit(lambda n, d, n2, theta: stack.stack(1.0, list(n), n2, list(d), theta))
+    run = jax.jit(lambda n, d, n2, theta: coherent.stack(1.0, list(n), n2, list(d), theta))
     for _ in range(20):
         index, depth, substrate, theta = random_stack(rng, count)
         phases = 2 * np.pi / WAVELENGTH * np.array(depth)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pellicle.optics.lens import AZIMUTHS, RINGS, Film, chosen_rays, lens_rays
+from pellicle.optics.quadrature import AZIMUTHS, RINGS, Film, chosen_rays, lens_rays
 
 from .lens_reference import muellers, permittivity
 

@@ -5,9 +5,7 @@ import numpy as np
 import pytest
 
 from pellicle.optics.coherent import responses
-from pellicle.optics.ellipsometry import normalised as normalised_stokes
-from pellicle.optics.ellipsometry import stokes
-from pellicle.optics.mueller import mueller, normalised
+from pellicle.optics.ellipsometry import mueller, normalised, normalised_mueller, stokes
 from pellicle.optics.pair import to_complex
 
 # S₁ = |E_p|² − |E_s|², S₂ = 2 Re(E_p conj E_s), S₃ = 2 Im(E_p conj E_s)
@@ -29,16 +27,16 @@ def test_definition(jones):
 
 def test_isotropic_sample():
     s, p = responses(1.0, [1.6 + 0.1j], 3.9 + 0.02j, [np.asarray(1.2)], np.asarray(1.1))
-    n, c, sine = normalised_stokes(stokes(s, p))
+    n, c, sine = normalised(stokes(s, p))
     rs, rp = (to_complex(x.reflected) / to_complex(x.denominator) for x in (s, p))
-    found = normalised(mueller(np.diag([rp, rs])))
+    found = normalised_mueller(mueller(np.diag([rp, rs])))
     expected = [[1, -n, 0, 0], [-n, 1, 0, 0], [0, 0, c, sine], [0, 0, -sine, c]]
     np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
 def test_dark_sample_has_finite_slopes():
     def first_row(scale):
-        return normalised(mueller(scale * np.eye(2, dtype=complex)))[0].sum()
+        return normalised_mueller(mueller(scale * np.eye(2, dtype=complex)))[0].sum()
 
     assert first_row(0.0) == 0
     assert np.isfinite(jax.grad(first_row)(0.0))

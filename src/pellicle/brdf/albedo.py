@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from pellicle.brdf.broadcasting import Parameters
 from pellicle.brdf.directions import direction, half_vector, reflect
+from pellicle.brdf.lobes import Parameters
 
 ANGLES = (0.0, 30.0, 60.0, 80.0)
 """Angles of incidence (degrees) at which `max_albedo` evaluates the albedo."""

@@ -4,12 +4,15 @@ Every root here has slope zero where it is zero, so that values and gradients ar
 grazing incidence.
 """
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from pellicle.optics.pair import sqrt
+
+Vectors: TypeAlias = Float[Array | np.ndarray, "... 3"]
 
 
 def direction(theta: Any, phi: Any) -> Float[Array, "... 3"]:
@@ -23,12 +26,12 @@ def direction(theta: Any, phi: Any) -> Float[Array, "... 3"]:
     return jnp.stack([sine * jnp.cos(phi), sine * jnp.sin(phi), jnp.cos(theta)], axis=-1)
 
 
-def dot(a: Any, b: Any) -> Any:
+def dot(a: Vectors, b: Vectors) -> Any:
     """Return ⟨a, b⟩ over the last axis."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
-def length(v: Any) -> Float[Array, "..."]:
+def length(v: Vectors) -> Float[Array, "..."]:
     """Return |v|, with slope zero at v = 0."""
     v = jnp.asarray(v)
     return sqrt(dot(v, v))
@@ -49,7 +52,7 @@ def frame(theta: Any, phi: Any) -> Float[Array, "... 3 3"]:
     return jnp.stack([t, b, n], axis=-2)
 
 
-def reflect(v: Any, normal: Any) -> Float[Array, "... 3"]:
+def reflect(v: Vectors, normal: Vectors) -> Vectors:
     """Return the mirror direction 2⟨v, n⟩n − v, which like `v` points away from the surface."""
     return 2 * dot(v, normal)[..., None] * normal - v
 
@@ -60,18 +63,18 @@ def cosine_inside(cosine: Any, index: Any) -> Float[Array, "..."]:
     return sqrt(jnp.maximum(1 - inverse + inverse * cosine * cosine, 0.0))
 
 
-def half_vector(i: Any, o: Any) -> Float[Array, "... 3"]:
+def half_vector(i: Vectors, o: Vectors) -> Vectors:
     """Return the half vector (i + o)/|i + o|; zero where i = −o."""
     both = i + o
     size = length(both)
     return both / jnp.where(size == 0, 1.0, size)[..., None]
 
 
-def cosine_to_half(i: Any, o: Any) -> Float[Array, "..."]:
+def cosine_to_half(i: Vectors, o: Vectors) -> Float[Array, "..."]:
     """Return ⟨i, h⟩ = ⟨o, h⟩ = |i + o|/2, the cosine of incidence on a facet that mirrors i into o."""
     return 0.5 * length(i + o)
 
 
-def angle_to_half(i: Any, o: Any) -> Float[Array, "..."]:
+def angle_to_half(i: Vectors, o: Vectors) -> Float[Array, "..."]:
     """Return the angle (radians) between i and h. Its slope at i = o is set to zero: use even functions."""
     return jnp.arctan2(length(i - o), length(i + o))

@@ -2,6 +2,12 @@
 
 The colour depends on the directions only through ⟨i, h⟩. So it is computed at Chebyshev nodes of ⟨i, h⟩,
 and each sample evaluates one polynomial: the cost per sample does not depend on the film.
+
+"Thin Film Interference for Computer Graphics" (gamedev.net, 2013) sums the transmitted waves of a transparent
+film and takes 1 − T. Its α = ρ₁₀ρ₁₂ contains the signs of both reflections, and its Δ adds the same half
+turns again. Where they do not cancel, the published shader exchanges bright and dark (n = 1/1.5/2, 250 nm of
+film, 550 nm, normal incidence: 0.0942 where Airy gives 0.0239). The corrected film is that of
+`pellicle.optics.film`.
 """
 
 import math
@@ -11,8 +17,8 @@ from typing import Any, TypeAlias
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.brdf.broadcasting import Parameters, column, in_channels
-from pellicle.brdf.directions import angle_to_half, cosine_to_half
+from pellicle.brdf.directions import Vectors, angle_to_half, cosine_to_half
+from pellicle.brdf.lobes import Parameters, column, in_channels
 from pellicle.optics import coherent, orders, response
 from pellicle.optics.interface import allow_tunnelling
 from pellicle.optics.pair import Number, Pair
@@ -38,7 +44,7 @@ def node_count(thickest: float) -> int:
 Reflectance: TypeAlias = Callable[[Parameters, Any], Any]
 """(parameters, angle in radians (...), None for normal incidence) → (..., wavelengths)."""
 
-Colour: TypeAlias = Callable[[Parameters, Any, Any], Any]
+Colour: TypeAlias = Callable[[Parameters, Vectors, Vectors], Any]
 """(parameters, i, o) → (..., 3), or a channel for each wavelength."""
 
 
@@ -86,6 +92,41 @@ def without_interference(parameters: Parameters, angle: Any) -> Any:
     return 0.5 * sum(orders.reflectance(series, orders.monochromatic, count=0) for series in (s, p))
 
 
+SHADER_WAVELENGTHS = (650.0, 510.0, 475.0)
+"""Wavelengths of R, G and B of the published shader in nm."""
+
+
+def published_shader(parameters: Parameters, angle: Any) -> Any:
+    """Return the reflectance of the shader, with Δ added to the phase of a signed α."""
+    n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
+    half_turns = jnp.pi * (jnp.where(n1 < n0, 1, 0) + jnp.where(n1 < n2, 1, 0))
+
+    def transmitted(series: orders.AirySeries):
+        alpha = -series.upper * series.lower
+        return series.direct / (1 + alpha * alpha - 2 * alpha * jnp.cos(series.phase + half_turns))
+
+    return _one_minus(transmitted, parameters, angle)
+
+
+def phase_average(parameters: Parameters, angle: Any) -> Any:
+    """Return the mean over all phases, 1 − |β|²/(1 − α²) times the ratio of beams, as in ray optics."""
+    return _one_minus(
+        lambda series: series.direct / (1 - (series.upper * series.lower) ** 2), parameters, angle
+    )
+
+
+def _one_minus(transmitted: Callable[[orders.AirySeries], Any], parameters: Parameters, angle: Any) -> Any:
+    """Return 1 − T, the mean of s and p; 1 with total reflection at either face, as in the shader."""
+    n0, n1, n2 = (parameters[key] for key in ("ambient_n", "n", "base_n"))
+    angle = angle[..., None]
+    a = n0 * jnp.sin(angle)
+    total = (a >= n1) | (a >= n2)
+    safe = jnp.where(total, 0.0, angle)
+    phase = 2 * jnp.pi / parameters["wavelengths"] * column(parameters["thickness"])
+    s, p = (transmitted(orders.airy_series(n0, n1, n2, phase, safe, letter)) for letter in "sp")
+    return jnp.where(total, 1.0, 1 - 0.5 * (s + p))
+
+
 def per_sample(reflectance: Reflectance) -> Colour:
     """Return the RGB reflectance for light from i to o, computed for each sample."""
     return lambda parameters, i, o: in_channels(parameters, reflectance(parameters, angle_to_half(i, o)))
@@ -130,7 +171,7 @@ def interpolated(count: int, reflectance: Reflectance = reflectance) -> Colour:
     return colour
 
 
-def incoherent(parameters: Parameters, i: Any, o: Any) -> Any:
+def incoherent(parameters: Parameters, i: Vectors, o: Vectors) -> Any:
     """Return the RGB reflectance without interference; over bands by a polynomial, for it has no fringes."""
     over_bands = "weights" in parameters
     return (interpolated(_SMOOTH, without_interference) if over_bands else per_sample(without_interference))(

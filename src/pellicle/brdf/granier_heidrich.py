@@ -22,11 +22,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
-from pellicle.brdf.broadcasting import Evaluate, Parameters, column, in_channels, weighted_sum
-from pellicle.brdf.directions import cosine_inside, cosine_to_half, direction
-from pellicle.brdf.lobes import cosine_to_mirror, power
-from pellicle.optics.elementary import sincos
+from pellicle.brdf import lobes
+from pellicle.brdf.directions import Vectors, cosine_inside, cosine_to_half, direction
+from pellicle.brdf.lobes import Evaluate, Parameters, column, in_channels, weighted_sum
 from pellicle.optics.pair import sqrt
+from pellicle.optics.special import sincos
 
 
 class Paths(NamedTuple):
@@ -56,7 +56,7 @@ Combine: TypeAlias = Callable[[Amplitudes], Any]
 """Sum of both lobes, with or without interference."""
 
 
-def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
+def paths(i: Vectors, o: Vectors, n: Any, normal: Any = None) -> Paths:
     """Return the cosines for a layer of index n ≥ 1 (scalar or per channel) over a boundary of this normal.
 
     `normal` None means parallel boundaries. With u = −t_i and w = −t_o the lobe of eq. 10 is
@@ -76,7 +76,7 @@ def paths(i: Any, o: Any, n: Any, normal: Any = None) -> Paths:
         half=cosine_to_half(i, o)[..., None],
         inside_i=down_i,
         inside_o=down_o,
-        mirror=cosine_to_mirror(i, o)[..., None],
+        mirror=lobes.cosine_to_mirror(i, o)[..., None],
         lower=jnp.where(reached, 2 * toward_i * toward_o - cosine_between, 0.0),
     )
 
@@ -107,7 +107,7 @@ def reciprocal(p: Paths, n: Any) -> tuple[Any, Any]:
     return schlick(p.half, n), _schlick_complement(p.i) * _schlick_complement(p.o)
 
 
-def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Fresnel = published) -> Amplitudes:
+def amplitudes(parameters: Parameters, i: Vectors, o: Vectors, fresnel: Fresnel = published) -> Amplitudes:
     """Return √R, √T and Φ, as products of roots: √(lobe^e) itself has no slope at the edge of the lobe."""
     n = parameters["n"]
     tilted = "deviation" in parameters
@@ -116,8 +116,8 @@ def amplitudes(parameters: Parameters, i: Any, o: Any, fresnel: Fresnel = publis
     e0, e1 = column(parameters["exponent_reflection"]), column(parameters["exponent_transmission"])
     per_wavelength = jnp.pi * n * column(parameters["thickness"]) / parameters["wavelengths"]
     return Amplitudes(
-        reflected=sqrt(F) * power(p.mirror, 0.5 * e0),
-        transmitted=(1 - normal_reflectance(n)) * sqrt(passed) * power(p.lower, 0.5 * e1),
+        reflected=sqrt(F) * lobes.power(p.mirror, 0.5 * e0),
+        transmitted=(1 - normal_reflectance(n)) * sqrt(passed) * lobes.power(p.lower, 0.5 * e1),
         phase=per_wavelength * (p.inside_i + p.inside_o),
     )
 
@@ -154,17 +154,14 @@ def layered_diffuse(parameters: Parameters, combine: Combine = interfering) -> A
     return in_channels(parameters, combine(amplitudes_at))
 
 
-def _lobes(parameters: Parameters, i: Any, o: Any, fresnel: Fresnel, combine: Combine) -> Any:
+def _lobes(parameters: Parameters, i: Vectors, o: Vectors, fresnel: Fresnel, combine: Combine) -> Any:
     return in_channels(parameters, combine(amplitudes(parameters, i, o, fresnel)))
 
 
 def specular(fresnel: Fresnel = published, combine: Combine = interfering) -> Evaluate:
     """Return the Phong-like BRDF over a grey diffuse base: specular · (eq. 5) + diffuse."""
 
-    def evaluate(parameters, i, o):
-        return weighted_sum(parameters, lambda: _lobes(parameters, i, o, fresnel, combine))
-
-    return evaluate
+    return lambda values, i, o: weighted_sum(values, lambda: _lobes(values, i, o, fresnel, combine))
 
 
 def diffuse(combine: Combine = interfering) -> Evaluate:
@@ -181,10 +178,7 @@ def full(fresnel: Fresnel = published, combine: Combine = interfering) -> Evalua
     """Return specular · (eq. 5) + diffuse · ρ_d (eq. 16), as in the paper's figures 3 and 5."""
 
     def evaluate(parameters, i, o):
-        return weighted_sum(
-            parameters,
-            lambda: _lobes(parameters, i, o, fresnel, combine),
-            lambda: layered_diffuse(parameters, combine),
-        )
+        base = lambda: layered_diffuse(parameters, combine)  # noqa: E731
+        return weighted_sum(parameters, lambda: _lobes(parameters, i, o, fresnel, combine), base)
 
     return evaluate

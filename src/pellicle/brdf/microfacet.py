@@ -25,10 +25,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.brdf import film_colour
-from pellicle.brdf.broadcasting import Evaluate, Parameters, column, weighted_sum
-from pellicle.brdf.directions import cosine_inside, cosine_to_half
+from pellicle.brdf.directions import Vectors, cosine_inside, cosine_to_half
 from pellicle.brdf.film_colour import Colour, clenshaw
-from pellicle.brdf.lobes import microfacets
+from pellicle.brdf.lobes import Evaluate, Parameters, column, microfacets, weighted_sum
 from pellicle.optics.pair import sqrt
 
 
@@ -38,13 +37,10 @@ def microfacet(colour: film_colour.Colour = film_colour.exact) -> Evaluate:
     With `multiple_scattering` the light reflected more than once between facets is added to the lobe.
     """
 
-    def evaluate(parameters, i, o):
-        return weighted_sum(parameters, lambda: film_lobes(parameters, i, o, colour))
-
-    return evaluate
+    return lambda parameters, i, o: weighted_sum(parameters, lambda: film_lobes(parameters, i, o, colour))
 
 
-def film_lobes(parameters: Parameters, i: Any, o: Any, colour: film_colour.Colour) -> Any:
+def film_lobes(parameters: Parameters, i: Vectors, o: Vectors, colour: film_colour.Colour) -> Any:
     """Return the BRDF of facets under a film, without weights."""
     once = column(microfacets(i, o, parameters["roughness"])) * colour(parameters, i, o)
     if "multiple_scattering" not in parameters:
@@ -108,7 +104,7 @@ def mean_colour(parameters: Parameters, colour: Colour, dtype: Any) -> Any:
     return jnp.tensordot(jnp.asarray(_SHARE, values.dtype), values, axes=1)
 
 
-def multiple_scattering_lobe(parameters: Parameters, i: Any, o: Any, colour: Colour) -> Any:
+def multiple_scattering_lobe(parameters: Parameters, i: Vectors, o: Vectors, colour: Colour) -> Any:
     """Return the BRDF of light reflected more than once, times the parameter `multiple_scattering`."""
     alpha = jnp.asarray(parameters["roughness"], i.dtype)
     lost = mean_loss(alpha)
@@ -140,7 +136,7 @@ def clear_coat(colour: film_colour.Colour = film_colour.exact) -> Evaluate:
     return evaluate
 
 
-def _below(parameters: Parameters, i: Any, o: Any, colour: film_colour.Colour) -> Any:
+def _below(parameters: Parameters, i: Vectors, o: Vectors, colour: film_colour.Colour) -> Any:
     """The film's lobe as seen through the coat."""
     n = parameters["coat_n"]
     inner_i, inner_o = (

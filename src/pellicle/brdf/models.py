@@ -20,9 +20,9 @@ from typing import Any, NamedTuple, TypeAlias
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from pellicle.brdf import blinn_phong_film, film_colour, granier_heidrich
-from pellicle.brdf.broadcasting import Evaluate as Evaluate
-from pellicle.brdf.broadcasting import Parameters
+from pellicle.brdf import film_colour, granier_heidrich
+from pellicle.brdf.directions import Vectors
+from pellicle.brdf.lobes import Evaluate, Parameters, blinn_phong, column, weighted_sum
 from pellicle.brdf.microfacet import clear_coat, microfacet
 
 RGB = (645.0, 525.0, 445.0)
@@ -67,7 +67,7 @@ class Model(NamedTuple):
         """Return the model without interference: averaged over the phase, or lobes added as intensities."""
         return self._replace(evaluate=self.incoherent, from_film_colour=None)
 
-    def __call__(self, parameters: Parameters, i: Any, o: Any) -> Float[Array, "... channels"]:
+    def __call__(self, parameters: Parameters, i: Vectors, o: Vectors) -> Float[Array, "... channels"]:
         """Evaluate the BRDF (1/sr) for light from `i` to `o`.
 
         **Arguments:**
@@ -145,20 +145,22 @@ def _granier_heidrich(
     )
 
 
+def blinn_phong_film(colour: film_colour.Colour = film_colour.exact) -> Evaluate:
+    """Return the BRDF specular · ⟨n, h⟩₊^e R(⟨o, h⟩) + diffuse; the lobe is not normalised, as published."""
+
+    def evaluate(parameters, i, o):
+        lobe = column(blinn_phong(i, o, parameters["exponent"]))
+        return weighted_sum(parameters, lambda: lobe * colour(parameters, i, o))
+
+    return evaluate
+
+
 def _shader(
     name: str, description: str, colour: film_colour.Colour, from_film_colour: FromColour | None
 ) -> Model:
-    average = blinn_phong_film.blinn_phong_film(film_colour.per_sample(blinn_phong_film.phase_average))
-    evaluate = blinn_phong_film.blinn_phong_film(colour)
-    return Model(
-        name,
-        description,
-        _SHADER,
-        evaluate,
-        average,
-        blinn_phong_film.PUBLISHED_WAVELENGTHS,
-        from_film_colour=from_film_colour,
-    )
+    average = blinn_phong_film(film_colour.per_sample(film_colour.phase_average))
+    evaluate, wavelengths = blinn_phong_film(colour), film_colour.SHADER_WAVELENGTHS
+    return Model(name, description, _SHADER, evaluate, average, wavelengths, from_film_colour)
 
 
 _ALL = (
@@ -208,12 +210,12 @@ _ALL = (
         "blinn-phong-film",
         "a transparent film in a Blinn-Phong lobe",
         film_colour.exact,
-        blinn_phong_film.blinn_phong_film,
+        blinn_phong_film,
     ),
     _shader(
         "blinn-phong-film-published",
         "a transparent film in a Blinn-Phong lobe, with the phase error of the published shader",
-        film_colour.per_sample(blinn_phong_film.published),
+        film_colour.per_sample(film_colour.published_shader),
         None,
     ),
 )

@@ -113,12 +113,6 @@ def published_gaussians() -> Bands:
     return Bands(1e9 / centre, np.sqrt(2 * variance) * 1e-9, weights, orders=3, absorbs=False)
 
 
-def belcour_barla(target: Sensor) -> Bands:
-    """Return the bands of Belcour and Barla 2017, converted from E by Bradford's adaptation."""
-    published, to_target = published_gaussians(), adaptation(np.ones(3), target.white)
-    return published._replace(weights=published.weights @ to_target.T)
-
-
 _WORD = re.compile(r"(points|uniform|frequency|nodes|gaussians)-(\d+(?:-\d+)*)")
 
 
@@ -145,7 +139,8 @@ def integration_bands(method: str = "gaussians-8", observer: str = "1931", illum
     """
     target = sensor(observer, illuminant)
     if method == "belcour-barla":
-        return belcour_barla(target)
+        published, from_equal_energy = published_gaussians(), adaptation(np.ones(3), target.white)
+        return published._replace(weights=published.weights @ from_equal_energy.T)
     match_ = _WORD.fullmatch(method)
     kind, numbers = (match_[1], [int(n) for n in match_[2].split("-")]) if match_ else ("", [])
     match kind, numbers:

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.colour.encoding import Encoding, encoding
-from pellicle.colour.spaces import lab
+from pellicle.colour.spaces import Encoding, encoding, lab
 from pellicle.colour.table import FilmColourTable
 
 SIGMA = 1.5 / 255

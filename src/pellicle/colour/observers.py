@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.spaces import srgb_matrix
 
 SPAN = (380, 730)
 """Range of wavelengths in nm: the rest is below 5e-4 of X, Y and Z under every lamp."""
@@ -56,14 +56,11 @@ def sensor(observer: str = "1931", illuminant: str = "D65") -> Sensor:
     """
     if observer not in OBSERVERS:
         raise ValueError(f"observer {observer!r} is unknown: expected one of {', '.join(OBSERVERS)}")
-    if illuminant not in ILLUMINANTS:
-        raise ValueError(f"illuminant {illuminant!r} is unknown: expected one of {', '.join(ILLUMINANTS)}")
-    table, lamps = columns("observers.csv"), columns("illuminants.csv")
+    lamp, table = illuminant_spectrum(illuminant), columns("observers.csv")
     inside = (table["wavelength_nm"] >= SPAN[0]) & (table["wavelength_nm"] <= SPAN[1])
     wavelength = table["wavelength_nm"][inside]
     functions = np.stack([table[f"{axis}_{observer}"][inside] for axis in "xyz"], axis=1)
-    if illuminant != "E":
-        functions = functions * np.interp(wavelength, lamps["wavelength_nm"], lamps[illuminant])[:, None]
+    functions = functions * np.interp(wavelength, *lamp)[:, None]
     return Sensor(wavelength, functions / functions[:, 1].sum())
 
 
@@ -110,7 +107,8 @@ def camera_sensor(
             f"the channel {name} has {share:.0f} % of its sensitivity at or beyond {nm[0]:g} or {nm[-1]:g}"
             " nm, where the table of the camera or of the lamp ends: give tables of the whole range"
         )
-    both = _at(nm, seen_at, seen) * np.interp(nm, lit_at, power)[:, None]
+    channels = [np.interp(nm, seen_at, channel) for channel in seen.T]
+    both = np.stack(channels, axis=1) * np.interp(nm, lit_at, power)[:, None]
     white = both.sum(axis=0)
     if not np.all(white > 0):
         raise ValueError(f"the channel {'RGB'[int(np.argmin(white))]} receives no light from this lamp")
@@ -140,7 +138,7 @@ def observer_sensor(observer: str, lamp_wavelength: ArrayLike, lamp: ArrayLike) 
 
 def srgb_sensor(eye: Sensor) -> Sensor:
     """Return an observer's sensor whose channels are linear sRGB, adapted to its white by Bradford."""
-    return Sensor(eye.wavelength, eye.weights @ (TO_SRGB @ adaptation(eye.white, SRGB_WHITE)).T)
+    return Sensor(eye.wavelength, eye.weights @ srgb_matrix(eye.white).T)
 
 
 @cache
@@ -153,7 +151,7 @@ def illuminant_spectrum(name: str) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"illuminant {name!r} is unknown: expected one of {', '.join(ILLUMINANTS)}")
     lamps = columns("illuminants.csv")
     nm = lamps["wavelength_nm"]
-    return nm, np.ones(nm.shape) if name == "E" else lamps[name]
+    return nm, lamps.get(name, np.ones(nm.shape))  # E has equal energy at all wavelengths
 
 
 def _increasing(name: str, values: ArrayLike) -> np.ndarray:
@@ -161,10 +159,6 @@ def _increasing(name: str, values: ArrayLike) -> np.ndarray:
     if nm.ndim != 1 or nm.size < 2 or not np.all(np.diff(nm) > 0):
         raise ValueError(f"`{name}` must be two or more rising numbers, in nm")
     return nm
-
-
-def _at(nm: np.ndarray, wavelength: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(nm, wavelength, column) for column in values.T], axis=1)
 
 
 def _trimmed(nm: np.ndarray, weights: np.ndarray) -> Sensor:

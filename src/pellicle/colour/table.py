@@ -142,26 +142,19 @@ class FilmColourTable(eqx.Module):
             )
         shear = np.float64(1 / index**2 if index > 1 else 0.0)  # total reflection: no fringe rests on a path
         colours = _in_batches(colours)
-        path = thickness[0] * _shortening(low, shear), thickness[1] * _shortening(high, shear)
-        grid = _Grid(np.array(path), np.array([low, high]), np.array(shear))
+        path = np.array([thickness[0] * _shortening(low, shear), thickness[1] * _shortening(high, shear)])
+        grid = _Grid(path, np.array([low, high]), np.array(shear))
         probes = _probes(colours, thickness, (low, high))
 
-        def attempt(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray, TableError]:
+        def attempt(counts: np.ndarray) -> Attempt:
             nodes = _nodes(colours, grid, counts)
             return counts, nodes, probes.error(nodes, grid, np.asarray(white))
 
-        counts, nodes, error = attempt(np.array([max(16, int(np.ptp(thickness) * index / 25)), 12]))
-        while error.largest > tolerance or error.slope > SLOPE_TOLERANCE:
-            finer = [counts * 3 // 2 * mask + counts * (1 - mask) for mask in np.eye(2, dtype=int)]
-            if any(np.prod(each) * _NODE > LARGEST for each in finer):
-                break
-            counts, nodes, error = min(
-                map(attempt, finer),
-                key=lambda made: max(made[2].largest / tolerance, made[2].slope / SLOPE_TOLERANCE),
-            )
-        x, y, z = (float(value) for value in white)
-        single = [jnp.asarray(each, jnp.float32) for each in (nodes, *grid)]
-        return cls(single[0], single[1], single[2], single[3], error, (x, y, z))
+        start = np.array([max(16, int(np.ptp(thickness) * index / 25)), 12])
+        nodes, error = _refined(attempt, start, tolerance)
+        x, y, z = map(float, white)
+        nodes, paths, cosines, shear = (jnp.asarray(each, jnp.float32) for each in (nodes, *grid))
+        return cls(nodes, paths, cosines, shear, error, (x, y, z))
 
     def xyz(self, thickness: Any, cosine: Any = 1.0) -> Float[Array, "... 3"]:
         """XYZ (..., 3) at thicknesses (nm) and cosines of the angle of incidence, which broadcast."""
@@ -174,9 +167,8 @@ class FilmColourTable(eqx.Module):
 
     def evaluate(self, thickness: np.ndarray, cosine: np.ndarray) -> np.ndarray:
         """XYZ (..., 3) as `xyz`, in NumPy: nothing is compiled."""
-        path, cosines, shear = (np.asarray(x) for x in (self.path, self.cosine, self.shear))
-        nodes, grid = np.asarray(self.nodes), _Grid(path, cosines, shear)
-        return _interpolated(nodes, grid, *np.broadcast_arrays(thickness, cosine))
+        nodes, *grid = (np.asarray(x) for x in (self.nodes, self.path, self.cosine, self.shear))
+        return _interpolated(nodes, _Grid(*grid), *np.broadcast_arrays(thickness, cosine))
 
     @property
     def thickness(self) -> tuple[float, float]:
@@ -196,6 +188,26 @@ class _Grid(NamedTuple):
     path: Any
     cosine: Any
     shear: Any
+
+
+Attempt = tuple[np.ndarray, np.ndarray, TableError]
+"""Numbers of nodes along both axes, the nodes, and their error."""
+
+
+def _refined(
+    attempt: Callable[[np.ndarray], Attempt], counts: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, TableError]:
+    """Add nodes along the axis that gains more, until the error is small enough or the table is full."""
+    counts, nodes, error = attempt(counts)
+    while error.largest > tolerance or error.slope > SLOPE_TOLERANCE:
+        finer = [counts * 3 // 2 * mask + counts * (1 - mask) for mask in np.eye(2, dtype=int)]
+        if any(np.prod(each) * _NODE > LARGEST for each in finer):
+            break
+        counts, nodes, error = min(
+            map(attempt, finer),
+            key=lambda made: max(made[2].largest / tolerance, made[2].slope / SLOPE_TOLERANCE),
+        )
+    return nodes, error
 
 
 def _shortening(cosine: Any, shear: Any) -> Any:

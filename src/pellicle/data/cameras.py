@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.colour import delta_e76, delta_e2000, lab
-from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.colour.observers import (
     OBSERVERS,
     Sensor,
@@ -24,6 +23,7 @@ from pellicle.colour.observers import (
     sensor,
     srgb_sensor,
 )
+from pellicle.colour.spaces import Encoding, camera_encoding, encoding
 from pellicle.data.colour_rows import bare_name, colour_cells, scaled
 from pellicle.data.colours import CameraMatrix
 from pellicle.data.spectrum_rows import axis_unit, read_axis

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.colour.encoding import Encoding
+from pellicle.colour.spaces import Encoding
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colour_rows import ColourRows, read_colour_rows
 from pellicle.data.colours import Colours

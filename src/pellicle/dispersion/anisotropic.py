@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Complex
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
-from pellicle.optics.anisotropy import Principal, permittivity, uniaxial
+from pellicle.optics.anisotropy import Medium, Principal, permittivity, uniaxial
 from pellicle.optics.pair import Number, namespace
 
 
@@ -70,18 +70,21 @@ class Anisotropic(AbstractDispersion):
 
     def with_media(self, convert: Callable[[Any], AbstractDispersion]) -> Anisotropic:
         """Return a copy whose principal media are `convert(medium)`."""
+        media = {name: getattr(self, name) for name in "xyz"}
+        return self._with(**{name: convert(x) for name, x in media.items() if x is not None})
+
+    def _with(self, **fields: Any) -> Anisotropic:
         # neither by the constructor, where traced angles lose the order of the axes, nor by `eqx.tree_at`,
         # which copies free parameters
         other = object.__new__(Anisotropic)
-        for name, value in vars(self).items():
-            medium = name in ("x", "y", "z") and value is not None
-            object.__setattr__(other, name, convert(value) if medium else value)
+        for name, value in (vars(self) | fields).items():
+            object.__setattr__(other, name, value)
         return other
 
     def with_angles(self, convert: Callable[[Any], Any]) -> Anisotropic:
         """Return a copy whose angles of the axis are `convert(angle)`."""
-        own = self.arguments
-        return Anisotropic(**own | {"axis": tuple(map(convert, own["axis"]))})
+        arguments = self.arguments
+        return Anisotropic(**arguments | {"axis": tuple(map(convert, arguments["axis"]))})
 
     def turned(self, azimuth: Any) -> Anisotropic:
         """Return the medium in a sample turned about its normal by `azimuth` degrees, from x towards y.
@@ -89,18 +92,13 @@ class Anisotropic(AbstractDispersion):
         A uniaxial medium whose axis is the normal stays as it is. In another one s and p mix, whatever the
         azimuth is.
         """
-        if self.is_uniaxial and self.order is not None and self.order[2] == 2:
-            return self
-        other = object.__new__(Anisotropic)
-        for name, value in (vars(self) | {"azimuth": azimuth, "order": None}).items():
-            object.__setattr__(other, name, value)
-        return other
+        return self if isotropic_in_plane(self) else self._with(azimuth=azimuth, order=None)
 
     @property
     def names(self) -> dict[str, str]:
         """Names of the fields in results."""
-        own = {"x": "ordinary", "z": "extraordinary"} if self.y is None else {"x": "x", "y": "y", "z": "z"}
-        return own | {"theta": "axis_theta", "phi": "axis_phi", "psi": "axis_psi"}
+        media = {"x": "ordinary", "z": "extraordinary"} if self.is_uniaxial else {x: x for x in "xyz"}
+        return media | {"theta": "axis_theta", "phi": "axis_phi", "psi": "axis_psi"}
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -128,7 +126,7 @@ class Anisotropic(AbstractDispersion):
                 indices.append(jnp.broadcast_to(index, at.shape) * (1 + 0j))
         return jnp.stack(indices, axis=-1)
 
-    def index(self, wavelength):
+    def index(self, wavelength) -> Medium:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a `Principal` where the axes are those of the laboratory, else a `Uniaxial` or `Tensor`."""
         x, z = self.x.index(wavelength), self.z.index(wavelength)
         y = x if self.y is None else self.y.index(wavelength)
@@ -152,25 +150,20 @@ def _axis_order(theta: Any, phi: Any, psi: Any) -> tuple[int, int, int] | None:
         literal = isinstance(angle, int | float) and math.isfinite(angle) and angle % 90 == 0
         return int(angle // 90) % 2 if literal else None
 
-    tilt, azimuth, twist = (quarter_turns(angle) for angle in (theta, phi, psi))
-    if psi is None:
-        twist = 0
-        if tilt == 0:
-            azimuth = 0
+    tilt, twist = quarter_turns(theta), 0 if psi is None else quarter_turns(psi)
+    azimuth = 0 if psi is None and tilt == 0 else quarter_turns(phi)
     if None in (tilt, azimuth, twist):
         return None
-    axes = [0, 1, 2]
-    for odd, (i, j) in ((twist, (0, 1)), (tilt, (0, 2)), (azimuth, (0, 1))):
-        if odd:
-            axes[i], axes[j] = axes[j], axes[i]
-    return axes[0], axes[1], axes[2]
+    x, y, z = (1, 0, 2) if twist else (0, 1, 2)
+    x, z = (z, x) if tilt else (x, z)
+    return (y, x, z) if azimuth else (x, y, z)
 
 
 def principal_media(medium: Any) -> list[Any]:
     """Return the two or three principal media of an anisotropic medium, each once; of another one itself."""
     if not isinstance(medium, Anisotropic):
         return [medium]
-    return [own for own in (medium.x, medium.y, medium.z) if own is not None]
+    return [principal for principal in (medium.x, medium.y, medium.z) if principal is not None]
 
 
 def each_principal(function: Callable[[Any], Any], medium: Any) -> Any:

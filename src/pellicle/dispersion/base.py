@@ -32,7 +32,7 @@ class AbstractDispersion(eqx.Module):
         return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
 
 
-def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Number:
+def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Any:
     """Index of a dispersion of numbers at `wavelength` (nm), in NumPy arrays: nothing is compiled.
 
     It is not finite where the formula of a model is not.

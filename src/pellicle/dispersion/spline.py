@@ -84,11 +84,8 @@ class KramersKronigSpline(AbstractDispersion):
         energy = HC / wavelength
         sites = HC / np.array(self.knots[::-1])
         low, high = sites[0] / sites[1], sites[-1] / sites[-2]
-        ends = (
-            np.array([sites[0] * low**2, sites[0] * low]),
-            np.array([sites[-1] * high, sites[-1] * high**2]),
-        )
-        around = np.concatenate([ends[0], sites, ends[1]])
+        below, above = sites[0] * np.array([low**2, low]), sites[-1] * np.array([high, high**2])
+        around = np.concatenate([below, sites, above])
         rising = self.k[::-1]
         n = self.n_inf + _combine(_conjugates(energy, around), rising)
         return Pair(n, _combine(b_splines(energy, around, 3), rising))
@@ -96,9 +93,9 @@ class KramersKronigSpline(AbstractDispersion):
 
 def greville_knots(sites: Sequence[float]) -> tuple[np.ndarray, int]:
     """Knots of the B-splines whose coefficients belong to `sites` (de Boor's averages), and their degree."""
-    degree, at = min(3, len(sites) - 1), np.array(sites)
-    inner = [at[i : i + degree].mean() for i in range(1, len(at) - degree)]
-    return np.concatenate([[at[0]] * (degree + 1), inner, [at[-1]] * (degree + 1)]), degree
+    degree = min(3, len(sites) - 1)
+    inner = [np.mean(sites[i : i + degree]) for i in range(1, len(sites) - degree)]
+    return np.concatenate([[sites[0]] * (degree + 1), inner, [sites[-1]] * (degree + 1)]), degree
 
 
 def _combine(basis: Any, coefficients: tuple[Any, ...]) -> Any:
@@ -131,8 +128,7 @@ def _conjugates(energy: Any, knots: np.ndarray) -> Any:
     parts = (below**3 * log_abs(below) + above**3 * log_abs(above)) / math.pi
     weights = np.zeros((len(knots), len(knots) - 4))
     for j in range(len(knots) - 4):
-        own = knots[j : j + 5]
+        five = knots[j : j + 5]
         for i in range(5):
-            weights[j + i, j] = (own[4] - own[0]) / np.prod(own[i] - np.delete(own, i))
-    at = cast_like(weights, energy)
-    return (parts[..., None] * at).sum(axis=-2)
+            weights[j + i, j] = (five[4] - five[0]) / np.prod(five[i] - np.delete(five, i))
+    return (parts[..., None] * cast_like(weights, energy)).sum(axis=-2)

@@ -18,7 +18,7 @@ from pellicle.effects.presence import roughness, scene_media
 from pellicle.forward_model.plan import GENERAL, Plan, Row
 from pellicle.optics import orders as series
 from pellicle.optics import quadrature
-from pellicle.optics.lens import Film, chosen_rays
+from pellicle.optics.quadrature import Film, chosen_rays
 from pellicle.scene.film import Scene, coherent_layers, is_graded, thickness_spread
 from pellicle.scene.free import Free
 from pellicle.scene.layers import Layer, absorbs

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 from pellicle.colour import lab, sensor
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.spaces import srgb_matrix
 from pellicle.data.spectrum import Spectrum
 from pellicle.explorer.controls import Control
 from pellicle.explorer.programs import COSINES, MOST, Curve, measured_angles, named, thinned
@@ -48,7 +48,7 @@ def _lookup(size: int) -> _Lookup:
 
 def to_linear_srgb(xyz: np.ndarray) -> np.ndarray:
     """Convert XYZ (..., 3) under D65, observer 1931, to linear sRGB, not clipped."""
-    return xyz @ (TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)).T
+    return xyz @ srgb_matrix(sensor().white).T
 
 
 def ball_rendering(xyz: np.ndarray, size: int) -> bytes:

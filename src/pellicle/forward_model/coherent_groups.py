@@ -11,7 +11,7 @@ from pellicle.forward_model.plan import Plan
 from pellicle.optics import coherent, interface, orders, plate, response
 from pellicle.optics.anisotropy import Principal, each_index, mixes_polarisations, seen_by
 from pellicle.optics.gradient import Gradient, gauss_points
-from pellicle.optics.pair import Number, imag, real
+from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Group, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer, Plate
@@ -20,9 +20,9 @@ from pellicle.scene.layers import Layer, Plate
 class CoherentGroup(NamedTuple):
     """Coherent layers between two thick media: numbers at each wavelength, of the types the plan needs."""
 
-    above: Number
-    layers: list[Number]  # of a graded one its `Gradient`
-    below: Number
+    above: Any  # media of optics
+    layers: list[Any]  # of a graded one its `Gradient`
+    below: Any
     phases: list[Any]
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
     internal: Any  # internal transmittance of the plate below, None on a half space; may be `PerPolarisation`
@@ -38,7 +38,7 @@ class PerPolarisation(NamedTuple):
     p: Any
 
 
-def _per_polarisation(function: Callable[[str], Any], medium: Number) -> Any:
+def _per_polarisation(function: Callable[[str], Any], medium: Any) -> Any:
     """function(polarisation), for s and p apart where the medium is birefringent, else one for both."""
     return PerPolarisation(function("s"), function("p")) if isinstance(medium, Principal) else function("s")
 
@@ -86,7 +86,7 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     return evaluated
 
 
-def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
+def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Any:
     if isinstance(layer.material, Graded):
         points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
         return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
@@ -94,7 +94,7 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Number:
     return index if plan.on("absorption") else each_index(real, index)
 
 
-def _internal(medium: Number, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
+def _internal(medium: Any, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:
     extinction = imag(interface.normal(seen_by(medium, polarisation), a))
     return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
 

@@ -29,9 +29,8 @@ from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
-from pellicle.optics.lens import Turn, lens_rays
 from pellicle.optics.orders import FWHM
-from pellicle.optics.quadrature import cone_rays, normal_rule
+from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Reference, Scene, media, of_reference, thickness_spread, turned
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Layer

@@ -22,11 +22,10 @@ from pellicle.forward_model.plan import SLICED, Plan
 from pellicle.optics import plate
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import Polarised, polarised, transmittances, two_sided
-from pellicle.optics.ellipsometry import Stokes
+from pellicle.optics.ellipsometry import Stokes, mueller, mueller_elements
 from pellicle.optics.interface import Inside, normal, normal_flux, transverse
-from pellicle.optics.lens import Turn, turned_response, turned_stokes
-from pellicle.optics.mueller import mueller, mueller_elements
 from pellicle.optics.pair import abs2, conj, imag, real, to_pair
+from pellicle.optics.quadrature import Turn, turned_response, turned_stokes
 from pellicle.signals.waves import stokes_of_mueller
 
 
@@ -114,7 +113,8 @@ def transmitted(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None =
 
 
 def _angle(group: CoherentGroup) -> Any:
-    return jnp.zeros_like(group.above) if group.angle is None else group.angle
+    above: Any = group.above
+    return jnp.zeros_like(above) if group.angle is None else group.angle
 
 
 def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit:

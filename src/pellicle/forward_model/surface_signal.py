@@ -7,7 +7,8 @@ from typing import Any
 import jax.numpy as jnp
 
 from pellicle.brdf import film_colour
-from pellicle.brdf.models import Evaluate, model
+from pellicle.brdf.lobes import Evaluate
+from pellicle.brdf.models import model
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.surface import SurfaceView
 

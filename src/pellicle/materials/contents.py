@@ -53,16 +53,9 @@ def key(name: str) -> str:
 @functools.cache
 def pages() -> tuple[Page, ...]:
     """Every page that ships with the package, by shelf, book and page."""
-    text = (DATA / "pages.csv").read_text(encoding="utf-8")
-    return tuple(_page(row) for row in csv.DictReader(text.splitlines()))
-
-
-def _page(row: dict[str, str]) -> Page:
-    fields: dict[str, Any] = dict(row)
-    fields.update(
-        low=float(row["low"]), high=float(row["high"]), has_extinction=row["has_extinction"] == "yes"
-    )
-    return Page(**fields)
+    rows = csv.DictReader((DATA / "pages.csv").read_text(encoding="utf-8").splitlines())
+    read: dict[str, Any] = {"low": float, "high": float, "has_extinction": lambda text: text == "yes"}
+    return tuple(Page(**{key: read.get(key, str)(text) for key, text in row.items()}) for row in rows)
 
 
 @functools.cache

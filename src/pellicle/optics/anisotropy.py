@@ -27,6 +27,10 @@ class Principal(NamedTuple):
     z: Number
 
 
+Index: TypeAlias = Number | Principal
+"""The refractive index of a medium in which s and p stay apart."""
+
+
 class Uniaxial(NamedTuple):
     """Uniaxial medium: both refractive indices, and the direction cosines of the optic axis (real)."""
 
@@ -46,16 +50,16 @@ class Tensor(NamedTuple):
     yz: Number
 
 
-Medium: TypeAlias = Any
-"""A refractive index (number), `Principal`, `Uniaxial` or `Tensor`."""
+Medium: TypeAlias = Index | Uniaxial | Tensor
+"""A refractive index (number), or an anisotropic medium."""
 
 
-def mixes_polarisations(*media: Medium) -> bool:
+def mixes_polarisations(*media: Any) -> bool:
     """Return True if s and p mix in one of the media: the 4×4 method is then needed."""
     return any(isinstance(medium, Uniaxial | Tensor) for medium in media)
 
 
-def is_anisotropic(medium: Medium) -> bool:
+def is_anisotropic(medium: Any) -> bool:
     """Return True for a `Principal`, `Uniaxial` or `Tensor`, False for a number."""
     return isinstance(medium, Principal | Uniaxial | Tensor)
 
@@ -142,12 +146,12 @@ def seen_by(index: Any, polarisation: str) -> Any:
     return index.y if polarisation == "s" and isinstance(index, Principal) else index
 
 
-def tangential_permittivity(index: Any) -> Number:
+def tangential_permittivity(index: Index) -> Number:
     """Return n², of a `Principal` n_x²: the permittivity along the surface in the plane of incidence."""
     return index.x * index.x if isinstance(index, Principal) else index * index
 
 
-def each_index(function: Callable[[Number], Any], index: Any) -> Any:
+def each_index(function: Callable[[Number], Any], index: Medium) -> Any:
     """Return function(index); of an anisotropic medium, the medium with the function of each number."""
     if isinstance(index, Uniaxial):
         return Uniaxial(function(index.ordinary), function(index.extraordinary), index.axis)

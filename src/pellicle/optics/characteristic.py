@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.elementary import exp_and_expm1, sincos
 from pellicle.optics.hoisting import hoist
 from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, times_i, where
+from pellicle.optics.special import exp_and_expm1, sincos
 
 
 class Characteristic(NamedTuple):
@@ -140,7 +140,7 @@ def _scale_exponent_slope(primal: Any, tangent: Any) -> tuple[Number, Number]:
 
 def _i_over_root(Q: Number) -> Number:
     """Return i/√Q, finite at 0; of a real Q 1/√−Q, which is used for evanescent layers only."""
-    q = jnp.sqrt(jnp.abs(Q)) if is_real_array(Q) else sqrt(Q)
+    q = jnp.sqrt(jnp.abs(real(Q))) if is_real_array(Q) else sqrt(Q)
     inverse = 1 / where(abs2(q) == 0, 1.0 + 0.0 * q, q)
     return inverse if is_real_array(Q) else times_i(inverse)
 

@@ -1,19 +1,29 @@
 """Response of any number of coherent layers: the closed form of a film, or characteristic matrices.
 
-`few_layers` is the same as `pellicle.optics.stack` in separate real arrays (`pellicle.optics.pair`), without
-a loop and without rescaling: the elements of `characteristic.matrix_elements` are at most 1 and k₀d, so that
+The fields (E, H) at a layer's lower face give those at its upper face by the elements of
+`characteristic.matrix_elements`, times their scale. `few_layers` multiplies these in separate real arrays
+(`pellicle.optics.pair`), without a loop and without rescaling: the elements are at most 1 and k₀d, so that
 products of a few cannot overflow, and an opaque layer halves the fields.
+
+`stack` divides the fields by their norm after each layer, so that 50 layers with an opaque one among them
+stay finite without clamping. Complex arithmetic: separate real arrays bring nothing here. One `lax.scan` runs
+over the layers; unrolled, 50 of them do not compile in minutes. A graded layer is a row of slices in that
+loop (`pellicle.optics.gradient`).
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
 
 from collections.abc import Sequence
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
-from pellicle.optics.anisotropy import Principal, mixes_polarisations, seen_by, tangential_permittivity
+import jax
+import jax.numpy as jnp
+
+from pellicle.optics.anisotropy import Index, Principal, mixes_polarisations, seen_by, tangential_permittivity
 from pellicle.optics.characteristic import matrix_elements, propagating_elements
 from pellicle.optics.film import film
-from pellicle.optics.gradient import is_graded
+from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
 from pellicle.optics.interface import (
     equal_media,
     incident_factor,
@@ -23,18 +33,184 @@ from pellicle.optics.interface import (
     transverse,
     zero_where,
 )
-from pellicle.optics.pair import Number, abs2, is_real, times_i
+from pellicle.optics.pair import Number, Pair, abs2, is_real, times_i, to_complex
 from pellicle.optics.response import Amplitudes, Response
-from pellicle.optics.stack import stack
+
+
+def stack(
+    ambient: Index,
+    layers: Sequence[Index | Gradient],
+    substrate: Index,
+    phases: Sequence[Any],
+    angle: Any = None,
+    polarisations: str = "sp",
+    roughness: Sequence[Any] | None = None,
+) -> tuple[Response, ...]:
+    """Return the response of a stack, for each letter of `polarisations`.
+
+    **Arguments:** as for `coherent.responses`. Every array broadcasts against every other.
+    """
+    a, q0 = transverse(ambient, angle)
+    rows = _rows((ambient, substrate, a), layers, phases, roughness)
+    shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
+
+    bottom, top, q_top = (_full(number, shape, dtype) for number in (substrate, ambient, q0))
+    q_bottom: Any = normal(bottom, a)
+    uniform: Sequence[Any] = () if is_graded(layers) else layers
+    empty = equal_media(ambient, substrate, *uniform)
+    if is_graded(layers):
+        empty = empty & jnp.all(jnp.stack(rows.points) == top, axis=(0, 1))
+    upside_down = _Rows(jax.tree.map(lambda x: x[::-1], rows.points[::-1]), rows.depth[::-1], None)
+    responses = []
+    for polarisation in polarisations[:1] if angle is None else polarisations:
+        e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
+        down_faces = up_faces = None
+        if rows.rough is not None:
+            upper, lower = faces(rows.points) if is_graded(layers) else rows.points * 2
+            faces_above: list[Any] = [q_top[None], normal(lower, a)]
+            faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
+            q, q_ = jnp.concatenate(faces_above), jnp.concatenate(faces_below)
+            weight = jnp.concatenate([e0[None], _weight(lower, polarisation)])
+            weight_ = jnp.concatenate([_weight(upper, polarisation), e2[None]])
+            down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, ::-1]
+            up_faces = _rough_faces(q_, weight_, q, weight, rows.rough)
+        (E, H), scale_square = _scaled_fields(upside_down, q_bottom / e2, down_faces, a, polarisation)
+        (E_, H_), _ = _scaled_fields(rows, q_top / e0, up_faces, a, polarisation)
+        down, up = q_top * E / e0, q_bottom * E_ / e2
+        flux = incident_factor(ambient, q0, polarisation) * normal_flux(bottom, q_bottom, polarisation)
+        denominator = down + H
+        # both directions have the same denominator except for its scale: rescale the second to the first
+        reversed_ = (up - H_) / (up + H_) * denominator
+        amplitudes = (zero_where(empty, down - H), reversed_, denominator)
+        squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
+        responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
+    return tuple(responses)
+
+
+class _Rows(NamedTuple):
+    """Layers of a stack, those of a graded one its slices; each array has the shape (layers, ...)."""
+
+    points: tuple[Any, ...]  # complex or `Principal` index, three at Gauss points where a layer is graded
+    depth: Any  # k₀ times the thickness
+    rough: Any  # k₀σ of each face, one more than layers; None where all are smooth
+
+
+def _rows(
+    media: tuple, layers: Sequence[Index | Gradient], phases: Sequence[Any], roughness: Sequence[Any] | None
+) -> _Rows:
+    """Return the layers in the shape to which all arrays broadcast; `media` are those around them."""
+    uniform = [layer for layer in layers if not isinstance(layer, Gradient)]
+    leaves = jax.tree.leaves((media, uniform, list(phases), roughness))
+    sliced = jax.tree.leaves([layer for layer in layers if isinstance(layer, Gradient)])
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves), *(jnp.shape(x)[1:] for x in sliced))
+    dtype = jnp.promote_types(jnp.result_type(*leaves, *sliced), jnp.complex64)
+    counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
+    full = partial(_full, shape=shape, dtype=dtype)
+
+    def joined(blocks: Sequence[Any]) -> Any:
+        return jnp.concatenate(blocks) if blocks else jnp.zeros((0, *shape), dtype)
+
+    def each_slice(number: Number) -> Any:
+        """One complex number for each slice of a graded layer, (slices, ...)."""
+        rows = to_complex(number).astype(dtype)
+        lacking = (1,) * (len(shape) + 1 - rows.ndim)
+        return jnp.broadcast_to(rows.reshape(rows.shape[0], *lacking, *rows.shape[1:]), (len(rows), *shape))
+
+    def of_layers(numbers: Sequence[Any]) -> Any:
+        """One number for each layer, repeated for its slices, (layers, ...)."""
+        blocks = zip((full(x)[None] for x in numbers), counts, strict=True)
+        return joined([block if n == 1 else jnp.repeat(block, n, 0) for block, n in blocks])
+
+    def index_at(point: int) -> Any:
+        if any(isinstance(layer, Principal) for layer in layers):
+            axes = zip(*(x if isinstance(x, Principal) else (x, x, x) for x in layers), strict=True)
+            return Principal(*map(of_layers, axes))
+        return joined([each_slice(x[point]) if isinstance(x, Gradient) else full(x)[None] for x in layers])
+
+    each_phase = [phase if n == 1 else phase / n for phase, n in zip(phases, counts, strict=True)]
+    depth = jnp.real(of_layers(each_phase))
+    points = tuple(map(index_at, range(3 if sliced else 1)))
+    indices = jax.tree.leaves(list(layers), is_leaf=lambda x: isinstance(x, Pair))
+    if sliced and all(map(is_real, indices)):
+        points = tuple(map(jnp.real, points))  # three times as fast
+    if roughness is None:
+        return _Rows(points, depth, None)
+    rough = [full(roughness[0])[None]]
+    for count, face in zip(counts, roughness[1:], strict=True):
+        rough += [jnp.zeros((count - 1, *shape), dtype), full(face)[None]]
+    return _Rows(points, depth, jnp.real(joined(rough)))
+
+
+def _full(number: Index, shape: tuple[int, ...], dtype: Any) -> Any:
+    if isinstance(number, Principal):
+        return Principal(*(_full(x, shape, dtype) for x in number))
+    return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
+
+
+def _weight(index: Any, polarisation: str) -> Any:
+    """Return the divisor of q in the boundary condition: 1 for s, ε for p."""
+    return jnp.ones_like(index) if polarisation == "s" else tangential_permittivity(index)
+
+
+def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: Any) -> Any:
+    """Return the factors (2, faces, ...) of the fields (E, H) on their way up through each rough face.
+
+    Névot and Croce 1980 (Rev. Phys. Appl. 15, 761): r exp(−x) with x = 2 k₀²σ² q q′, and
+    t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, with the entire function
+    (1 − e^−x)/x, so that a smooth face, or one at a critical angle, is no special case.
+    """
+    square = rough * rough
+    damping = square * _expm1_ratio(2 * square * q * q_below)
+    passed = jnp.exp(-0.5 * square * (q - q_below) ** 2)
+    E = 1 + damping * q_below * (q_below * weight / weight_below - q)
+    H = 1 + damping * q * (q * weight_below / weight - q_below)
+    return jnp.stack([E * passed, H * passed])
+
+
+def _expm1_ratio(x: Any) -> Any:
+    """Return (1 − e^−x)/x, by its Taylor series near 0."""
+    near = abs2(x) < 0.01
+    small, far = jnp.where(near, x, 0), jnp.where(near, 1, x)
+    taylor = jnp.ones_like(x)
+    for j in range(12, 1, -1):
+        taylor = 1 - small * taylor / j
+    return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
+
+
+def _scaled_fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
+    """Return (E, H) at the far face for a unit wave in the last medium, the first row first, and |scale|²."""
+
+    def through_layer(carry, layer):
+        (E, H), scale_square = carry
+        points, k, face = layer
+        if face is not None:
+            E, H = E * face[0], H * face[1]
+        if len(points) == 1:
+            square, e = normal_square(points[0], a), _weight(points[0], polarisation)
+            c, f, layer_scale, _ = matrix_elements(square, k)
+            E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
+        else:
+            alpha, beta, skew, square = coefficients(points, k, a, polarisation)
+            c, f, layer_scale, _ = matrix_elements(square, k)
+            E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
+        size = jax.lax.stop_gradient(abs2(E) + abs2(H))
+        shrink = jax.lax.rsqrt(size)
+        return ((E * shrink, H * shrink), scale_square * layer_scale / size), None
+
+    start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
+    inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
+    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (rows.points, rows.depth, inner))
+    return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square
+
 
 FEW = 3
 """Layers up to which the product is multiplied out; a scan over so few takes several times as long."""
 
 
 def few_layers(
-    ambient: Any,
-    layers: Sequence[Number],
-    substrate: Number,
+    ambient: Index,
+    layers: Sequence[Index],
+    substrate: Index,
     phases: Sequence[Any],
     angle: Any = None,
     polarisations: str = "sp",
@@ -83,9 +259,9 @@ def _fields(admittance: Number, matrices: Sequence[tuple[Number, Number, Number]
 
 
 def responses(
-    ambient: Number,
-    layers: Sequence[Number],
-    substrate: Number,
+    ambient: Index,
+    layers: Sequence[Index | Gradient],
+    substrate: Index,
     phases: Sequence[Any],
     angle: Any = None,
     polarisations: str = "sp",
@@ -93,29 +269,21 @@ def responses(
     propagating: bool = False,
     roughness: Sequence[Any] | None = None,
 ) -> tuple[Response, ...]:
-    """Return the response of coherent layers between two half spaces, for each polarisation.
-
-    One smooth layer takes the closed form of `pellicle.optics.film`; none, two or three of them take their
-    product of matrices in `pellicle.optics.coherent`; more, or rough interfaces, take the loop of
-    `pellicle.optics.stack`.
+    """Return the response of coherent layers between two half spaces, for each polarisation in its order.
 
     **Arguments:** all arrays broadcast.
 
     - `ambient`, `substrate`: refractive indices, or `Principal` ones of a medium with its axes along those of
-      the laboratory. A real index promises that the wave propagates there;
-      `interface.allow_tunnelling` turns it into one that may be totally reflected. The ambient is real,
-      except for light from within a plate.
+      the laboratory. A real index promises that the wave propagates there (`interface.allow_tunnelling` takes
+      that back). The ambient is real, except for light from within a plate.
     - `layers`: refractive indices from the ambient down, or `Principal` ones. In a real one the wave may be
       evanescent. A graded layer is a `pellicle.optics.gradient.Gradient`.
     - `phases`: k₀d = 2πd/λ of each layer.
     - `angle`: of incidence in radians, or `interface.Inside` for light from within a plate. None is
-      normal incidence, where s and p are equal and only the first polarisation is computed.
+      normal incidence, where s and p are equal and, without a `Principal` medium, only the first is computed.
     - `polarisations`: "s", "p" or "sp".
     - `propagating`: promises that no wave is totally reflected in a real layer: a cheaper film.
     - `roughness`: k₀σ of each interface from the top down, one more than there are layers.
-
-    **Returns:** one `Response` for each polarisation, in their order. With a `Principal` medium s and p
-    differ at normal incidence too, and each of `polarisations` has its own.
 
     ```python
     >>> from pellicle.optics.response import reflectance
@@ -126,18 +294,14 @@ def responses(
     """
     if mixes_polarisations(ambient, *layers, substrate):
         raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
-
-    def of(ambient: Number, layers: Sequence[Any], substrate: Number, letters: str) -> tuple[Response, ...]:
+    apart = any(isinstance(n, Principal) for n in (ambient, *layers, substrate))
+    results: list[Response] = []
+    for letters in polarisations if apart else [polarisations]:
+        above, *between, below = (seen_by(n, letters) for n in (ambient, *layers, substrate))
         if roughness is not None or is_graded(layers) or len(layers) > FEW:
-            return stack(ambient, layers, substrate, phases, angle, letters, roughness)
-        if len(layers) == 1:
-            return film(ambient, layers[0], substrate, phases[0], angle, letters, propagating)
-        return few_layers(ambient, layers, substrate, phases, angle, letters, propagating)
-
-    if not any(isinstance(n, Principal) for n in (ambient, *layers, substrate)):
-        return of(ambient, layers, substrate, polarisations)
-    each = []
-    for letter in polarisations:
-        above, *between, below = (seen_by(n, letter) for n in (ambient, *layers, substrate))
-        each += of(above, between, below, letter)
-    return tuple(each)
+            results += stack(above, between, below, phases, angle, letters, roughness)
+        elif len(layers) == 1:
+            results += film(above, between[0], below, phases[0], angle, letters, propagating)
+        else:
+            results += few_layers(above, between, below, phases, angle, letters, propagating)
+    return tuple(results)

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from pellicle.optics.anisotropy import tangential_permittivity
+from pellicle.optics.anisotropy import Index, tangential_permittivity
 from pellicle.optics.characteristic import (
     element_slopes,
     half_expm1,
@@ -22,7 +22,6 @@ from pellicle.optics.characteristic import (
     nonzero_root,
     propagating_elements,
 )
-from pellicle.optics.elementary import sincos, sincos_squares
 from pellicle.optics.hoisting import hoist, is_reused
 from pellicle.optics.interface import (
     equal_media,
@@ -35,6 +34,7 @@ from pellicle.optics.interface import (
 )
 from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
 from pellicle.optics.response import Amplitudes, Response
+from pellicle.optics.special import sincos, sincos_squares
 
 
 class AmplitudesAndSquares(NamedTuple):
@@ -150,9 +150,9 @@ _amplitudes.defjvp(_amplitude_slopes, symbolic_zeros=True)
 
 
 def film(
-    ambient: Any,
-    layer: Number,
-    substrate: Number,
+    ambient: Index,
+    layer: Index,
+    substrate: Index,
     phase: Any,
     angle: Any = None,
     polarisations: str = "sp",

@@ -8,23 +8,24 @@ parameters and a signal stand a few numbers at each wavelength: the indices and 
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 from jax.experimental.xla_metadata import set_xla_metadata
 
-from pellicle.optics.pair import Number
+Tree = TypeVar("Tree")
+"""A pytree of numbers."""
 
 
-def is_reused(value: Number, grid: Any) -> bool:
+def is_reused(value: Any, grid: Any) -> bool:
     """True if each element of `value` is used at 8 or more points of `grid`: storing it costs little."""
     own = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(value)))
     return 8 * math.prod(own) <= math.prod(jnp.broadcast_shapes(own, jnp.shape(grid)))
 
 
-def hoist(value: Number, grid: Any) -> Number:
+def hoist(value: Tree, grid: Any) -> Tree:
     """Return `value` unchanged, computed once and not again at each point of `grid` where it is used.
 
     XLA fuses cheap expressions into the loop that uses them, and repeats them there at each point. Where
@@ -56,7 +57,7 @@ def _identity(value: Any) -> Any:
     return value
 
 
-def stored(numbers: Any) -> Any:
+def stored(numbers: Tree) -> Tree:
     """Return a pytree of numbers unchanged, whose arrays are stored where they are computed.
 
     XLA fuses an expression into each of the loops that use it. In a long formula whose intermediate results
@@ -79,17 +80,6 @@ def _stored_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
     tangents = {i: x for i, x in enumerate(tangent[0]) if not isinstance(x, SymbolicZero)}
     kept = dict(zip(tangents, _stored(list(tangents.values())), strict=True))
     return _stored(primal[0]), [kept.get(i, x) for i, x in enumerate(tangent[0])]
-
-
-def not_inlined(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return function(*arguments), compiled apart: its arguments and results are stored."""
-
-    def inside(*arguments: Any) -> Any:
-        with set_xla_metadata(inlineable="true"):
-            return function(*arguments)
-
-    with set_xla_metadata(inlineable="false"):
-        return jax.jit(inside)(*arguments)
 
 
 def stack_rows(rows: Sequence[Any]) -> Any:
@@ -128,11 +118,13 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
             of_one = lambda x: function(structure.unflatten([*leaves[:i], x, *leaves[i + 1 :]]))  # noqa: E731
             return jax.jvp(of_one, (leaves[i],), (jnp.ones_like(leaves[i]),))
 
-        values, slopes = zip(*(along(i) for i in varying), strict=True)
+        with set_xla_metadata(inlineable="true"):
+            values, slopes = zip(*(along(i) for i in varying), strict=True)
         return values[0], slopes
 
     # compiled apart: else the slopes are computed again for each parameter
-    value, slopes = not_inlined(value_and_slopes, *leaves)
+    with set_xla_metadata(inlineable="false"):
+        value, slopes = jax.jit(value_and_slopes)(*leaves)
 
     def change(*slopes: Any) -> Any:
         return sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))

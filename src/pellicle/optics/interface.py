@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from pellicle.optics.anisotropy import Principal, each_index, tangential_permittivity
+from pellicle.optics.anisotropy import Index, Medium, Principal, each_index, tangential_permittivity
 from pellicle.optics.pair import Number, Pair, abs2, conj, is_real, real, sqrt, where
 
 _NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
@@ -54,7 +54,7 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
     return Transverse(a, ambient, q0 * q0 / (ambient + a)), q0
 
 
-def normal_square(index: Number, a: Any) -> Number:
+def normal_square(index: Index, a: Any) -> Number:
     """Return q² = (n − a)(n + a), which does not cancel near the critical angle.
 
     With a `Transverse` it does not cancel near grazing incidence either, where
@@ -71,25 +71,24 @@ def normal_square(index: Number, a: Any) -> Number:
     return (index - a) * (index + a)
 
 
-def normal(index: Number, a: Any) -> Number:
+def normal(index: Index, a: Any) -> Number:
     """Return q = √(n² − a²), Im q ≥ 0. A real index is a promise that the wave propagates (n ≥ a)."""
     if isinstance(a, float) and a == 0.0:
         return index.x if isinstance(index, Principal) else index
     return sqrt(normal_square(index, a))
 
 
-def equal_media(ambient: Any, *others: Number) -> Any:
+def equal_media(ambient: Index, *others: Index) -> Any:
     """True where all other media are exactly equal to the ambient."""
-    pairs = [pair for other in others for pair in _same_axes(other, ambient)]
+    pairs: list[tuple[Number, Number]] = []
+    for other in others:
+        if isinstance(other, Principal) or isinstance(ambient, Principal):
+            # p waves propagate in both alike where n_x and n_z are equal
+            one, another = (n if isinstance(n, Principal) else Principal(n, n, n) for n in (other, ambient))
+            pairs += [(one.x, another.x), (one.z, another.z)]
+        else:
+            pairs.append((other, ambient))
     return reduce(jnp.logical_and, [abs2(a - b) == 0 for a, b in pairs])
-
-
-def _same_axes(medium: Any, ambient: Any) -> list[tuple[Number, Number]]:
-    """Pairs of indices, all equal where p waves propagate in both media alike."""
-    if not isinstance(medium, Principal) and not isinstance(ambient, Principal):
-        return [(medium, ambient)]
-    own, other = (n if isinstance(n, Principal) else Principal(n, n, n) for n in (medium, ambient))
-    return [(own.x, other.x), (own.z, other.z)]
 
 
 def zero_where(test: Any, amplitude: Number) -> Number:
@@ -114,14 +113,14 @@ def propagates(medium: Any, ambient: Any, angle: Any) -> bool:
     return bool(np.all(np.real(index) > np.abs(n0 * np.sin(np.deg2rad(theta)))))
 
 
-def allow_tunnelling(index: Number) -> Number:
+def allow_tunnelling(index: Medium) -> Any:
     """Turn a real index into a `Pair`, which does not promise that the wave propagates."""
     if isinstance(index, tuple):
         return each_index(allow_tunnelling, index)
     return Pair(index, jnp.zeros_like(jnp.asarray(index) * 1.0)) if is_real(index) else index
 
 
-def fresnel(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -> Number:
+def fresnel(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: str) -> Number:
     """Return the amplitude reflection coefficient r from medium 1 to medium 2.
 
     **Arguments:** refractive indices `n1` and `n2`, their normal components `q1` and `q2`, and "s" or "p".
@@ -137,7 +136,7 @@ def fresnel(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -
     return (u - v) / (u + v)
 
 
-def normal_flux(index: Number, q: Number, polarisation: str) -> Any:
+def normal_flux(index: Index, q: Number, polarisation: str) -> Any:
     """Return the flux along the normal per |E|²: Re q for s, Re(ε q̄) for p, up to |n|², which cancels.
 
     Gerardin et al. 2019 (eq. 21) use one factor for both polarisations. With an absorbing substrate that
@@ -146,7 +145,7 @@ def normal_flux(index: Number, q: Number, polarisation: str) -> Any:
     return real(q) if polarisation == "s" else real(tangential_permittivity(index) * conj(q))
 
 
-def incident_factor(index: Number, q: Number, polarisation: str) -> Any:
+def incident_factor(index: Index, q: Number, polarisation: str) -> Any:
     """Return the incident wave's factor in a film's transmittance: 4|q|²/Re q for s, 4|εq|²/Re(ε q̄) for p.
 
     For a medium that does not absorb these are 4 q and 4 ε q, without a division at grazing incidence.
@@ -159,12 +158,12 @@ def incident_factor(index: Number, q: Number, polarisation: str) -> Any:
     return jnp.where(zero, 0.0, 4 * abs2(amplitude) / jnp.where(zero, 1.0, flux))
 
 
-def reflectance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -> Any:
+def reflectance(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: str) -> Any:
     """Return the power reflectance |r|² of one interface; arguments as for `fresnel`."""
     return abs2(fresnel(n1, q1, n2, q2, polarisation))
 
 
-def transmittance(n1: Number, q1: Number, n2: Number, q2: Number, polarisation: str) -> Any:
+def transmittance(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: str) -> Any:
     """Return the power transmittance of one interface; 0 where the incident wave carries no power."""
     incident = normal_flux(n1, q1, polarisation)
     zero = incident == 0

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from pellicle.optics.anisotropy import seen_by, tangential_permittivity
-from pellicle.optics.elementary import sincos
+from pellicle.optics.anisotropy import Index, seen_by, tangential_permittivity
 from pellicle.optics.interface import fresnel, incident_factor, normal, normal_flux, transverse
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
+from pellicle.optics.special import sincos
 
 Window = Callable[[int], Any]
 """m → W_m, the factor by which order m is damped."""
@@ -39,7 +39,7 @@ class AirySeries(NamedTuple):
 
 
 def airy_series(
-    ambient: Any, layer: Number, substrate: Number, phase: Any, angle: Any, polarisation: str
+    ambient: Index, layer: Index, substrate: Index, phase: Any, angle: Any, polarisation: str
 ) -> AirySeries:
     """Return the series of one layer; arguments as for `film.film`, with φ = 2 k₀d q₁."""
     ambient, layer, substrate = (seen_by(n, polarisation) for n in (ambient, layer, substrate))

@@ -12,7 +12,7 @@ traced programs the same formulas use JAX.
 
 from collections.abc import Callable
 from functools import update_wrapper
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 
 import jax
 import jax.numpy as jnp
@@ -50,8 +50,23 @@ def fori_loop(lower: int, upper: int, step: Callable[[Any, Any], Any], state: An
     return state
 
 
-Number: TypeAlias = Any
-"""A real array, a complex array or a `Pair`."""
+if TYPE_CHECKING:
+
+    class Number(Protocol):
+        """A real array, a complex array or a `Pair`; numbers of Python and tracers count as arrays."""
+
+        def __neg__(self) -> Any: ...
+        def __add__(self, other: Any, /) -> Any: ...
+        def __radd__(self, other: Any, /) -> Any: ...
+        def __sub__(self, other: Any, /) -> Any: ...
+        def __rsub__(self, other: Any, /) -> Any: ...
+        def __mul__(self, other: Any, /) -> Any: ...
+        def __rmul__(self, other: Any, /) -> Any: ...
+        def __truediv__(self, other: Any, /) -> Any: ...
+        def __rtruediv__(self, other: Any, /) -> Any: ...
+
+else:
+    Number = Any  # a check of each tracer as it runs would be slow
 
 
 @jax.tree_util.register_pytree_node_class
@@ -123,13 +138,15 @@ def _or_zero(a: Any) -> Any:
     return 0.0 if a is None else a
 
 
+def _is_complex(z: Number) -> TypeGuard[jax.Array]:
+    return jnp.iscomplexobj(z)
+
+
 def parts(z: Number) -> tuple[Any, Any]:
     """Return the real and imaginary part; None where a part is absent."""
     if isinstance(z, Pair):
         return z.re, z.im
-    if jnp.iscomplexobj(z):
-        return z.real, z.imag
-    return z, None
+    return (z.real, z.imag) if _is_complex(z) else (z, None)
 
 
 def narrow(re: Any, im: Any) -> Number:
@@ -147,7 +164,7 @@ def imag(z: Number) -> Any:
     return _or_zero(parts(z)[1])
 
 
-def is_real(z: Number) -> bool:
+def is_real(z: Number | tuple[Number, ...]) -> bool:
     """True if the type of the number, or of all numbers of a tuple, excludes an imaginary part."""
     if isinstance(z, tuple):
         return all(map(is_real, z))
@@ -158,7 +175,7 @@ def conj(z: Number) -> Number:
     """Return the complex conjugate, of the same type."""
     if isinstance(z, Pair):
         return Pair(z.re, _minus(z.im))
-    return z.conjugate() if jnp.iscomplexobj(z) else z
+    return z.conjugate() if _is_complex(z) else z
 
 
 def abs2(z: Number) -> Any:
@@ -169,7 +186,7 @@ def abs2(z: Number) -> Any:
 
 def times_i(z: Number) -> Number:
     """Return i z; an absent part of a `Pair` stays absent."""
-    if not isinstance(z, Pair) and jnp.iscomplexobj(z):
+    if not isinstance(z, Pair) and _is_complex(z):
         return 1j * z
     re, im = parts(z)
     return narrow(_minus(im), re)
@@ -177,7 +194,7 @@ def times_i(z: Number) -> Number:
 
 def to_pair(z: Number) -> Number:
     """Convert a complex array to a `Pair`; return anything else unchanged."""
-    return Pair(z.real, z.imag) if not isinstance(z, Pair) and jnp.iscomplexobj(z) else z
+    return Pair(z.real, z.imag) if not isinstance(z, Pair) and _is_complex(z) else z
 
 
 def to_complex(z: Number) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pellicle.colour import integration_bands, sensor
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.spaces import srgb_matrix
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.optics.pair import parts
 from pellicle.scene.film import Light, Scene
@@ -103,7 +103,7 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
 
 def _bare(scene: Scene) -> np.ndarray:
     """Linear sRGB of the substrate in the scene's ambient at normal incidence, without a layer."""
-    bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
+    bands, to_srgb = integration_bands(BANDS), srgb_matrix(sensor().white)
     n0, n2 = (_index(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
     return np.clip(to_srgb @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights), 0.0, 1.0)
 

@@ -83,10 +83,11 @@ def film(index: Any, base: Pair, thickness: Any, cosine: Any) -> Float[Array, ".
     angle, total = jnp.arccos(cosine)[..., None], 0.0
     for letter in "sp":
         series = airy_series(1.0, index[..., None], base, 0.0, angle, letter)
-        into = 1 - series.upper**2
-        returned = into**2 * abs2(series.lower) / (1 - series.upper**2 * abs2(series.lower))
-        seen = series.upper**2 + returned
-        term, step = series.lower * (series.upper * (into - returned)), -(series.lower * series.upper)
+        upper, lower = real(series.upper), series.lower
+        into = 1 - upper**2
+        returned = into**2 * abs2(lower) / (1 - upper**2 * abs2(lower))
+        seen = upper**2 + returned
+        term, step = lower * (upper * (into - returned)), -(lower * upper)
         for re, im in zip(waves.re, waves.im, strict=True):
             seen = seen + 2 * real(term * Pair(re, im))
             term = term * step

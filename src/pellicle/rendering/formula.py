@@ -22,7 +22,7 @@ import optimistix as optx
 
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.colour.bands import published_gaussians
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.spaces import srgb_matrix
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.rendering.appearance import ANGLES, Appearance
 
@@ -61,7 +61,7 @@ class Formula:
     def xyz_at(self, numbers: Numbers, thickness: Any, cosine: Any) -> Any:
         """XYZ (..., 3) under D65 at thicknesses (nm) and cosines, which broadcast."""
         rgb = self.colour(numbers, thickness, cosine)
-        matrix = np.linalg.inv(TO_SRGB @ adaptation(sensor().white, SRGB_WHITE))
+        matrix = np.linalg.inv(srgb_matrix(sensor().white))
         return rgb @ jnp.asarray(matrix.T, rgb.dtype)
 
 

@@ -19,7 +19,7 @@ from jinja2 import Template
 
 from pellicle.brdf.lobes import microfacets
 from pellicle.colour import integration_bands, sensor
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.spaces import srgb_matrix
 from pellicle.data.formats.rgl import write_tensors
 from pellicle.data.half_angles import angles, vectors
 from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
@@ -216,7 +216,7 @@ def _isotropic(brdf: Brdf) -> bool:
 
 def _reflectances(look: Appearance, nm: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear sRGB, clipped at 0, and reflectance at `WAVELENGTHS`, (thicknesses, cosines, ...)."""
-    bands, to_srgb = integration_bands(BANDS), TO_SRGB @ adaptation(sensor().white, SRGB_WHITE)
+    bands, to_srgb = integration_bands(BANDS), srgb_matrix(sensor().white)
     degrees, count = np.rad2deg(np.arccos(cosine))[::-1], len(bands.wavelength)
     spectra = look.spectra(np.concatenate([bands.wavelength, WAVELENGTHS]), nm, degrees)
     spectra = np.swapaxes(spectra[::-1], 0, 1)

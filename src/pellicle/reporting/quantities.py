@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.colour.encoding import encoding
-from pellicle.colour.spaces import linear_srgb, srgb
+from pellicle.colour.spaces import encoding, linear_srgb, srgb
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.half_angles import vectors

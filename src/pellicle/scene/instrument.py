@@ -74,10 +74,9 @@ class Instrument(eqx.Module):
     angle_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
-        check_not_negative("bandwidth", self.bandwidth, "nm")
-        check_not_negative("thickness_spread", self.thickness_spread, "nm")
-        check_not_negative("angle_spread", self.angle_spread, "degrees")
-        check_not_negative("numerical_aperture", self.numerical_aperture, "")
+        units = {"bandwidth": "nm", "thickness_spread": "nm", "angle_spread": "degrees"}
+        for name, unit in (units | {"numerical_aperture": ""}).items():
+            check_not_negative(name, getattr(self, name), unit)
         if self.angle_spread is not None and self.numerical_aperture is not None:
             raise ValueError("give `angle_spread` or `numerical_aperture`, not both: each describes the cone")
         if _upper(self.angle_spread) >= 90:

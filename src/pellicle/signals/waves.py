@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.optics import ellipsometry
+from pellicle.optics.ellipsometry import inverse_intensity, mueller_elements
 from pellicle.optics.hoisting import stack_rows, stored
-from pellicle.optics.mueller import inverse_intensity, mueller_elements
 from pellicle.optics.pair import Number, abs2, conj, imag, real
 
 Matrix = Sequence[Sequence[Any]]
@@ -63,7 +63,7 @@ def ratio_sums_of_mueller(m: Matrix) -> list[Any]:
     """Stokes sums of AnE, Aps and Asp (`signals.generalised`), averaged over light that adds incoherently.
 
     Every product of two elements of a Jones matrix in one row, in one column or on one diagonal is a sum of
-    elements of the Mueller matrix (`optics.mueller.mueller_elements`).
+    elements of the Mueller matrix (`optics.ellipsometry.mueller_elements`).
     """
     even, odd = 0.5 * (m[0][0] + m[1][1]), 0.5 * (m[0][1] + m[1][0])
     other_even, other_odd = 0.5 * (m[0][0] - m[1][1]), 0.5 * (m[0][1] - m[1][0])

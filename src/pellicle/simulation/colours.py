@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.colour import integration_bands, sensor
-from pellicle.colour.encoding import Encoding, camera_encoding, encoding
 from pellicle.colour.film import Colour
 from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.colour.observers import sensor as observer
+from pellicle.colour.spaces import measured_encoding
 from pellicle.colour.table import REFERENCE, TOLERANCE, FilmColourTable
 from pellicle.data.colours import SPACES, CameraMatrix, Colours
 from pellicle.effects.differences import signals
@@ -158,8 +158,7 @@ def simulate_colours(
 ) -> tuple[Colours, Plan]:
     """Simulate the colours of a film, and return them with the plan of the simulation.
 
-    The spectrum is integrated over the sensor's wavelengths. The scale of the scene's instrument is the
-    exposure.
+    The spectrum is integrated over the sensor's wavelengths. The instrument's scale is the exposure.
 
     **Arguments:**
 
@@ -177,39 +176,21 @@ def simulate_colours(
         raise UsageError("ellipsometry has no colour: use a scene with signal R or T")
     if space not in SPACES:
         raise UsageError(f"`space` must be one of {', '.join(SPACES)}, not {space!r}")
-    if sensor is None:
-        eye = observer()
-        sensor = srgb_sensor(eye) if space == "rgb" else eye
-    nm, weights = (np.asarray(x, float) for x in sensor)
-    own: Any = getattr(scene.light.angle, "start", scene.light.angle)
-    angles = np.atleast_1d(np.asarray(own if angle is None else angle, float))
+    seen = sensor or (srgb_sensor(observer()) if space == "rgb" else observer())
+    nm, weights = (np.asarray(x, float) for x in seen)
+    if angle is None:
+        angle = getattr(scene.light.angle, "start", scene.light.angle)
+    angles = np.atleast_1d(np.asarray(angle, float))
     grid = np.tile(nm, angles.size)
-    simulated = simulate_signal(
-        with_wavelength(scene, grid, np.repeat(angles, nm.size)), grid, tolerance=tolerance
-    )
-    coding = _coding(space, weights.sum(axis=0), gamma, camera)
+    scene = with_wavelength(scene, grid, np.repeat(angles, nm.size))
+    simulated = simulate_signal(scene, grid, tolerance=tolerance)
+    matrix = None if camera is None else camera.matrix
+    coding = measured_encoding(space, weights.sum(axis=0), gamma, matrix)
     channels = coding.channels(simulated.clean.reshape(angles.size, nm.size) @ weights)
     values = coding.encode(channels, coding.roots(channels))
     values = values + noise * np.random.default_rng(seed).normal(0.0, 1.0, values.shape)
     if coding.clips:
         values = np.clip(values, 0.0, 1.0)
-    colours = Colours(
-        values,
-        (nm, weights),
-        space,
-        scene.light.signal,
-        sigma=np.full(values.shape, noise) if noise > 0 else None,
-        angle=angles,
-        polarisation=scene.light.polarisation,
-        gamma=gamma,
-        camera=camera,
-    )
-    return colours, simulated.plan
-
-
-def _coding(space: str, white: np.ndarray, gamma: float, camera: CameraMatrix | None) -> Encoding:
-    """Encoding of a colour space under this white (3,), of a camera's with its matrix."""
-    if space != "rgb":
-        return encoding(space, white)
-    linear = np.diag(1 / white) if camera is None else np.asarray(camera.matrix)
-    return camera_encoding(gamma)._replace(linear=linear)
+    light, sigma = scene.light, np.full(values.shape, noise) if noise > 0 else None
+    described = {"angle": angles, "polarisation": light.polarisation, "gamma": gamma, "camera": camera}
+    return Colours(values, (nm, weights), space, light.signal, sigma=sigma, **described), simulated.plan

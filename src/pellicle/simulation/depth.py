@@ -12,10 +12,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
 from pellicle.errors import UsageError
-from pellicle.optics.absorption import absorptances
-from pellicle.optics.field import fields
+from pellicle.optics.field import absorptances, fields
 from pellicle.optics.interface import transverse
-from pellicle.optics.pair import Number, to_complex
+from pellicle.optics.pair import to_complex
 from pellicle.simulation.functions import Medium, film_arguments, floating
 
 
@@ -58,7 +57,7 @@ def absorptance(
     is proportional to k and has all digits.
 
     **Source:** Byrnes, arXiv:1603.02720, section 4; Pettersson, Roman and Inganäs, J. Appl. Phys. 86, 487
-    (1999). The integrals over each layer are in closed form (`pellicle.optics.absorption`).
+    (1999). The integrals over each layer are in closed form (`pellicle.optics.field`).
 
     ```python
     >>> pl.absorptance(550.0, [100.0, 30.0], [1.46, 0.4 + 2.5j], 1.52).round(4).tolist()
@@ -72,9 +71,7 @@ def absorptance(
 
 def _absorptances(*arguments: Any) -> tuple[Any, ...]:
     film = film_arguments(*arguments)
-    phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
-    media = (film.ambient, film.layers, film.substrate)
-    return _compiled_absorptances(*media, phases, film.angle, polarisations=film.polarisations)
+    return _compiled_absorptances(*film.media, film.phases, film.angle, polarisations=film.polarisations)
 
 
 _compiled_absorptances = jax.jit(absorptances, static_argnames="polarisations")
@@ -122,24 +119,17 @@ def _field(*arguments_and_depth: Any) -> Field:
     if isinstance(depth, str):
         raise UsageError(f"`depth` must be a number or an array, not {depth!r}")
     angle = floating(0.0) if film.angle is None else film.angle
-    media = (film.ambient, film.layers, film.substrate)
     lengths = (2 * jnp.pi / film.wavelength, film.thicknesses, floating(depth))
-    return _fields(*media, *lengths, angle, polarisations=film.polarisations)
+    return _fields(film.media, *lengths, angle, polarisations=film.polarisations)
 
 
 @partial(jax.jit, static_argnames="polarisations")
 def _fields(
-    ambient: Number,
-    layers: list[Number],
-    substrate: Number,
-    wavenumber: Any,
-    thicknesses: list[Any],
-    depth: Any,
-    angle: Any,
-    polarisations: str,
+    media: Any, wavenumber: Any, thicknesses: list[Any], depth: Any, angle: Any, polarisations: str
 ) -> Field:
+    ambient, layers, substrate = media
     waves = fields(ambient, layers, substrate, wavenumber, thicknesses, depth, angle, polarisations)
-    energy = sum(each.energy() * (1 / len(waves)) for each in waves)
+    energy = sum(wave.energy() * (1 / len(waves)) for wave in waves)
     _, q0 = transverse(ambient, angle)
     incident = jnp.sqrt(q0)  # |E| of the incident wave is 1, of each of these 1/√q₀
     turns = [jax.lax.complex(incident * jnp.cos(x.phase), incident * jnp.sin(x.phase)) for x in waves]

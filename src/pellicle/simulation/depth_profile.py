@@ -29,8 +29,7 @@ from pellicle.forward_model.coherent_groups import (
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, plate, response
-from pellicle.optics.absorption import absorptances
-from pellicle.optics.field import fields
+from pellicle.optics.field import absorptances, fields
 from pellicle.optics.interface import transverse
 from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Scene, all_collected, groups, sliced, with_wavelength
@@ -176,20 +175,21 @@ MARGIN = 0.25
 
 @dataclass(frozen=True)
 class Section:
-    """Field in one coherent group of layers, between the ambient, plates and the substrate."""
+    """Field in one coherent group of layers, between the ambient, plates and the substrate.
+
+    `layers` are name and depth of the upper and lower face in nm, from the uppermost interface of the group;
+    `above` and `below` the media around it. At each `depth` (depths,) in nm there are the name of the
+    `medium`, the `intensity` |E|² relative to the incident wave and the share of the incident power that is
+    `absorbed` per nm, both (chosen wavelengths, depths).
+    """
 
     layers: tuple[tuple[str, float, float], ...]
-    """Name and depth of the upper and lower face in nm, from the uppermost interface of the group."""
     above: str
     below: str
     medium: tuple[str, ...]
-    """Name of the medium at each depth."""
     depth: np.ndarray
-    """nm, (depths,)."""
     intensity: np.ndarray
-    """|E|² relative to the incident wave, (chosen wavelengths, depths)."""
     absorbed: np.ndarray
-    """Share of the incident power absorbed per nm, (chosen wavelengths, depths)."""
 
 
 @dataclass(frozen=True)
@@ -289,9 +289,9 @@ def _polarisations(plan: Plan, scene: Scene) -> str:
 
 @partial(jax.jit, static_argnames=("plan", "letters"))
 def _mean_powers(scene: Scene, plan: Plan, letters: str) -> Any:
-    coherent, wavelength = coherent_groups(plan, scene), jnp.asarray(scene.light.wavelength)
-    each = [absorbed_power(plan, coherent, groups(scene)[1], wavelength, letter)[:4] for letter in letters]
-    return jax.tree.map(lambda *x: sum(x) / len(x), *each)
+    film = coherent_groups(plan, scene), groups(scene)[1], jnp.asarray(scene.light.wavelength)
+    powers = [absorbed_power(plan, *film, letter)[:4] for letter in letters]
+    return jax.tree.map(lambda *x: sum(x) / len(x), *powers)
 
 
 @partial(jax.jit, static_argnames=("plan", "letters", "position"))
@@ -316,43 +316,39 @@ def _sections(
     letters = _polarisations(plan, scene)
     edges = ["ambient", *names, "substrate" if scene.substrate.back is None else "behind the substrate"]
     sections = []
-    for i, group in enumerate(groups(scene)[0]):
+    for i, (group, run) in enumerate(zip(groups(scene)[0], runs, strict=True)):
         if not group.layers:
             continue
-        depths: list[Any] = [layer.thickness for layer in group.layers]
-        faces = np.concatenate([[0.0], np.cumsum([float(d) for d in depths])])
-        slices = np.cumsum([0, *(count for _, count in runs[i])])
-        layers = tuple(
-            (name, float(faces[a]), float(faces[b]))
-            for (name, _), a, b in zip(runs[i], slices[:-1], slices[1:], strict=True)
-        )
-        depth, medium = _depths(layers, faces, slices, edges[i], edges[i + 1])
-
-        how = {"plan": plan.static_key, "letters": letters, "position": i}
-        each = (tabulated(with_wavelength(scene, chosen[j : j + 1])) for j in range(len(chosen)))
-        rows = [_at_depths(one, depth, depths, **how) for one in each]
+        thicknesses: list[Any] = [layer.thickness for layer in group.layers]
+        faces = np.concatenate([[0.0], np.cumsum([float(d) for d in thicknesses])])
+        ends = np.cumsum([0, *(count for _, count in run)])
+        slices = [(name, faces[a : b + 1]) for (name, _), a, b in zip(run, ends[:-1], ends[1:], strict=True)]
+        layers = tuple((name, float(within[0]), float(within[-1])) for name, within in slices)
+        depth, medium = _depths(edges[i], slices, edges[i + 1])
+        static = {"plan": plan.static_key, "letters": letters, "position": i}
+        scenes = (tabulated(with_wavelength(scene, chosen[j : j + 1])) for j in range(len(chosen)))
+        rows = [_at_depths(one, depth, thicknesses, **static) for one in scenes]
         intensity, absorbed = (np.array(x) for x in zip(*rows, strict=True))
         sections.append(Section(layers, edges[i], edges[i + 1], medium, depth, intensity, absorbed))
     return tuple(sections)
 
 
 def _depths(
-    layers: tuple[tuple[str, float, float], ...],
-    faces: np.ndarray,
-    slices: np.ndarray,
-    above: str,
-    below: str,
+    above: str, layers: list[tuple[str, np.ndarray]], below: str
 ) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Depths in the media above, in each slice of each layer and below, off the interfaces; their media."""
-    total = faces[-1]
+    """Depths in the media above, in each slice of each layer and below, off the interfaces; their media.
+
+    `layers` have the faces of their slices.
+    """
+    total = layers[-1][1][-1]
     margin = max(MARGIN * total, 20.0)
     spans = [(above, -margin, 0.0, POINTS)]
-    for (name, _, _), a, b in zip(layers, slices[:-1], slices[1:], strict=True):
-        count = 1 if b - a == SLICES else max(POINTS // int(b - a), 2)  # of each slice
-        spans += [(name, faces[j], faces[j + 1], count) for j in range(a, b)]
+    for name, faces in layers:
+        slices = len(faces) - 1
+        count = 1 if slices == SLICES else max(POINTS // slices, 2)  # of each slice
+        spans += [(name, faces[j], faces[j + 1], count) for j in range(slices)]
     spans.append((below, total, total + margin, POINTS))
     shares = [np.linspace(EDGE, 1 - EDGE, count) if count > 1 else np.array([0.5]) for *_, count in spans]
     parts = [x + share * (y - x) for (_, x, y, _), share in zip(spans, shares, strict=True)]
     kept = [(span[0], part) for span, part in zip(spans, parts, strict=True) if span[2] > span[1]]
-    medium = tuple(name for name, part in kept for _ in part)
-    return np.concatenate([part for _, part in kept]), medium
+    return np.concatenate([part for _, part in kept]), tuple(name for name, part in kept for _ in part)

@@ -7,7 +7,6 @@ A line of sight crosses the film of a bubble in front and at the back at one ang
 further chords within. Its thickness depends on the height.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -15,8 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.colour import integration_bands
-from pellicle.colour.observers import Sensor
-from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
+from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, response
@@ -26,7 +24,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.layers import Layer
 from pellicle.simulation.colours import BANDS, varied_layer
-from pellicle.simulation.environment import Environment, Rendering, Sphere, sphere
+from pellicle.simulation.environment import Environment, Rendering, sphere
 
 _BATCH = 4096
 """Films in one call: 4096 × 64 wavelengths are 2 MB in double precision."""
@@ -80,27 +78,25 @@ def stack(
     return Stack(eye, ambient, tuple(layers), substrate, thickness, varied)
 
 
-def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> Number:
+def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> Any:
     index = known_index(medium, wavelength)
-    if not all(np.all(np.isfinite(part)) for part in jax.tree_util.tree_leaves(index)):
+    if not all(np.all(np.isfinite(part)) for part in jax.tree.leaves(index)):
         raise UsageError("a material has no data between 380 and 730 nm, which a colour needs")
-    return jax.tree_util.tree_map(lambda part: part * np.ones(len(wavelength)), index)
+    return jax.tree.map(lambda part: part * np.ones(len(wavelength)), index)
 
 
 def spectra(films: Stack, thickness: float | np.ndarray, cosine: np.ndarray) -> Spectra:
     """Compute spectra at thicknesses (nm) of the varied layer and cosines of incidence, which broadcast."""
-    at = np.broadcast_arrays(np.asarray(thickness, float), np.asarray(cosine, float))
-    rows = np.stack([one.ravel() for one in at])
+    points = np.broadcast_arrays(np.asarray(thickness, float), np.asarray(cosine, float))
+    rows = np.stack([each.ravel() for each in points])
     count = rows.shape[1]
     size = min(_BATCH, 1 << (count - 1).bit_length())  # powers of two: few programs
     rows = np.pad(rows, ((0, 0), (0, -count % size)), "edge").reshape(2, -1, size)
     media = (films.ambient, films.layers, films.substrate, films.eye.wavelength)
     with jax.enable_x64(True):
-        parts = [
-            np.asarray(_spectra(media, films.thickness, films.varied, *each)) for each in rows.swapaxes(0, 1)
-        ]
-    whole = np.concatenate(parts, axis=2)[:, :, :count]
-    return Spectra(*whole.reshape(3, 2, *at[0].shape, -1))
+        fixed = (media, films.thickness, films.varied)
+        whole = np.concatenate([_spectra(*fixed, *batch) for batch in rows.swapaxes(0, 1)], axis=2)
+    return Spectra(*whole[:, :, :count].reshape(3, 2, *points[0].shape, -1))
 
 
 @jax.jit
@@ -121,12 +117,7 @@ def linear_srgb(films: Stack, spectrum: np.ndarray) -> np.ndarray:
 
     The white of the illuminant is (1, 1, 1).
     """
-    return spectrum.mean(axis=0) @ to_srgb(films.eye)
-
-
-def to_srgb(eye: Sensor) -> np.ndarray:
-    """Matrix (wavelengths, 3) from a spectrum to linear sRGB, with the white of the sensor at (1, 1, 1)."""
-    return eye.weights @ (TO_SRGB @ adaptation(eye.white, SRGB_WHITE)).T
+    return spectrum.mean(axis=0) @ srgb_sensor(films.eye).weights
 
 
 COSINES = 256
@@ -167,43 +158,22 @@ def ball(films: Stack, thickness: float, environment: Environment, size: int) ->
 
     seen = environment.radiance(pixels.mirrored())[:, None]
     reflected = pixels.rendering(colour(light.reflected) * seen)
-    if is_opaque(films):
+    if np.max(np.imag(to_complex(films.substrate))) > OPAQUE:
         return Ball(reflected, None)
-    return Ball(
-        reflected, pixels.rendering(_through(pixels, _relative_index(films), light, environment, colour))
-    )
-
-
-def is_opaque(films: Stack) -> bool:
-    """True where the substrate absorbs."""
-    return bool(np.max(np.imag(to_complex(films.substrate))) > OPAQUE)
-
-
-def _relative_index(films: Stack) -> float:
-    inside, outside = (
+    index = [
         float(np.interp(550.0, films.eye.wavelength, np.real(to_complex(medium))))
         for medium in (films.substrate, films.ambient)
-    )
-    return inside / outside
-
-
-def _through(
-    pixels: Sphere,
-    index: float,
-    seen: Spectra,
-    environment: Environment,
-    colour: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:
-    """Light (pixels, 3) after one chord, two, ...: T² R′^(chords − 1) of what lies where it leaves."""
+    ]
+    # light after one chord, two, ...: T² R′^(chords − 1) of what lies where it leaves
     outside = np.arccos(pixels.cosine)
-    inside = np.arcsin(np.clip(np.sin(outside) / index, -1.0, 1.0))
+    inside = np.arcsin(np.clip(np.sin(outside) / (index[0] / index[1]), -1.0, 1.0))
     total = np.zeros((len(outside), 3))
-    spectrum = seen.transmitted**2
+    spectrum = light.transmitted**2
     for chord in range(CHORDS):
         turned = 2 * (outside - inside) + chord * (np.pi - 2 * inside)
         total += colour(spectrum) * environment.radiance(pixels.deflected(-turned))[:, None]
-        spectrum = spectrum * seen.below
-    return total
+        spectrum = spectrum * light.below
+    return Ball(reflected, pixels.rendering(total))
 
 
 CROSSINGS = 4

@@ -17,12 +17,11 @@ from pellicle.dispersion.anisotropic import Anisotropic, principal_media
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, interface, response
-from pellicle.optics import mueller as mueller_matrices
+from pellicle.optics import ellipsometry as waves
 from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.slices import DIRECT
 from pellicle.optics.berreman.stack import Polarised, most_dichroic, polarised
-from pellicle.optics.ellipsometry import normalised, psi_delta, stokes
 from pellicle.optics.interface import normal, normal_flux, transverse
 from pellicle.optics.pair import Number, abs2, is_real, to_complex, to_pair
 from pellicle.optics.response import Response
@@ -38,12 +37,15 @@ class FilmArguments(NamedTuple):
 
     wavelength: Any  # nm
     thicknesses: list[Any]  # nm
-    ambient: Number
-    layers: list[Number]
-    substrate: Number
+    media: tuple[Number, list[Any], Any]  # ambient, layers and substrate, each of them any medium of optics
     angle: Any  # radians; None is normal incidence
     polarisations: str
     propagating: bool  # no wave is totally reflected in a real layer
+
+    @property
+    def phases(self) -> list[Any]:
+        """k₀d of each layer."""
+        return [2 * jnp.pi / self.wavelength * d for d in self.thicknesses]
 
 
 def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, polarisation) -> FilmArguments:
@@ -83,8 +85,8 @@ def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, pola
         if count not in (len(layers), (len(layers),)):
             raise ValueError(f"thickness: expected one for each of {len(layers)} layers, got {count}")
         thicknesses = [thickness[i] for i in range(len(layers))]
-    indices = [index_at(n, wavelength) for n in layers]
-    return FilmArguments(wavelength, thicknesses, ambient, indices, substrate, theta, letters, propagating)
+    media = ambient, [index_at(n, wavelength) for n in layers], substrate
+    return FilmArguments(wavelength, thicknesses, media, theta, letters, propagating)
 
 
 def floating(x: Any):
@@ -92,13 +94,13 @@ def floating(x: Any):
     return jnp.asarray(x) * 1.0
 
 
-def index_at(what: Medium, wavelength) -> Number:
+def index_at(what: Medium, wavelength) -> Any:
     """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
     if isinstance(what, str | AbstractDispersion):
         material = medium(what)
-        for own in [] if isinstance(wavelength, Tracer) else principal_media(material):
-            if hasattr(own, "check_range"):
-                own.check_range(np.asarray(wavelength))
+        for principal in [] if isinstance(wavelength, Tracer) else principal_media(material):
+            if hasattr(principal, "check_range"):
+                principal.check_range(np.asarray(wavelength))
         return material.index(wavelength)
     return to_pair(floating(what))
 
@@ -203,13 +205,12 @@ def ellipsometry(
     ```
     """
     angle = floating(angle)  # also at 0 both polarisations are needed
-    s, p = _responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
-    return _psi_delta(s, p)
+    return _psi_delta(*_responses(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised"))
 
 
 @jax.jit
 def _psi_delta(s: Response, p: Response) -> tuple[Any, Any]:
-    return psi_delta(*normalised(stokes(s, p)))
+    return waves.psi_delta(*waves.normalised(waves.stokes(s, p)))
 
 
 def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
@@ -236,12 +237,10 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
     return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
 
 
-def _responses(wavelength, thickness, layer, substrate, ambient, angle, polarisation):
-    film = film_arguments(wavelength, thickness, layer, substrate, ambient, angle, polarisation)
-    phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
-    media = (film.ambient, film.layers, film.substrate)
+def _responses(*arguments: Any) -> tuple[Response, ...]:
+    film = film_arguments(*arguments)
     static = {"polarisations": film.polarisations, "propagating": film.propagating}
-    return _compiled_responses(*media, phases, film.angle, **static)
+    return _compiled_responses(*film.media, film.phases, film.angle, **static)
 
 
 _compiled_responses = jax.jit(coherent.responses, static_argnames=("polarisations", "propagating"))
@@ -284,9 +283,9 @@ def jones(
 
     ```
     """
-    film, response = _response(wavelength, thickness, layer, substrate, ambient, angle, side)
-    amplitudes = response.reflected if side == "reflection" else _transmitted(film, response)
-    return _array([to_complex(x) for x in amplitudes])
+    arguments = (wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    film, response = _polarised_response(side, *arguments)
+    return _array(response.reflected if side == "reflection" else _transmitted(film, response))
 
 
 def mueller(
@@ -318,36 +317,34 @@ def mueller(
 
     ```
     """
-    film, response = _response(wavelength, thickness, layer, substrate, ambient, angle, side)
+    arguments = (wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
+    film, response = _polarised_response(side, *arguments)
     amplitudes = response.reflected
     if side == "transmission":
         # power in place of the electric field, p and s apart
-        q = normal(film.substrate, transverse(film.ambient, film.angle)[0])
-        flux = [normal_flux(film.substrate, q, letter) for letter in "ps"]
-        per_field = flux[0] / abs2(film.substrate), flux[1]
+        ambient, _, substrate = film.media
+        q = normal(substrate, transverse(ambient, film.angle)[0])
+        flux = [normal_flux(substrate, q, letter) for letter in "ps"]
+        per_field = flux[0] / abs2(substrate), flux[1]
         p, s = (jnp.sqrt(jnp.maximum(x, 0.0) / response.incident) for x in per_field)
         t = _transmitted(film, response)
         amplitudes = Elements(t.pp * p, t.ps * p, t.sp * s, t.ss * s)
-    matrix = mueller_matrices.mueller(_array([to_complex(x) for x in amplitudes]))
-    return mueller_matrices.normalised(matrix) if normalised else matrix
+    matrix = waves.mueller(_array(amplitudes))
+    return waves.normalised_mueller(matrix) if normalised else matrix
 
 
-def _response(
-    wavelength: Any, thickness: Any, layer: Any, substrate: Any, ambient: Any, angle: Any, side: str
-) -> tuple[FilmArguments, Polarised]:
+def _polarised_response(side: str, *arguments: Any) -> tuple[FilmArguments, Polarised]:
     if side not in ("reflection", "transmission"):
         raise UsageError(f'`side` must be "reflection" or "transmission", not {side!r}')
-    film = film_arguments(wavelength, thickness, layer, substrate, ambient, angle, "unpolarised")
-    if side == "transmission" and is_anisotropic(film.substrate):
+    film = film_arguments(*arguments)
+    if side == "transmission" and is_anisotropic(film.media[-1]):
         raise ValueError(
             'a birefringent substrate transmits neither p nor s waves: `side` must be "reflection"'
         )
-    angle = jnp.zeros_like(film.wavelength) if film.angle is None else film.angle
-    film = film._replace(angle=angle)
-    phases = [2 * jnp.pi / film.wavelength * d for d in film.thicknesses]
-    numbers = (film.ambient, film.layers, film.substrate, phases, angle)
+    film = film._replace(angle=jnp.zeros_like(film.wavelength) if film.angle is None else film.angle)
+    numbers = (*film.media, film.phases, film.angle)
     traced = any(isinstance(x, Tracer) for x in jax.tree.leaves(numbers))
-    dichroic = traced or bool(jnp.any(_dichroism(film.ambient, film.layers, phases, angle) > DIRECT))
+    dichroic = traced or bool(jnp.any(_dichroism(*film.media[:2], film.phases, film.angle) > DIRECT))
     return film, _polarised(*numbers, dichroic=dichroic)
 
 
@@ -358,10 +355,10 @@ _dichroism = jax.jit(most_dichroic)
 def _transmitted(film: FilmArguments, response: Polarised) -> Elements:
     """Return the Jones matrix of transmission: of the electric field of p and s in the substrate."""
     E, H = response.fields
-    index = 1 / film.substrate
+    index = 1 / film.media[-1]
     return Elements(index * H.pp, index * H.ps, E.sp, E.ss)
 
 
-def _array(elements: list[Any]) -> Any:
-    pp, ps, sp, ss = jnp.broadcast_arrays(*elements)
-    return jnp.stack([jnp.stack([pp, ps], axis=-1), jnp.stack([sp, ss], axis=-1)], axis=-2)
+def _array(elements: Elements) -> Any:
+    each = jnp.stack(jnp.broadcast_arrays(*map(to_complex, elements)), axis=-1)
+    return each.reshape(*each.shape[:-1], 2, 2)

@@ -77,6 +77,7 @@ def simulate_spectrum(
     share, share_noise = simulated.depolarisation, simulated.depolarisation_noise
     share_sigma = np.full(nm.shape, share_noise) if share is not None and share_noise > 0 else None
     arrays = kind.arrays(simulated.values.reshape(nm.size, -1))
+    words: dict[str, Any] = kind.words
     return Spectrum(
         nm,
         signal=light.signal,
@@ -89,7 +90,7 @@ def simulate_spectrum(
         transmission=light.transmission,
         **arrays,
         **(kind.errors(arrays["values"], noise) if noise > 0 else {}),
-        **kind.words,
+        **words,
     )
 
 

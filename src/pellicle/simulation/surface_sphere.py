@@ -13,13 +13,12 @@ from pellicle.brdf.directions import cosine_to_half, direction, dot, frame, half
 from pellicle.brdf.lobes import ggx
 from pellicle.brdf.models import Model
 from pellicle.colour import FilmColourTable, integration_bands, sensor
-from pellicle.colour.observers import Sensor
+from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
-from pellicle.scene.surface import INDICES, Surface, index_numbers
+from pellicle.scene.surface import INDICES, KEYS, Surface, index_numbers
 from pellicle.simulation.colours import BANDS
 from pellicle.simulation.environment import EDGE, EYE, Environment, Rendering, sphere, studio
-from pellicle.simulation.film_sphere import to_srgb
 
 DIRECTIONS = 192
 """Directions of the light at each pixel: half of them spread as a lobe, half as the light of a diffuser."""
@@ -72,7 +71,7 @@ def render(
 def following(surface: Surface, noise: Relief) -> dict[str, np.ndarray]:
     """The thickness by the noise's height, and the deviation by its slope, where they are free."""
     depth, tilt = (surface.numbers.get(key) for key in ("thickness", "deviation"))
-    arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     if isinstance(depth, Free):
         arrays["thickness"] = depth.lower + noise.height * (depth.upper - depth.lower)
     if isinstance(tilt, Free):
@@ -191,49 +190,42 @@ def in_colour(surface: Surface) -> Shading:
     take their start values.
     """
     numbers: dict[str, Any] = dict(surface.start_numbers())
-    low, high = thickness_range(surface)
+    thickness: Any = surface.numbers.get("thickness", numbers["thickness"])
+    free = isinstance(thickness, Free)
+    low, high = (thickness.lower, thickness.upper) if free else (float(thickness), float(thickness))
     brdf = surface.brdf
     numbers.pop("weights", None)  # of a sensor that is not the eye
     if not numbers.get("multiple_scattering"):
         numbers.pop("multiple_scattering", None)
     if brdf.from_film_colour is not None:
-        at = _at(surface, numbers, _EVERYWHERE)
-        table = FilmColourTable.build(
-            _medium(at, "n", "k"),
-            _medium(at, "base_n", "base_k"),
-            (0.99 * low, 1.01 * high + 1.0),
-            ambient=Table(_EVERYWHERE, at["ambient_n"]) if "ambient_n" in at else numbers.get("coat_n", 1.0),
-            angle=(0.0, STEEPEST),
-        )
-        matrix = to_srgb(sensor())
+        indices = _indices(surface, numbers, _EVERYWHERE)
+        film, base = (_medium(indices, *keys) for keys in KEYS.values())
+        above = indices.get("ambient_n")
+        ambient = numbers.get("coat_n", 1.0) if above is None else Table(_EVERYWHERE, above)
+        heights = (0.99 * low, 1.01 * high + 1.0)
+        table = FilmColourTable.build(film, base, heights, ambient=ambient, angle=(0.0, STEEPEST))
+        matrix = srgb_sensor(sensor()).weights
         numbers |= {"table": table, "xyz_to_srgb": np.linalg.lstsq(sensor().weights, matrix, rcond=None)[0]}
         return Shading(_by_table(brdf), numbers, np.eye(3))
     thick = high * float(np.max(numbers["n"])) > THIN
     bands = integration_bands(BANDS if thick else "uniform-32")
-    numbers |= _at(surface, numbers, bands.wavelength) | {"wavelengths": bands.wavelength}
-    return Shading(brdf, numbers, to_srgb(Sensor(bands.wavelength, bands.weights)))
-
-
-def thickness_range(surface: Surface) -> tuple[float, float]:
-    """Bounds of a free thickness in nm, or a fixed one twice."""
-    thickness: Any = surface.numbers.get("thickness", surface.start_numbers()["thickness"])
-    if isinstance(thickness, Free):
-        return thickness.lower, thickness.upper
-    return float(thickness), float(thickness)
+    numbers |= _indices(surface, numbers, bands.wavelength) | {"wavelengths": bands.wavelength}
+    return Shading(brdf, numbers, srgb_sensor(Sensor(bands.wavelength, bands.weights)).weights)
 
 
 @cache  # one object for each model, for which programs are compiled once
 def _by_table(brdf: Model) -> Model:
+    """Return the model with the film's linear sRGB (..., 3) from a table."""
     assert brdf.from_film_colour is not None
-    return brdf._replace(evaluate=brdf.from_film_colour(_from_table))
+
+    def colour(parameters: Any, i: Any, o: Any) -> Any:
+        xyz = parameters["table"].xyz(parameters["thickness"], cosine_to_half(i, o))
+        return xyz @ parameters["xyz_to_srgb"]
+
+    return brdf._replace(evaluate=brdf.from_film_colour(colour))
 
 
-def _from_table(parameters: Any, i: Any, o: Any) -> Any:
-    """Linear sRGB (..., 3) of the film."""
-    return parameters["table"].xyz(parameters["thickness"], cosine_to_half(i, o)) @ parameters["xyz_to_srgb"]
-
-
-def _at(surface: Surface, numbers: dict[str, Any], nm: np.ndarray) -> dict[str, np.ndarray]:
+def _indices(surface: Surface, numbers: dict[str, Any], nm: np.ndarray) -> dict[str, np.ndarray]:
     """Indices (wavelengths,) of the surface: those of its media, and those of its channels interpolated."""
     channels = surface.bands.wavelength
     order = np.argsort(channels)
@@ -247,9 +239,9 @@ def _at(surface: Surface, numbers: dict[str, Any], nm: np.ndarray) -> dict[str, 
     return given
 
 
-def _medium(at: dict[str, np.ndarray], n: str, k: str) -> Table:
-    extinction = at.get(k)
-    return Table(_EVERYWHERE, at[n], extinction if extinction is not None and np.any(extinction) else None)
+def _medium(indices: dict[str, np.ndarray], n: str, k: str) -> Table:
+    absorbs = np.any(indices.get(k, 0.0))
+    return Table(_EVERYWHERE, indices[n], indices[k] if absorbs else None)
 
 
 WAVES = 24

@@ -6,7 +6,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import sensor
-from pellicle.colour.encoding import camera_encoding, encoding
+from pellicle.colour.spaces import camera_encoding, encoding
 from pellicle.data.colours import CameraMatrix, Colours
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.colour_measurements import measured_colours

@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.brdf.directions import direction
-from pellicle.brdf.lobes import two_lobes
-from pellicle.brdf.models import Evaluate, model
+from pellicle.brdf.lobes import Evaluate, two_lobes
+from pellicle.brdf.models import model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.coordinates import Array

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.colour.encoding import camera_encoding, encoding
-from pellicle.colour.spaces import delta_e76, lab
+from pellicle.colour.spaces import camera_encoding, delta_e76, encoding, lab
 from pellicle.data.colours import Colours
 from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.colour.encoding import Encoding
+from pellicle.colour.spaces import Encoding
 from pellicle.data.colours import Colours
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,8 +12,9 @@ from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, content_lines, is_number, open_binary, text_of
 from pellicle.data.tabular.units import to_nm
 from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Table as InterpolatedTable
+from pellicle.dispersion.empirical import WithExtinction
 from pellicle.errors import DataError
-from pellicle.materials.page import NOISE_IN_K, table
 
 LARGEST_FILE = 64 * 2**20
 """Largest material file, in bytes: a million rows."""
@@ -22,8 +23,67 @@ LARGEST = 1e10
 """Bounds of wavelengths and of n, k, ε₁ and ε₂, beyond all data: refractiveindex.info has water up to 10 m,
 and metals in the far infrared have |ε| of 1e6."""
 
+NOISE_IN_K = 1e-4
+"""A k between this much below zero and zero is noise about zero."""
+
+
+class MaterialFile(NamedTuple):
+    """A dispersion from a source, its range (nm) and whether the source has k, and what was understood of it.
+
+    `format` is the kind of file, `columns` the columns and unit as they were read, `assumed` a sentence on
+    what the file does not state, `title`, `citation` and `comments` what it says of the material.
+    """
+
+    dispersion: AbstractDispersion
+    wavelength_range: tuple[float, float]
+    has_extinction: bool
+    format: str = ""
+    columns: str = ""
+    assumed: str = ""
+    title: str = ""
+    citation: str = ""
+    comments: str = ""
+
+
+def table(nm: Any, n: Any, k: Any = None) -> MaterialFile:
+    """Make a published table fit for linear interpolation.
+
+    Points are sorted, those at the same wavelength averaged. A k slightly below zero is set to zero;
+    rows where it is truly negative (Querry's far infrared, where his inversion fails) are left out.
+    A k that is zero throughout makes a table that cannot absorb.
+    """
+    nm, columns = np.asarray(nm, dtype=float), [np.asarray(n, dtype=float)]
+    if k is not None:
+        columns.append(np.asarray(k, dtype=float))
+        keep = columns[1] >= -NOISE_IN_K
+        nm, columns = nm[keep], [column[keep] for column in columns]
+        columns[1] = np.maximum(columns[1], 0.0)
+    distinct, where, count = np.unique(nm, return_inverse=True, return_counts=True)
+    columns = [np.bincount(where, column) / count for column in columns]
+    if len(columns) == 2 and not columns[1].any():
+        columns.pop()
+    for array in (distinct, *columns):
+        array.flags.writeable = False
+    known = float(distinct[0]), float(distinct[-1])
+    return MaterialFile(InterpolatedTable(distinct, *columns), known, k is not None)
+
+
+def combine(n: MaterialFile, nm: Any, k: Any) -> MaterialFile:
+    """Return n from one source and the table of k from another, where both are known."""
+    extinction = table(nm, np.zeros(len(nm)), k)
+    (first, last), (lowest, highest) = n.wavelength_range, extinction.wavelength_range
+    low, high = max(first, lowest), min(last, highest)
+    if low >= high:
+        raise DataError(
+            f"n is known from {first:g} to {last:g} nm and k from {lowest:g} to {highest:g} nm, "
+            "which do not overlap: choose another page"
+        )
+    absorbs = isinstance(extinction.dispersion, InterpolatedTable) and extinction.dispersion.k is not None
+    both = WithExtinction(n.dispersion, extinction.dispersion) if absorbs else n.dispersion
+    return MaterialFile(both, (low, high), True)
+
+
 _ROW = "correct or delete that row"
-_SIGN = "absorption is n + ik with k ≥ 0 here, so turn its sign"
 
 
 @dataclass(frozen=True)
@@ -93,24 +153,6 @@ def read_rows(path: str, lines: Sequence[Line], names: Sequence[str], optional: 
     return replace(plain_columns(names[:width], rows, []), path=path)
 
 
-class MaterialFile(NamedTuple):
-    """A dispersion read from a file, and what was understood of the file.
-
-    `format` is the kind of file, `columns` the columns and unit as they were read, `assumed` a sentence on
-    what the file does not state, `title`, `citation` and `comments` what it says of the material.
-    """
-
-    dispersion: AbstractDispersion
-    wavelength_range: tuple[float, float]
-    has_extinction: bool
-    format: str
-    columns: str
-    assumed: str = ""
-    title: str = ""
-    citation: str = ""
-    comments: str = ""
-
-
 class OpticalConstants(NamedTuple):
     """Columns of a file: the axis in `unit`, then n and k or, where `dielectric`, eps1 and eps2.
 
@@ -168,37 +210,34 @@ def material_file(constants: OpticalConstants, kind: str, title: str = "", assum
     Raises DataError, one sentence with file, line, column and remedy.
     """
     axis, first, second = constants.names
-    _refuse(constants, axis, constants.axis, constants.axis <= 0, "above 0", _ROW)
+
+    def refuse(name: str, values: np.ndarray, wrong: np.ndarray, expected: str, remedy: str = _ROW) -> None:
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise DataError(
+                f"{constants.where(row, name)}: expected {name} {expected}, found {values[row]:g}; {remedy}"
+            )
+
+    refuse(axis, constants.axis, constants.axis <= 0, "above 0")
     _check_order(constants)
     with np.errstate(over="ignore"):
         nm = np.round(to_nm(constants.axis, constants.unit), 9)
-    _refuse(
-        constants, axis, constants.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light", _ROW
-    )
+    refuse(axis, constants.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light")
     n, k = constants.first, constants.second
     for name, values in ((first, n), (second, k)):
         if values is not None:
-            _refuse(constants, name, values, np.abs(values) > LARGEST, f"up to {LARGEST:g}", _ROW)
+            refuse(name, values, np.abs(values) > LARGEST, f"up to {LARGEST:g}")
     if k is not None:
-        _refuse(constants, second, k, k < -NOISE_IN_K, "0 or above", _SIGN)
+        sign = "absorption is n + ik with k ≥ 0 here, so turn its sign"
+        refuse(second, k, k < -NOISE_IN_K, "0 or above", sign)
     if constants.dielectric:
         assert k is not None
         n, k = nk_from_dielectric(n, np.maximum(k, 0.0))
-        _refuse(constants, first, constants.first, n <= 0, "of an index n above 0", _ROW)
+        refuse(first, constants.first, n <= 0, "of an index n above 0")
     else:
-        _refuse(constants, first, n, n <= 0, "above 0", _ROW)
+        refuse(first, n, n <= 0, "above 0")
     columns = f"{axis} in {constants.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows"
-    return MaterialFile(*table(nm, n, k), kind, columns, assumed, title)
-
-
-def _refuse(
-    constants: OpticalConstants, name: str, values: np.ndarray, wrong: np.ndarray, expected: str, remedy: str
-) -> None:
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{constants.where(row, name)}: expected {name} {expected}, found {values[row]:g}; {remedy}"
-        )
+    return table(nm, n, k)._replace(format=kind, columns=columns, assumed=assumed, title=title)
 
 
 def _check_order(constants: OpticalConstants) -> None:

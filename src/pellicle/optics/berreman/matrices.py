@@ -20,9 +20,9 @@ from pellicle.optics.characteristic import (
     matrix_elements,
     scale_exponent,
 )
-from pellicle.optics.elementary import sincos
 from pellicle.optics.hoisting import stored
 from pellicle.optics.pair import Number, Pair, imag, is_real, real
+from pellicle.optics.special import sincos
 
 
 class Elements(NamedTuple):
@@ -124,7 +124,7 @@ def full(number: Number) -> Pair:
 def exp(z: Number) -> Number:
     """Return the exponential of a real array or a `Pair`."""
     if not isinstance(z, Pair):
-        return jnp.exp(z)
+        return jnp.exp(real(z))
     sine, cosine = sincos(z.im)
     if z.re is None:
         return Pair(cosine, sine)

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from pellicle.optics.berreman.matrices import Propagation, inverse, one_minus, product
 from pellicle.optics.hoisting import stored
-from pellicle.optics.pair import Number, to_complex, to_pair
+from pellicle.optics.pair import Number, to_complex, to_pair, where
 
 DIRECT = 3.0
 """Largest difference of the attenuations, as exponents of amplitudes, that takes no slices: it costs e³."""
@@ -114,7 +114,7 @@ def sliced(
         whole = doubled(scattering(matrix, loss), count)
         inside = product(inverse(one_minus(product(whole.below, lower))), whole.down)
         reflected = whole.reflected + product(product(whole.up, lower), inside)
-        return jnp.where(needed, reflected, state[0]), jnp.where(needed, inside, state[1])
+        return where(needed, reflected, state[0]), where(needed, inside, state[1])
 
     reached = jax.lax.cond(jnp.any(needed), by_slices, lambda state: state, stored(direct))
     return to_pair(reached[0]), to_pair(reached[1])

@@ -14,19 +14,23 @@ faces are joined by Redheffer's star product.
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.anisotropy import Medium, Tensor, Uniaxial, mixes_polarisations, tensor
-from pellicle.optics.berreman import aligned, biaxial, uniaxial
+from pellicle.optics.anisotropy import Index, Medium, Principal, Tensor, Uniaxial, mixes_polarisations, tensor
+from pellicle.optics.berreman import biaxial, uniaxial
 from pellicle.optics.berreman.biaxial import delta, downward_pair, half_space
 from pellicle.optics.berreman.matrices import (
     Elements,
+    Fields,
     Propagation,
     elements,
+    elements_and_exponents,
+    exp,
+    full,
     inverse,
     matrix,
     one_minus,
@@ -44,18 +48,18 @@ from pellicle.optics.berreman.slices import (
     sliced,
     transfer,
 )
+from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.hoisting import stored
-from pellicle.optics.interface import Inside, transverse
-from pellicle.optics.pair import Number, conj, real, to_complex, to_pair
+from pellicle.optics.interface import Inside, normal_square, transverse
+from pellicle.optics.pair import Number, conj, real, times_i, to_complex, to_pair
 
 
 class Polarised(NamedTuple):
     """Reflection and transmission of layers that mix s and p. Rows are outgoing, columns incident."""
 
     reflected: Elements  # Jones matrix
-    fields: tuple[
-        Elements, Elements
-    ]  # (Ex, Ey) and (Hy, −Hx) at the substrate for unit electric field incident
+    # (Ex, Ey) and (Hy, −Hx) at the substrate for unit electric field incident
+    fields: tuple[Elements, Elements]
     incident: Any  # power flux of a unit electric field, n₀ cos θ
 
 
@@ -116,24 +120,56 @@ def most_dichroic(ambient: Any, layers: Sequence[Medium], phases: Sequence[Any],
     As exponents of amplitudes. Above `slices.DIRECT` the layer is cut into slices.
     """
     a, _ = transverse(ambient, jnp.asarray(angle) * 1.0)
-    layers_and_phases = zip(layers, phases, strict=True)
-    exponents = [method_of(m).dichroism(m, a) * k for m, k in layers_and_phases if mixes_polarisations(m)]
-    return jnp.max(jnp.stack([jnp.max(x) for x in exponents])) if exponents else jnp.zeros(())
+    exponents = [
+        jnp.max(_method(medium).dichroism(medium, a) * k)
+        for medium, k in zip(layers, phases, strict=True)
+        if mixes_polarisations(medium)
+    ]
+    return jnp.max(jnp.stack(exponents)) if exponents else jnp.zeros(())
 
 
-def method_of(medium: Medium) -> Any:
-    """Return the module that computes layers of this type of medium."""
-    return uniaxial if isinstance(medium, Uniaxial) else biaxial if isinstance(medium, Tensor) else aligned
+def _method(medium: Medium) -> Any:
+    """Return the module that computes layers of this medium, in which s and p mix."""
+    return uniaxial if isinstance(medium, Uniaxial) else biaxial
 
 
 def _substrate(medium: Medium, a: Any, like: Any) -> Number:
+    """Return the reflection matrix of a substrate against free space at normal incidence."""
     if isinstance(medium, Uniaxial):
         one, other = uniaxial.downward_roots(medium, a)
         return half_space(delta(tensor(medium), a), one + other, one * other, like)
     if isinstance(medium, Tensor):
         total, both = downward_pair(medium, a)
         return half_space(delta(medium, a), to_pair(total), to_pair(both), like)
-    return aligned.half_space(medium, a, like)
+    Q_p, Q_s, epsilon = _squares(medium, a)
+    p, s = nonzero_root(full(Q_p)), nonzero_root(full(Q_s))
+    zero = 0.0 * p
+    return matrix((p - epsilon) / (p + epsilon), zero, zero, (1 - s) / (1 + s), like=like)
+
+
+def _squares(medium: Index, a: Any) -> tuple[Number, Number, Number]:
+    """Return q² of p and of s, and ε along x, of a medium with its axes along those of the laboratory."""
+    x, y, z = medium if isinstance(medium, Principal) else (medium, medium, medium)
+    ratio = x * x / (z * z) if isinstance(medium, Principal) else 1.0
+    return normal_square(z, a) * ratio, normal_square(y, a), x * x
+
+
+def _propagation(medium: Index, a: Any, k: Any) -> Propagation:
+    """Return the propagation through a layer in which s and p each have a 2×2 matrix, of k = k₀d."""
+    Q_p, Q_s, epsilon = _squares(medium, a)
+    squares = (Q_p, Q_s) if isinstance(medium, Principal) else (Q_p,)
+    waves = list(elements_and_exponents(squares, k))
+    growth = jax.lax.stop_gradient(reduce(jnp.maximum, (-real(exponent) for *_, exponent in waves)))
+    factors = [exp(-exponent - growth) for *_, exponent in waves]
+    scaled = [(c * factor, times_i(-f) * factor) for (c, f, _), factor in zip(waves, factors, strict=True)]
+    (c, f), (c_s, f_s) = scaled[0], scaled[-1]
+    down_p, up_p, down_s = f * (Q_p / epsilon), f * epsilon, f_s * Q_s
+
+    def apply(fields: Fields) -> Fields:
+        Ex, Hy, Ey, Hx = fields
+        return c * Ex + down_p * Hy, c * Hy + up_p * Ex, c_s * Ey + f_s * Hx, c_s * Hx + down_s * Ey
+
+    return Propagation(apply, growth)
 
 
 class _Fields(NamedTuple):
@@ -166,8 +202,10 @@ def _behind(down: Any, waves: Number) -> Number:
 
 def _add(medium: Medium, a: Any, k: Any, below: _Fields, dichroic: bool) -> _Fields:
     """Return the fields above a layer; those below it are of unit waves."""
-    method = method_of(medium)
-    if not (dichroic and mixes_polarisations(medium)):
+    if not isinstance(medium, Uniaxial | Tensor):
+        return _direct(_propagation(medium, a, k), below)
+    method = _method(medium)
+    if not dichroic:
         return _direct(method.propagation(medium, a, k), below)
     assert below.reflection is not None
     exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)
@@ -208,11 +246,17 @@ def two_sided(
     whole = _upper_face(above, q_above, shape)
     for medium, k in zip(layers, phases, strict=True):
         whole = stored(join(whole, _layer(medium, a, k, shape, dichroic)))
-    return stored(join(whole, _lower_face(below, q_below, shape)))
+    # from free space into the half space below: an upper face from its other side, where p waves change the
+    # sign of Ex
+    reflected, down, up, below_ = _upper_face(below, q_below, shape)
+    signs = jnp.array([-1.0, 1.0], jnp.real(up).dtype).reshape(2, 1, *[1] * len(shape))
+    face = Scattering(reflected=below_, down=up * signs, up=down * signs, below=reflected)
+    return stored(join(whole, face))
 
 
 def _layer(medium: Medium, a: Any, k: Any, shape: tuple[int, ...], dichroic: bool) -> Scattering:
-    method, mixes = method_of(medium), mixes_polarisations(medium)
+    method = _method(medium)
+    mixes = isinstance(medium, Uniaxial | Tensor)
     k = jnp.broadcast_to(k, shape)
     count = None
     if dichroic and mixes:
@@ -220,7 +264,7 @@ def _layer(medium: Medium, a: Any, k: Any, shape: tuple[int, ...], dichroic: boo
         k = k * jnp.exp2(-count)
     direction = jnp.array([1.0, -1.0], k.dtype).reshape(2, *[1] * len(shape))
     # waves along the axes of the laboratory are alike in both directions
-    propagation = method.propagation(medium, a, k, direction) if mixes else method.propagation(medium, a, k)
+    propagation = method.propagation(medium, a, k, direction) if mixes else _propagation(medium, a, k)
     loss = jnp.broadcast_to(jnp.exp(-propagation.growth), (2, *shape))
     waves = transfer(propagation, direction)
     one = scattering(jnp.broadcast_to(waves, (4, 4, 2, *shape)), loss)
@@ -241,16 +285,6 @@ def _upper_face(index: Number, q: Number, shape: tuple[int, ...]) -> Scattering:
         up=_diagonal(-2 * index * p, 2 * s, shape),
         below=_diagonal(r_p, -r_s, shape),
     )
-
-
-def _lower_face(index: Number, q: Number, shape: tuple[int, ...]) -> Scattering:
-    """From free space into a half space below: the upper face seen from its other side.
-
-    p waves change the sign of Ex between both sides.
-    """
-    reflected, down, up, below = _upper_face(index, q, shape)
-    signs = jnp.array([-1.0, 1.0], jnp.real(up).dtype).reshape(2, 1, *[1] * len(shape))
-    return Scattering(reflected=below, down=up * signs, up=down * signs, below=reflected)
 
 
 def _diagonal(p: Any, s: Any, shape: tuple[int, ...]) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.errors import UsageError
 from pellicle.fitting.result import Fit
-from pellicle.materials.named_dispersion import materials_in
+from pellicle.materials.catalogue import materials_in
 from pellicle.sampling.result import Posterior
 
 _LONGEST = 200_000
