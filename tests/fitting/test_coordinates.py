@@ -47,13 +47,6 @@ def test_numpy_agrees_with_a_traced_program(coordinates):
     np.testing.assert_allclose(found, jax.jit(coordinates.values)(own, units), rtol=1e-13)
 
 
-def test_plain_coordinates_go_evenly():
-    plain = Coordinates()
-    np.testing.assert_allclose(
-        plain.values(box(np.zeros(2), np.array([2.0, 4.0]), [None] * 2), np.array([0.25, 0.5])), [0.5, 2.0]
-    )
-
-
 @pytest.mark.parametrize(("coordinates", "least"), [(DISC, -180.0), (FOLDED, 0.0)])
 def test_a_tilt_fills_a_disc_and_folded_half_of_one(coordinates, least):
     units = np.random.default_rng(0).random((4000, 4))
@@ -102,9 +95,10 @@ def test_slope_by_finite_differences(coordinates):
     np.testing.assert_allclose(coordinates.slope(around, unit), expected, rtol=1e-6, atol=1e-6)
 
 
-def test_the_centre_of_the_disc_has_a_slope():
-    slope = DISC.slope(bounds(DISC), np.full(4, 0.5))
-    assert np.isfinite(slope).all()
+def test_the_centre_of_the_disc_has_a_slope_and_plain_coordinates_go_evenly():
+    assert np.isfinite(DISC.slope(bounds(DISC), np.full(4, 0.5))).all()
+    plain = box(np.zeros(2), np.array([2.0, 4.0]), [None] * 2)
+    np.testing.assert_allclose(Coordinates().values(plain, np.array([0.25, 0.5])), [0.5, 2.0])
 
 
 def test_priors_of_a_box():

@@ -39,8 +39,8 @@ def test_sums_of_squares_of_all_sweeps():
 def test_probability_from_a_table():
     """The 5 % and 1 % points of F on 5 and 10 degrees of freedom are 3.326 and 5.636 (NIST e-Handbook of
     statistical methods, 1.3.6.7.3)."""
-    assert LackOfFit(2, 0.1, 3.326, (5, 10)).probability == pytest.approx(0.05, rel=1e-3)
-    assert LackOfFit(2, 0.1, 5.636, (5, 10)).probability == pytest.approx(0.01, rel=1e-3)
+    for ratio, probability in ((3.326, 0.05), (5.636, 0.01)):
+        assert LackOfFit(2, 0.1, ratio, (5, 10)).probability == pytest.approx(probability, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -132,10 +132,8 @@ def test_fits_that_are_no_use_are_left_out_and_named():
     wrong = fit(250.5, path="c", status=Status.MISFIT)
     found = pl.fitting.repeats([good[0], wrong, good[1], fit(100.0, path="copy")])
     assert found["thickness"].values == (100.0, 100.3)
-    assert found.warnings == (
-        "c is left out: its fit is misfit",
-        "copy is left out: it holds the same numbers as a",
-    )
+    misfit, copy = "c is left out: its fit is misfit", "copy is left out: it holds the same numbers as a"
+    assert found.warnings == (misfit, copy)
     with pytest.raises(UsageError, match=r"two usable fits or more, and 1 of 2 are; c is left out"):
         pl.fitting.repeats([good[0], wrong])
 
@@ -147,9 +145,8 @@ def test_parameters_without_an_error_are_not_compared():
     assert list(found.parameters) == ["thickness"]
     assert found.uncompared == ("k",)
     resting = Estimate("A", 1.3, 0.1, "", 1.3, 1.7, True, at_bound=True)
-    found = pl.fitting.repeats(
-        [fit(100.0, A=resting), fit(100.3, A=resting, status=Status.AT_BOUND, path="b")]
-    )
+    second = fit(100.3, A=resting, status=Status.AT_BOUND, path="b")
+    found = pl.fitting.repeats([fit(100.0, A=resting), second])
     assert found.uncompared == ("A",)
     assert found.warnings == ("b: its fit is at-bound",)
     with pytest.raises(UsageError, match="no parameter has a finite error"):
@@ -157,9 +154,7 @@ def test_parameters_without_an_error_are_not_compared():
 
 
 def test_another_order_of_interference_is_named():
-    order = fit(357.3, path="c", rivals=(Rival({"thickness": 3494.1}, 2.1), Rival({"thickness": 800.0}, 9.0)))
-    found = pl.fitting.repeats([fit(3494.0), fit(3493.9), order])
-    [warning] = found.warnings
-    assert warning.startswith(
-        "c lies in another minimum: thickness 357.3 nm, while its rival of 3494.1 nm (Δχ² 2.1)"
-    )
+    rivals = Rival({"thickness": 3494.1}, 2.1), Rival({"thickness": 800.0}, 9.0)
+    [warning] = pl.fitting.repeats([fit(3494.0), fit(3493.9), fit(357.3, path="c", rivals=rivals)]).warnings
+    words = "c lies in another minimum: thickness 357.3 nm, while its rival of 3494.1 nm (Δχ² 2.1)"
+    assert warning.startswith(words)

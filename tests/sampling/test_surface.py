@@ -56,7 +56,7 @@ def test_a_posterior_is_as_wide_as_the_errors_say(monkeypatch, known, tmp_path):
         assert np.all(np.diff(np.median(band.model, axis=0)[np.argsort(band.axis.values)]) > -1e-3)
 
 
-@pytest.mark.slow  # samples; tests/sampling/test_sandwich.py is quick
+@pytest.mark.slow  # samples; tests/sampling/test_checks.py is quick
 def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
     """Under a noise in proportion to the signal, which one σ for all samples would state wrongly."""
     clean = pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values

@@ -1,10 +1,10 @@
-"""Warnings on what the directions of samples cannot determine, and on numbers that mean little."""
+"""Evidence for a layer, each reason that denies it, and warnings on what samples cannot determine."""
 
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.summary import direction_warnings, number_warnings, weight_warnings
-from pellicle.fitting.result import Estimate
+from pellicle.fitting.brdf.summary import direction_warnings, evidence, number_warnings, weight_warnings
+from pellicle.fitting.result import Baseline, Estimate, Rival
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 
@@ -58,3 +58,61 @@ def test_weights_that_are_fixed_are_named():
     assert message.startswith("fixed: specular at 1; ")
     assert "specular = { lower = 0, upper = 10 }" in message
     assert weight_warnings({"diffuse": free}) == []
+
+
+def estimate(name, value, stderr=0.1, lower=0.0, upper=1000.0, at_bound=False, **limits):
+    return Estimate(name, value, stderr, "", lower, upper, True, at_bound, **limits)
+
+
+GOOD = {
+    "thickness": estimate("thickness", 300.0),
+    "exponent_reflection": estimate("exponent_reflection", 80.0),
+    "specular": estimate("specular", 1.0),
+    "deviation": estimate("deviation", 0.0, at_bound=True),
+    "n_g": estimate("n_g", 1.5, upper=2.5),
+}
+BASELINES = (Baseline("no interference", 2.0), Baseline("two lobes", 3.0))
+"""Held-out errors, of which a layer's must be 10 % less than each."""
+
+
+def test_a_layer_without_any_doubt():
+    result = evidence(GOOD, (Rival({"thickness": 500.0}, 40.0),), 1.0, BASELINES)
+    assert result.layered
+    assert result.verdict.startswith("Evidence of a layer: thickness 300.00 ± 0.10")
+    assert "50 % below no interference and 67 % below two lobes" in result.verdict
+
+
+@pytest.mark.parametrize(
+    ("changed", "rivals", "held_out", "reason"),
+    [
+        ({}, (), 1.84, "8 % below no interference"),
+        (
+            {"thickness": estimate("thickness", 0.5, 0.4, upper_limit=1.2)},
+            (),
+            1.0,
+            "0 fits as well, for it is at most 1.2 (95 %)",
+        ),
+        ({}, (), 3.3, "1.10 times that of two lobes"),
+        ({}, (Rival({"thickness": 500.0}, 3.0),), 1.84, "500 nm fits as well as 300 nm"),
+        ({"thickness": estimate("thickness", 300.0, np.inf)}, (), 1.0, "no finite error"),
+        ({"exponent_reflection": estimate("exponent_reflection", 1.5)}, (), 1.0, "is no lobe"),
+        ({"exponent_reflection": estimate("exponent_reflection", 1e3, at_bound=True)}, (), 1.0, "its bound"),
+        ({"deviation": estimate("deviation", 20.0, upper=20.0, at_bound=True)}, (), 1.0, "its bound 20"),
+        ({"n_g": estimate("n_g", 2.5, upper=2.5, at_bound=True)}, (), 1.0, "n_g rests on its bound"),
+        ({"roughness": estimate("roughness", 0.84)}, (), 1.0, "roughness 0.84 is no lobe"),
+        ({"specular": estimate("specular", 0.0, at_bound=True)}, (), 1.0, "no weight"),
+    ],
+)
+def test_each_reason_alone_denies_a_layer(changed, rivals, held_out, reason):
+    result = evidence({**GOOD, **changed}, rivals, held_out, BASELINES)
+    assert not result.layered
+    assert result.verdict.startswith("No evidence of a layer: ")
+    assert reason in result.verdict
+
+
+def test_several_thicknesses_do_not_mean_that_there_is_no_layer():
+    result = evidence(GOOD, (Rival({"thickness": 500.0}, 3.0),), 1.0, BASELINES)
+    assert (result.layered, result.several) == (False, True)
+    assert result.verdict == (
+        "The samples do not determine the thickness of the layer: 500 nm fits as well as 300 nm (Δχ² 3.0)."
+    )

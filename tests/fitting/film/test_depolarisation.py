@@ -146,6 +146,7 @@ def test_a_comparison_counts_the_depolarisation(measured):
     assert even - uneven > 100
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_noise_alone_is_no_depolarisation(measured):
     share = np.random.default_rng(2).normal(0, 0.02, 64)
     fit = pl.fit(replace(measured, depolarisation=share, depolarisation_sigma=np.full(64, 0.02)), scene(None))

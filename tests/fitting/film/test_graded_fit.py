@@ -1,5 +1,6 @@
 """Fit of a graded film: its parameters, profile.csv and the panel of its figure."""
 
+import csv
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -39,15 +40,11 @@ def test_a_fit_finds_the_profile(fit, tmp_path):
         assert abs(found.value - value) < 3 * found.stderr_noise, name
         assert found.stderr_noise < 0.05 * value, name
 
-    table = np.genfromtxt(
-        write_fit(tmp_path / "graded", fit) / "profile.csv",
-        delimiter=",",
-        names=True,
-        dtype=None,
-        encoding="utf-8",
-    )
-    depth, fraction, stderr, n = (table[name] for name in ("depth_nm", "fraction", "fraction_stderr", "n"))
-    assert set(table["layer"]) == {"layer"}
+    with open(write_fit(tmp_path / "graded", fit) / "profile.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    names = ("depth_nm", "fraction", "fraction_stderr", "n")
+    depth, fraction, stderr, n = (np.array([float(row[name]) for row in rows]) for name in names)
+    assert {row["layer"] for row in rows} == {"layer"}
     assert depth[[0, -1]] == pytest.approx([0.0, fit.parameters["thickness"].value])
     np.testing.assert_allclose(fraction, TOP + (BOTTOM - TOP) * depth / depth[-1], atol=0.02)
     assert np.all((stderr > 0) & (stderr < 0.05))

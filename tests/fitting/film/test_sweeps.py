@@ -11,13 +11,21 @@ NM = np.linspace(400.0, 800.0, 41)
 ANGLES = np.array([20.0, 45.0, 60.0, 70.0])
 
 
-def rows(*arrays):
-    return [np.asarray(x).tolist() for x in arrays]
+THERE_AND_BACK = np.concatenate([NM, NM[-2::-1]])
+TWICE = np.tile(np.arange(50.0, 71.0), 2)
 
 
-def test_one_angle_is_one_sweep():
-    assert rows(*sweeps(NM, np.zeros(41))) == rows(np.arange(41))
-    assert rows(*sweeps(NM[::-1], np.zeros(41))) == rows(np.arange(41))
+@pytest.mark.parametrize(
+    ("nm", "angle", "expected"),
+    [
+        (NM, np.zeros(41), [range(41)]),
+        (NM[::-1], np.zeros(41), [range(41)]),
+        (THERE_AND_BACK, np.zeros(81), [range(41), range(41, 81)]),
+        (np.full(42, 658.0), TWICE, [range(21), range(21, 42)]),  # swept along the angle
+    ],
+)
+def test_sweeps_of_one_angle_or_one_wavelength(nm, angle, expected):
+    assert [part.tolist() for part in sweeps(nm, angle)] == [list(part) for part in expected]
 
 
 @pytest.mark.parametrize("interleaved", [True, False])
@@ -28,16 +36,6 @@ def test_each_angle_is_a_sweep(interleaved):
     for part, each in zip(result, ANGLES, strict=True):
         assert (angle[part] == each).all()
         np.testing.assert_array_equal(nm[part], NM)
-
-
-def test_there_and_back_are_two_sweeps():
-    nm = np.concatenate([NM, NM[-2::-1]])
-    assert rows(*sweeps(nm, np.zeros(81))) == rows(np.arange(41), np.arange(41, 81))
-
-
-def test_one_wavelength_is_swept_along_the_angle():
-    angle = np.concatenate([np.arange(50.0, 71.0), np.arange(50.0, 71.0)])
-    assert rows(*sweeps(np.full(42, 658.0), angle)) == rows(np.arange(21), np.arange(21, 42))
 
 
 def test_rows_in_no_order_are_one_sorted_sweep():
