@@ -120,7 +120,16 @@ def reflectance_from_counts(
     check_noise(noise)
     sigma = None if noise is None else np.full(len(sample), noise / np.sqrt(max(len(sample.sweeps), 1)))
     sweeps = [reflectance_from_counts(sweep, reference, known, dark, noise=noise) for sweep in sample.sweeps]
-    values = _ratio(sample, reference, dark) * known
+    background = 0.0 if dark is None else _interpolated(sample, dark, "dark")
+    full = _interpolated(sample, reference, "reference") - background
+    if full.min() <= 0:
+        first = sample.wavelength[np.argmax(full <= 0)]
+        above = "" if dark is None else " above the dark"
+        raise DataError(
+            f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
+            "leave those wavelengths out with `range`"
+        )
+    values = (sample.values - background) / full * known
     note = f"counts divided by those of the reference {reference.path}"
     return _reflectance(sample, values, sigma, sweeps, "counts", note)
 
@@ -174,20 +183,6 @@ def _reflectance(
         notes=(*sample.notes, note),
         sweeps=tuple(sweeps),
     )
-
-
-def _ratio(sample: Spectrum, reference: Spectrum, dark: Spectrum | None) -> np.ndarray:
-    """(S − D) / (Ref − D) at the wavelengths of the sample."""
-    background = 0.0 if dark is None else _interpolated(sample, dark, "dark")
-    full = _interpolated(sample, reference, "reference") - background
-    if full.min() <= 0:
-        first = sample.wavelength[np.argmax(full <= 0)]
-        above = "" if dark is None else " above the dark"
-        raise DataError(
-            f"{reference.path}: the reference has no counts{above} at {first:g} nm; "
-            "leave those wavelengths out with `range`"
-        )
-    return (sample.values - background) / full
 
 
 def _interpolated(sample: Spectrum, other: Spectrum, name: str) -> np.ndarray:

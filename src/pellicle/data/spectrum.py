@@ -132,22 +132,18 @@ class Spectrum:
             object.__setattr__(self, name, array)
         self._check_arrays()
         if self.folded is None:
-            self._find_folding()
+            at = None
+            if self.delta is not None and not parts:
+                group = np.zeros(size) if self.setting is None else self.setting
+                at = folding_at(self.wavelength, self.values, self.delta, group)
+            object.__setattr__(self, "folded", at is not None)
+            if at is not None:
+                object.__setattr__(self, "notes", (*self.notes, folding_note(at)))
 
     @property
     def kind(self) -> Signal:
         """Kind of the signal: quantities, units, and their comparison in a fit."""
         return KINDS[self.signal].of(self)
-
-    def _find_folding(self) -> None:
-        """Set `folded`, with a note where it is true."""
-        at = None
-        if self.delta is not None and not self.kind.parts:
-            group = np.zeros(len(self)) if self.setting is None else self.setting
-            at = folding_at(self.wavelength, self.values, self.delta, group)
-        object.__setattr__(self, "folded", at is not None)
-        if at is not None:
-            object.__setattr__(self, "notes", (*self.notes, folding_note(at)))
 
     def _check_words(self) -> None:
         for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):

@@ -15,7 +15,7 @@ from pellicle.errors import DataError, UsageError
 FOLDER = Path(__file__).with_name("samples")
 SAMPLES = {path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.glob("*/*"))}
 READERS = {
-    "accurion": accurion.layout,
+    "accurion": accurion.read,
     **{r.__module__.split(".")[-1] if r.__name__ == "read" else r.__name__: r for r in TEXT_READERS},
 }
 READING = {

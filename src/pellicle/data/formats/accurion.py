@@ -25,7 +25,7 @@ DRIFT_MM = 1.0
 _MOST_LISTED = 40
 
 
-def layout(file: TextFile, spot: int | None = None) -> Table | None:
+def read(file: TextFile, spot: int | None = None) -> Table | None:
     """Return Ψ and Δ of one spot, or None for another format.
 
     Raises UsageError where `spot`, from 1, is missing or wrong, DataError for several zones.

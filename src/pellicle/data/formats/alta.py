@@ -22,18 +22,6 @@ GRAZING = 1e-3
 """Degrees from 90 within which a cosine-weighted value does not determine the BRDF."""
 
 
-def _isotropic(theta_v: np.ndarray, theta_l: np.ndarray, phi: np.ndarray) -> Angles:
-    return theta_l, np.zeros_like(phi), theta_v, -phi  # ALTA counts from the viewer to the light
-
-
-def _projected(theta_l: np.ndarray, x: np.ndarray, y: np.ndarray) -> Angles:
-    return theta_l, np.zeros_like(x), np.hypot(x, y), np.arctan2(y, x)
-
-
-def _cartesian(*view_and_light: np.ndarray) -> Angles:
-    return *angles(np.stack(view_and_light[3:])), *angles(np.stack(view_and_light[:3]))
-
-
 def _half(theta_h: np.ndarray, phi_h: np.ndarray | float, theta_d: np.ndarray, phi_d: np.ndarray) -> Angles:
     view, light = from_half_difference(theta_h, phi_h, theta_d, phi_d)
     return *angles(light), *angles(view)
@@ -45,12 +33,21 @@ def _half_isotropic(theta_h: np.ndarray, theta_d: np.ndarray, phi_d: np.ndarray)
 
 
 INPUTS: dict[str, tuple[tuple[str, ...], Callable[..., Angles]]] = {
-    "SPHERICAL_TL_PL_TV_PV": (("theta_l", "phi_l", "theta_v", "phi_v"), lambda *angles: angles),
-    "ISOTROPIC_TV_TL_DPHI": (("theta_v", "theta_l", "dphi"), _isotropic),
-    "ISOTROPIC_TL_TV_PROJ_DPHI": (("theta_l", "x", "y"), _projected),
+    "SPHERICAL_TL_PL_TV_PV": (("theta_l", "phi_l", "theta_v", "phi_v"), lambda *directions: directions),
+    "ISOTROPIC_TV_TL_DPHI": (  # ALTA counts from the viewer to the light
+        ("theta_v", "theta_l", "dphi"),
+        lambda theta_v, theta_l, phi: (theta_l, np.zeros_like(phi), theta_v, -phi),
+    ),
+    "ISOTROPIC_TL_TV_PROJ_DPHI": (
+        ("theta_l", "x", "y"),
+        lambda theta_l, x, y: (theta_l, np.zeros_like(x), np.hypot(x, y), np.arctan2(y, x)),
+    ),
     "RUSIN_TH_PH_TD_PD": (("theta_h", "phi_h", "theta_d", "phi_d"), _half),
     "RUSIN_TH_TD_PD": (("theta_h", "theta_d", "phi_d"), _half_isotropic),
-    "CARTESIAN": (("v_x", "v_y", "v_z", "l_x", "l_y", "l_z"), _cartesian),
+    "CARTESIAN": (
+        ("v_x", "v_y", "v_z", "l_x", "l_y", "l_z"),
+        lambda *vl: (*angles(np.stack(vl[3:])), *angles(np.stack(vl[:3]))),  # view, then light
+    ),
 }
 """Coordinates of a row for each `#PARAM_IN`, and their directions. ALTA's other parametrisations leave part
 of the directions open, or are hardly in use."""

@@ -1,6 +1,6 @@
 """Detection of a file's format by its content, and the tables in it.
 
-A text reader takes a `TextFile` and returns the layouts of plain columns of its spectra, whose rows keep
+A text reader takes a `TextFile` and returns the tables of plain columns of its spectra, whose rows keep
 their line numbers, or None for another format. A binary reader takes the content. Cells, units and axes are
 then checked as in any other file, and messages name the lines of the user's file.
 """
@@ -47,27 +47,26 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     """
     content, digest = read_bytes(path)
     for reader in BINARY_READERS:
-        if layouts := reader(content, str(path)):
-            return [replace(table, path=str(path), sha256=digest) for table in layouts]
+        if tables := reader(content, str(path)):
+            return [replace(table, path=str(path), sha256=digest) for table in tables]
     if spot is None:
-        plain = bulk_layout(content, lambda head: text_file(head, digest, path), _plain_layout)
+        plain = bulk_layout(
+            content,
+            lambda head: text_file(head, digest, path),
+            lambda head: None if _export_tables(head, None) else find_layout(head),
+        )
         if plain is not None:
             return [replace(plain, path=str(path), sha256=digest)]
     file = text_file(content, digest, path)
-    layouts = _export_layouts(file, spot) or [find_layout(file)]
-    return [replace(table, path=file.path, sha256=digest) for table in layouts]
+    tables = _export_tables(file, spot) or [find_layout(file)]
+    return [replace(table, path=file.path, sha256=digest) for table in tables]
 
 
-def _plain_layout(head: TextFile) -> Table | None:
-    """The layout of a file that is no instrument's export, from its first lines; None for an export."""
-    return None if _export_layouts(head, None) else find_layout(head)
-
-
-def _export_layouts(file: TextFile, spot: int | None) -> Sequence[Table] | None:
-    """The layouts of an instrument's export, None for another file."""
-    layout = accurion.layout(file, spot)
-    if layout is not None:
-        return [layout]
+def _export_tables(file: TextFile, spot: int | None) -> Sequence[Table] | None:
+    """The tables of an instrument's export, None for another file."""
+    table = accurion.read(file, spot)
+    if table is not None:
+        return [table]
     if spot is not None:
         raise UsageError(f"{file.path}: `spot` selects a spot of an Accurion file, which this is not")
-    return next((layouts for reader in TEXT_READERS if (layouts := reader(file))), None)
+    return next((tables for reader in TEXT_READERS if (tables := reader(file))), None)

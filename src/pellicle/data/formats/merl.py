@@ -48,7 +48,15 @@ def read_merl(
 
     Raises DataError for other dimensions, a wrong size or no valid cell.
     """
-    _check_size(path)
+    actual, expected = (" x ".join(map(str, shape)) for shape in (_dimensions(path), SHAPE))
+    if actual != expected:
+        raise DataError(
+            f"{path}: looks like a MERL file of {actual} cells, where {expected} are expected; "
+            "convert it to text (CSV) first"
+        )
+    if (size := Path(path).stat().st_size) != _SIZE:
+        fault = "is cut short" if size < _SIZE else "is too long"
+        raise DataError(f"{path}: {fault}, {size} bytes where a MERL file has {_SIZE}; download it again")
     with open_binary(path) as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     cells = np.memmap(path, dtype="<f8", mode="r", offset=_HEADER, shape=(3, *SHAPE))
@@ -83,19 +91,6 @@ def _dimensions(path: str | os.PathLike[str]) -> np.ndarray:
     with open_binary(path) as file:
         head = file.read(_HEADER)
     return np.frombuffer(head[: len(head) // 4 * 4], dtype="<i4")
-
-
-def _check_size(path: str | os.PathLike[str]) -> None:
-    actual, expected = (" x ".join(map(str, shape)) for shape in (_dimensions(path), SHAPE))
-    if actual != expected:
-        raise DataError(
-            f"{path}: looks like a MERL file of {actual} cells, where {expected} are expected; "
-            "convert it to text (CSV) first"
-        )
-    size = Path(path).stat().st_size
-    if size != _SIZE:
-        fault = "is cut short" if size < _SIZE else "is too long"
-        raise DataError(f"{path}: {fault}, {size} bytes where a MERL file has {_SIZE}; download it again")
 
 
 def _valid(cells: np.ndarray, max_theta: float) -> tuple[np.ndarray, int, int]:

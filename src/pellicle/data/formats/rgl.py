@@ -205,7 +205,7 @@ def read_rgl(
     bands outside the spectra.
     """
     brdf = load_rgl(path)
-    channels = _channels(path, brdf, wavelengths) if bands is None else _band_channels(path, brdf, bands)
+    channels, described = _channels(path, brdf, wavelengths, bands)
     lowest = np.cos(np.deg2rad(max_theta)) if max_theta < 90 else 0.0
     every, beyond, invalid = _valid_nodes(brdf, channels, lowest)
     if not every.size:
@@ -226,7 +226,7 @@ def read_rgl(
         path=str(path),
         sha256=digest,
         notes=(
-            f"read as an RGL tensor file of an {nature}, {_described(brdf, wavelengths, bands)}",
+            f"read as an RGL tensor file of an {nature}, {described}",
             f"{kept.size} of {every.shape[1]} valid nodes kept, spread over the grid",
             f"left out: {beyond} nodes with a direction {where}, {invalid} invalid (negative) ones",
         ),
@@ -249,45 +249,32 @@ def _valid_nodes(brdf: RglBrdf, channels: np.ndarray, lowest: float) -> tuple[np
     return np.concatenate(pieces, axis=1), beyond, invalid
 
 
-def _channels(path: str | os.PathLike[str], brdf: RglBrdf, wavelengths: Sequence[float] | None) -> np.ndarray:
-    """Weights (channels, stored) of the stored channels in those that are read."""
+def _channels(
+    path: str | os.PathLike[str], brdf: RglBrdf, wavelengths: Sequence[float] | None, bands: Bands | None
+) -> tuple[np.ndarray, str]:
+    """Weights (channels, stored) of the stored channels in those that are read, and a description."""
     if brdf.wavelengths is None:
-        return np.eye(3)
-    wanted = np.array(WAVELENGTHS if wavelengths is None else wavelengths, dtype=float)
+        told = "R, G, B of linear sRGB"
+        return np.eye(3), told + ("" if bands else ', at wavelengths: give the surface sensor = "srgb"')
+    own = WAVELENGTHS if wavelengths is None else wavelengths
+    wanted = np.array(bands[0] if bands else own, dtype=float)
     first, last = brdf.wavelengths[[0, -1]]
+    stored = [np.interp(wanted, brdf.wavelengths, row) for row in np.eye(brdf.wavelengths.size)]
+    if bands:
+        weights, beyond = np.asarray(bands[1], dtype=float), (wanted < first) | (wanted > last)
+        if np.any(np.abs(weights[beyond]).sum(axis=0) > _UNSEEN * np.abs(weights).sum(axis=0)):
+            raise DataError(
+                f"{path}: its spectra go from {first:g} to {last:g} nm, beyond which the sensor sees more"
+                " than 1 % of the light; give the surface wavelengths in place of a sensor"
+            )
+        return weights.T @ np.stack(stored, axis=1), "spectra integrated over the bands of the sensor"
+    names = ", ".join(f"{nm:g}" for nm in wanted)
     if wanted.size not in (1, 3) or wanted.min() < first or wanted.max() > last:
         raise DataError(
             f"{path}: its spectra go from {first:g} to {last:g} nm; choose one or three `wavelengths` there,"
-            f" not {', '.join(f'{each:g}' for each in wanted)}"
+            f" not {names}"
         )
-    unit = np.eye(brdf.wavelengths.size)
-    return np.stack([np.interp(wanted, brdf.wavelengths, row) for row in unit], axis=1)
-
-
-def _band_channels(path: str | os.PathLike[str], brdf: RglBrdf, bands: Bands) -> np.ndarray:
-    """Weights (channels, stored) of the stored wavelengths in channels that are integrals."""
-    if brdf.wavelengths is None:
-        return np.eye(3)
-    wavelength, weights = (np.asarray(each, dtype=float) for each in bands)
-    first, last = brdf.wavelengths[[0, -1]]
-    beyond = (wavelength < first) | (wavelength > last)
-    if np.any(np.abs(weights[beyond]).sum(axis=0) > _UNSEEN * np.abs(weights).sum(axis=0)):
-        raise DataError(
-            f"{path}: its spectra go from {first:g} to {last:g} nm, beyond which the sensor sees more than"
-            " 1 % of the light; give the surface wavelengths in place of a sensor"
-        )
-    unit = np.eye(brdf.wavelengths.size)
-    return weights.T @ np.stack([np.interp(wavelength, brdf.wavelengths, row) for row in unit], axis=1)
-
-
-def _described(brdf: RglBrdf, wavelengths: Sequence[float] | None, bands: Bands | None) -> str:
-    if brdf.wavelengths is None:
-        told = "R, G, B of linear sRGB"
-        return told if bands is not None else f'{told}, at wavelengths: give the surface sensor = "srgb"'
-    if bands is not None:
-        return "spectra integrated over the bands of the sensor"
-    names = ", ".join(f"{each:g}" for each in (WAVELENGTHS if wavelengths is None else wavelengths))
-    return f"spectra taken at {names} nm"
+    return np.stack(stored, axis=1), f"spectra taken at {names} nm"
 
 
 def is_tensor_file(path: str | os.PathLike[str]) -> bool:

@@ -110,21 +110,16 @@ def _kind(content: bytes) -> str | None:
         return "sp"
     if content.startswith(b"L~S ") or (content.startswith(_OLE) and _JASCO_STREAM in content):
         return "jws"
-    return "spc" if _is_spc(content) else None
-
-
-def _is_spc(content: bytes) -> bool:
-    """True for a plausible header of SPC: its version is one byte, which text may have too."""
+    # of SPC the version is one byte, which text may have too
     version = content[1] if len(content) > 1 else 0
     if version not in _SPC_VERSIONS or len(content) < _SPC_SHORTEST[version] or b"\0" not in content[:32]:
-        return False
+        return None
     points, first, last = struct.unpack_from(_SPC_HEADERS[version], content)
     axis_code, signal_code = content[16:18] if version == _SPC_OLD else content[28:30]
     ends = (abs(first), abs(last))
-    plausible = (
-        first != last and all(x == 0 or _SPC_SMALLEST < x < _SPC_LARGEST for x in ends) and points >= 1
-    )
-    return plausible and axis_code <= 31 and (signal_code <= 32 or signal_code >= 128)
+    plausible = first != last and all(x == 0 or _SPC_SMALLEST < x < _SPC_LARGEST for x in ends)
+    plausible = plausible and points >= 1 and axis_code <= 31 and (signal_code <= 32 or signal_code >= 128)
+    return "spc" if plausible else None
 
 
 def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:

@@ -118,8 +118,14 @@ class TextCells:
         """As `numbers`, cell by cell: names the first bad cell, and how many rows have one."""
         columns: list[list[float]] = [[] for _ in positions]
 
+        def complete(line: Line) -> bool:
+            cells = split(line.bare, self.delimiter)
+            numbers = [cells[position] if position < len(cells) else "" for position in positions]
+            valid = (is_number(x, self.decimal) and np.isfinite(float(x.replace(",", "."))) for x in numbers)
+            return all(valid)
+
         def faulty_after(row: int) -> int:
-            return sum(not self._complete(line, positions) for line in self.rows[row + 1 :])
+            return sum(not complete(line) for line in self.rows[row + 1 :])
 
         for row, line in enumerate(self.rows):
             cells = split(line.bare, self.delimiter)
@@ -153,13 +159,6 @@ class TextCells:
         count = others()
         more = f", and {count} more row{'s have' if count > 1 else ' has'} no number" if count else ""
         raise DataError(f"{where}{fault}{more}; {remedies[count > 0]}")
-
-    def _complete(self, line: Line, positions: Sequence[int]) -> bool:
-        cells = split(line.bare, self.delimiter)
-        numbers = [cells[position] if position < len(cells) else "" for position in positions]
-        return all(
-            is_number(cell, self.decimal) and np.isfinite(float(cell.replace(",", "."))) for cell in numbers
-        )
 
 
 @dataclass(frozen=True, eq=False)
