@@ -8,7 +8,7 @@ import numpy as np
 
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
-from pellicle.fitting.result import Fit, Part, Profile, Rival
+from pellicle.fitting.result import Fit, Profile, Rival
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import data_panels
 from pellicle.reporting.drawable import Band, Line, Panel, Section, Table
@@ -158,13 +158,10 @@ def _labelled(minima: list[tuple[float, float]], room: float) -> list[tuple[floa
 
 def index_is_free(fit: Fit) -> bool:
     """True where n or k was fitted and is worth a curve against wavelength."""
-    several = fit.index.wavelength.size > 1 or not all(_ellipsometric(part) for part in fit.parts)
+    ellipsometric = (isinstance(p.curve, Curve) and p.spectrum.ellipsometric for p in fit.parts)
+    several = fit.index.wavelength.size > 1 or not all(ellipsometric)
     curves = [fit.index, *fit.principal_indices.values()]
     return several and any(bool(np.any(c.n_stderr > 0) or np.any(c.k_stderr > 0)) for c in curves)
-
-
-def _ellipsometric(part: Part) -> bool:
-    return isinstance(part.curve, Curve) and part.spectrum.ellipsometric
 
 
 def index(fit: Fit) -> Section | None:

@@ -1,7 +1,7 @@
 """Tables of a fit: data, model and residuals; n and k; profiles of graded layers."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -133,35 +133,32 @@ def _samples(fit: Fit) -> str:
     columns: dict[str, Any] = {"file": names} if fit.joint else {}
     for name in DIRECTIONS:
         columns[name] = np.concatenate([getattr(part.samples, name) for part in fit.parts])
-    for c, name in enumerate(channels):
-        columns[name] = np.concatenate([part.samples.values[:, c] for part in fit.parts])
-    for c, name in enumerate(channels):
-        columns[f"model_{name}"] = np.concatenate([part.curve.model[:, c] for part in fit.parts])
-    return _text(fit, about, columns)
+    measured = np.concatenate([part.samples.values for part in fit.parts])
+    model = np.concatenate([part.curve.model for part in fit.parts])
+    columns |= dict(zip(channels, measured.T, strict=True))
+    return _text(fit, about, columns | {f"model_{c}": x for c, x in zip(channels, model.T, strict=True)})
 
 
 def _joint(fit: Fit) -> str:
-    about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
-    azimuths = any(isinstance(part.data, Spectrum) and part.data.azimuth is not None for part in fit.parts)
-    rows = [row for part in fit.parts for row in _joint_rows(part)]
-    columns = dict(zip(_JOINT, zip(*rows, strict=True), strict=True))
-    return _text(fit, about, {name: columns[name] for name in _JOINT[: None if azimuths else -1]})
-
-
-def _joint_rows(part: Part) -> Iterable[tuple[str | float, ...]]:
     """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour; Mueller elements one each.
 
     The angle of a BRDF sample is that of the light.
     """
-    data = part.data
-    unknown = np.full(len(part.curve.model), math.nan)
-    nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown
-    angle = data.theta_i if isinstance(data, BrdfSamples) else data.angle
-    azimuth = data.azimuth if isinstance(data, Spectrum) else None
-    for q in quantities(data, part.curve):
-        numbers = (nm, angle, q.data, q.model, q.residual, q.sigma, azimuth)
-        for row in zip(*(unknown if x is None else x for x in numbers), strict=True):
-            yield part.name, q.name, *row
+    about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
+    azimuths, rows = False, []
+    for part in fit.parts:
+        data = part.data
+        unknown = np.full(len(part.curve.model), math.nan)
+        nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown
+        angle = data.theta_i if isinstance(data, BrdfSamples) else data.angle
+        azimuth = data.azimuth if isinstance(data, Spectrum) else None
+        azimuths |= azimuth is not None
+        for q in quantities(data, part.curve):
+            numbers = (nm, angle, q.data, q.model, q.residual, q.sigma, azimuth)
+            of_points = zip(*(unknown if x is None else x for x in numbers), strict=True)
+            rows += [(part.name, q.name, *point) for point in of_points]
+    columns = dict(zip(_JOINT, zip(*rows, strict=True), strict=True))
+    return _text(fit, about, {name: columns[name] for name in _JOINT[: None if azimuths else -1]})
 
 
 def _text(fit: Fit, about: Sequence[str], columns: dict[str, Any]) -> str:

@@ -146,7 +146,14 @@ def statistic_rows(fit: Fit) -> list[tuple[str, str]]:
         over = "" if fit.parts[0].data.sigma is None else " over sigma"
         rows.append(("compared", _RESIDUALS[fit.layer_test.residual] + over))
     for part in fit.parts:
-        rows += [*_residuals(part), *_sweeps(part, len(fit.free))]
+        rows += _residuals(part)
+        lack = lack_of_fit(part, len(fit.free))
+        if lack is not None:  # the scatter of repeated sweeps, and what it makes of the residuals
+            unit = " degrees" if part.spectrum.delta is not None else ""
+            scatter = f"{lack.sweeps}, of which a point scatters by {lack.repeatability:.2g}{unit}"
+            of = f" of {part.name}" if part.name else ""
+            text = f"{scatter}; {lack.verdict} (probability {lack.probability:.2g})"
+            rows.append((f"sweeps{of}", text))
     chi2 = ("reduced chi-square", f"{fit.chi2_reduced:.4g}")
     return [*rows, chi2, ("seconds", f"{fit.seconds:.2f}")]
 
@@ -177,17 +184,6 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
         share = np.sqrt(np.mean(curve.depolarisation_residual**2))
         rows.append(("of depolarisation", f"{share:.4g}"))
     return rows
-
-
-def _sweeps(part: Part, free: int) -> list[tuple[str, str]]:
-    """Scatter of the repeated sweeps of one part, and what it makes of the residuals."""
-    lack = lack_of_fit(part, free)
-    if lack is None:
-        return []
-    unit = " degrees" if part.spectrum.delta is not None else ""
-    scatter = f"{lack.sweeps}, of which a point scatters by {lack.repeatability:.2g}{unit}"
-    of = f" of {part.name}" if part.name else ""
-    return [(f"sweeps{of}", f"{scatter}; {lack.verdict} (probability {lack.probability:.2g})")]
 
 
 LEAST_CORRELATION = 0.5

@@ -53,7 +53,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
             for effect in fit.budget
         ],
         "plan": [
-            _named(part.name) | taken(row, "effect", "on", "why", "error_bound")
+            ({"name": part.name} if part.name else {}) | taken(row, "effect", "on", "why", "error_bound")
             for part in fit.parts
             for row in part.plan.rows
         ],
@@ -78,11 +78,6 @@ def taken(record: object, *names: str) -> dict[str, Any]:
 def _known(record: object, *names: str) -> dict[str, Any]:
     """Attributes that are not None."""
     return {name: value for name, value in taken(record, *names).items() if value is not None}
-
-
-def _named(name: str) -> dict[str, str]:
-    """The name of a spectrum, which those of a joint fit have."""
-    return {"name": name} if name else {}
 
 
 def _part(part: Part, fit: Fit) -> dict[str, Any]:

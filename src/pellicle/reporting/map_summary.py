@@ -142,16 +142,11 @@ def summarise(made: Dataset | Map) -> MapSummary:
     used = is_decided(np.asarray(thin["status"]))
     parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
     rates = summarise_rates(thin)
-    about = dict(dataset.attrs)
-    return MapSummary(axes, counts, places, parameters, _step(axes), about, _plan(dataset), run, rates)
-
-
-def _plan(dataset: Dataset) -> tuple[Mapping[str, Any], ...]:
-    """Rows of the plan, with that of the neighbours."""
-    stored, counted = dataset.attrs.get("plan"), evidence(dataset)
-    rows = [] if stored is None else json.loads(stored)
-    named = any(each["effect"] == "neighbours" for each in rows)
-    return (*rows, *([asdict(row(counted))] if counted is not None and not named else []))
+    about, counted = dict(dataset.attrs), evidence(dataset)
+    plan = json.loads(about["plan"]) if about.get("plan") is not None else []
+    if counted is not None and all(effect["effect"] != "neighbours" for effect in plan):
+        plan.append(asdict(row(counted)))
+    return MapSummary(axes, counts, places, parameters, _step(axes), about, tuple(plan), run, rates)
 
 
 def thinned(dataset: Dataset, axes: MapAxes) -> Dataset:

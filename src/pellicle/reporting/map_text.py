@@ -44,10 +44,14 @@ def cube_report(made: Dataset | Map, summary: MapSummary | None = None) -> str:
     `summary` is that of the map, if it has been computed.
     """
     summary = summarise(made) if summary is None else summary
+    parameters = [line for p in summary.parameters for line in facts(parameter_rows(p))]
+    if summary.sampled > 1 and parameters:
+        every = ordinal(summary.sampled)
+        parameters += wrapped(f"Percentiles are those of every {every} pixel in each direction.")
     blocks = [
         ("Map", [*wrapped(in_words(summary)), *facts(file_rows(summary))]),
         ("Status: what to do", facts(status_rows(summary))),
-        (decided_in_words(summary), _parameters(summary)),
+        (decided_in_words(summary), parameters),
         ("Rate of change: a straight line through the times", facts(rate_rows(summary))),
         ("Errors", wrapped(ERRORS)),
         ("Plan: what was simulated", facts(plan_rows(summary))),
@@ -128,7 +132,10 @@ def _time(run: Run) -> str:
     """`3.2 s, 81 000 pixels/s`, with the time of compilation and the pixels of an earlier run."""
     if not run.pixels:
         return "all pixels are of an earlier run"
-    parts = [f"{run.seconds:.3g} s", f"{_rounded(_rate(run))} pixels/s"]
+    rate = _rate(run)
+    digits = max(0, math.floor(math.log10(rate)) - 2) if rate > 0 else 0  # three are shown
+    speed = f"{round(rate, -digits):,.0f}".replace(",", " ")
+    parts = [f"{run.seconds:.3g} s", f"{speed} pixels/s"]
     if run.compiling > 0.1 * run.seconds:
         parts.insert(1, f"{run.compiling:.2g} s of it compilation")
     if run.workers > 1:
@@ -143,12 +150,6 @@ def _rate(run: Run) -> float:
     return run.pixels / max(run.seconds - run.compiling, 1e-3)
 
 
-def _rounded(value: float) -> str:
-    """Three digits, thousands apart."""
-    digits = max(0, math.floor(math.log10(value)) - 2) if value > 0 else 0
-    return f"{round(value, -digits):,.0f}".replace(",", " ")
-
-
 def decided_in_words(made: MapSummary) -> str:
     """The number of pixels whose parameters can be used, and their statuses."""
     if not made.decided:
@@ -157,39 +158,25 @@ def decided_in_words(made: MapSummary) -> str:
     return f"Parameters at the {made.decided} {made.axes.points} with status {words}"
 
 
-def _parameters(made: MapSummary) -> list[str]:
-    lines = [line for p in made.parameters for line in facts(parameter_rows(p))]
-    if made.sampled == 1 or not lines:
-        return lines
-    return [
-        *lines,
-        *wrapped(f"Percentiles are those of every {ordinal(made.sampled)} pixel in each direction."),
-    ]
-
-
 def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:
     """Median, range, standard error and slope of a parameter; the first row bears its name."""
-    least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
-    unit = f" {p.unit}" if p.unit else ""
     if not math.isfinite(p.percentiles[2]):
         return []
+    least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
+    unit = f" {p.unit}" if p.unit else ""
+    stderr, noise = _error(p.stderr, unit), _error(p.stderr_noise, unit)
     rows = [
         (p.name, f"median {middle}{unit}, 5 to 95 %: {low} to {high}{unit}, all: {least} to {largest}{unit}"),
-        (
-            "",
-            f"standard error {_error(p.stderr, unit)} (median), of the noise {_error(p.stderr_noise, unit)}",
-        ),
+        ("", f"standard error {stderr} (median), of the noise {noise}"),
     ]
     if p.plane is not None:
         slopes = ", ".join(f"{name} {slope:+.3g}" for name, slope in p.plane.slopes.items())
         shape = "plane" if len(p.plane.slopes) > 1 else "line"
-        rows.append(
-            (
-                "",
-                f"a {shape} explains {share_of_variance(p.plane.explains)} % of the variance: slope {slopes}"
-                f" {p.plane.unit}, rms beside it {_error(p.plane.rms, unit)}",
-            )
+        text = (
+            f"a {shape} explains {share_of_variance(p.plane.explains)} % of the variance: slope {slopes}"
+            f" {p.plane.unit}, rms beside it {_error(p.plane.rms, unit)}"
         )
+        rows.append(("", text))
     return rows
 
 

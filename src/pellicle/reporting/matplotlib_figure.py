@@ -268,8 +268,16 @@ def _arrange(figure: Figure, grid: list[list[Axes]], rows: list[Sequence[Panel]]
     Here heights are those of lines of text, and only the labels beside the panels are measured.
     """
     heights = [row[0].height for row in rows]
-    above = [_TEXT * _lines_above(axes_row, row) for axes_row, row in zip(grid, rows, strict=True)]
-    below = [_room_below(axes_row) for axes_row in grid]
+    above, below = [], []
+    for axes_row, row in zip(grid, rows, strict=True):
+        legend = axes_row[-1].get_legend()
+        lines = int(any(axes.get_title(loc="left") for axes in axes_row))
+        if legend is not None and any(panel.legend == "above" for panel in row):
+            lines += -(-len(legend.get_texts()) // 8)  # in rows of eight names
+        above.append(_TEXT * lines)
+        numbered = any(axes.xaxis.get_tick_params().get("labelbottom", True) for axes in axes_row)
+        named = any(axes.get_xlabel() for axes in axes_row)
+        below.append(_AXIS if named else _NUMBERS if numbered else _GAP)
     top = _TEXT * (title.count("\n") + 1) + 2 * _GAP if title else _GAP
     width, height = figure.get_figwidth(), top + sum(above) + sum(heights) + sum(below)
     figure.set_size_inches(width, height)
@@ -296,18 +304,3 @@ def _arrange(figure: Figure, grid: list[list[Axes]], rows: list[Sequence[Panel]]
         each = (1 - left - right - between * (len(axes_row) - 1)) / len(axes_row)
         for j, axes in enumerate(axes_row):
             axes.set_position((left + j * (each + between), bottom, each, own / height))
-
-
-def _lines_above(axes_row: Sequence[Axes], row: Sequence[Panel]) -> int:
-    """Lines of text above a row: titles at the left, and a legend in rows of eight names."""
-    legend = axes_row[-1].get_legend()
-    above = legend is not None and any(panel.legend == "above" for panel in row)
-    titled = any(bool(axes.get_title(loc="left")) for axes in axes_row)
-    return titled + (-(-len(legend.get_texts()) // 8) if legend is not None and above else 0)
-
-
-def _room_below(row: Sequence[Axes]) -> float:
-    if any(axes.get_xlabel() for axes in row):
-        return _AXIS
-    numbered = any(axes.xaxis.get_tick_params().get("labelbottom", True) for axes in row)
-    return _NUMBERS if numbered else _GAP

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from arviz import InferenceData
     from matplotlib.figure import Figure
 
-    from pellicle.sampling.result import Posterior, Prediction
+    from pellicle.sampling.result import Prediction
 
 _LEAST_MASS = 0.005
 """Minima with less of the posterior are not listed."""

@@ -37,8 +37,10 @@ def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: 
     where the files are repeated measurements.
     """
     links = [None if each is None else quote(each) for each in pages]
-    names = _parameters(records)
     every = [record["parameters"] for record in records]
+    shown = (name for p in every for name in p if p[name]["free"] and not NUISANCE.fullmatch(name))
+    # those of the instrument are the last ones
+    names = sorted(dict.fromkeys(shown), key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
     units = {name: next((p[name]["unit"] for p in every if name in p), "") for name in names}
     drawn = _figure(records, links, names[0], units[names[0]]) if names else None
     rows = [_row(record, link, names) for record, link in zip(records, links, strict=True)]
@@ -58,17 +60,6 @@ def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: 
         counts=[(status, TONES[Status(status)], number) for status, number in counts.most_common()],
         repeats=scatter,
     )
-
-
-def _parameters(records: Sequence[Record]) -> list[str]:
-    """Names of free parameters, those of the instrument last, without scale and offset."""
-    names = dict.fromkeys(
-        name
-        for record in records
-        for name, p in record["parameters"].items()
-        if p["free"] and not NUISANCE.fullmatch(name)
-    )
-    return sorted(names, key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
 
 
 def _row(record: Record, link: str | None, names: Sequence[str]) -> dict[str, Any]:

@@ -47,9 +47,8 @@ def fit_page(
     "predictive"); `again`, what repeats the fit: descriptions and texts to copy.
     """
     of_data = [figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
-    misfit, index = figures.of_misfit(fit), figures.of_index(fit)
-    section = surface = None
-    shown = [*of_data, *(each for each in (misfit, index) if each)]
+    misfit, index, section, surface = figures.of_misfit(fit), figures.of_index(fit), None, None
+    shown = [*of_data, *(drawn for drawn in (misfit, index) if drawn)]
     if posterior is not None:
         section = posterior_section(posterior, pictures or {})
         shown.append(section["trace"])

@@ -41,8 +41,11 @@ def repetition(
             return [*result, *([("Recipe", recipe_in(Path()))] if recipe_in else _written(fit))]
         except UsageError:
             return result
-    text = _text(Path(recipe))
-    return result if text is None else [*result, (f"Recipe {Path(recipe).name}", text)]
+    try:
+        text = Path(recipe).read_text(encoding="utf-8")
+    except (OSError, ValueError):  # it has gone since
+        return result
+    return result if len(text) > _LONGEST else [*result, (f"Recipe {Path(recipe).name}", text)]
 
 
 def _word(value: Any) -> str:
@@ -69,15 +72,6 @@ def _written(fit: Fit) -> list[tuple[str, str]]:
         return [("Recipe", recipe_text(own, files=[data.path] if data.path else []))]
     except UsageError:
         return []
-
-
-def _text(path: Path) -> str | None:
-    """The text of a recipe, None where it has gone since, or is too long."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return None
-    return text if len(text) <= _LONGEST else None
 
 
 _GRANIER = "X. Granier and W. Heidrich: A simple layered RGB BRDF model. Pacific Graphics 2002."

@@ -17,6 +17,7 @@ from pellicle.reporting.figures import rival_label
 from pellicle.reporting.page.document import picture
 from pellicle.reporting.plotly_figure import figure
 from pellicle.reporting.renderings import display
+from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 from pellicle.simulation.environment import EYE, sphere
 
@@ -55,8 +56,11 @@ def _views(name: str, numbers: Any, normals: Any) -> Views:
 
 def surface_section(fit: Fit) -> dict[str, Any]:
     """The figure of lobes, with those of rivals, and the rendering of a sphere."""
-    best, *rivals = (_at(fit, changed) for changed in ({}, *(rival.parameters for rival in fit.rivals)))
-    names = _names(fit.surface)
+    fitted = {name: p.value for name, p in fit.parameters.items()}
+    numbers = [fitted, *(fitted | dict(rival.parameters) for rival in fit.rivals)]
+    best, *rivals = (with_values(fit.surface, values) for values in numbers)
+    count = fit.surface.channels
+    names = ["R", "G", "B"] if count == 3 else [f"channel {i + 1}" for i in range(count)]
     with jax.enable_x64(True):
         lobes, pixels = _seen(best)
         of_rivals = [_seen(own).lobes for own in rivals]
@@ -88,20 +92,8 @@ def _panels(lobes: np.ndarray, names: list[str]) -> list[Panel]:
     return panels
 
 
-def _at(fit: Fit, changed: dict[str, float]) -> Surface:
-    """The fitted surface, with some of its numbers changed."""
-    values = {name: p.value for name, p in fit.parameters.items()} | changed
-    surface = with_values(fit.surface, values)
+def _seen(surface: Scene | Surface) -> Views:
     assert isinstance(surface, Surface)
-    return surface
-
-
-def _names(surface: Surface) -> list[str]:
-    count = surface.channels
-    return ["R", "G", "B"] if count == 3 else [f"channel {i + 1}" for i in range(count)]
-
-
-def _seen(surface: Surface) -> Views:
     numbers = {key: np.asarray(value, dtype=float) for key, value in surface.start_numbers().items()}
     views = _views(surface.model, numbers, sphere(_SIZE).normal)
     return Views(*map(np.asarray, views))
