@@ -242,13 +242,7 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
     warnings += [f"{each.path}: its fit is {each.status}" for each in unclear]
     names, compared = dict.fromkeys(p.name for _, fit in used for p in fit.free), {}
     for name in names:
-        # a parameter that rests on a bound does not scatter
-        known = [
-            (path, fit, p)
-            for path, fit in used
-            if (p := fit.parameters.get(name)) and p.free and not p.at_bound
-            if p.stderr_noise > 0 and math.isfinite(p.stderr)
-        ]
+        known = [(path, fit, p) for path, fit in used if (p := fit.parameters.get(name)) and _usable(p)]
         if len(known) < 2:
             continue
         compared[name] = _repeated(name, [p for *_, p in known])
@@ -257,6 +251,11 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
     if not compared:
         raise UsageError(f"no parameter has a finite error in two of the {len(used)} repeats")
     return Repeats(every, compared, tuple(n for n in names if n not in compared), tuple(warnings))
+
+
+def _usable(p: Estimate) -> bool:
+    """True for a free parameter with an error; one that rests on a bound does not scatter."""
+    return p.free and not p.at_bound and p.stderr_noise > 0 and math.isfinite(p.stderr)
 
 
 def _repeated(name: str, estimates: Sequence[Estimate]) -> RepeatedParameter:
