@@ -64,14 +64,13 @@ def fit(
     """
     check_measurement(data)
     check_scene(scene, several=True)
+    both: Any = data, scene
     if joint.of_both_kinds(scene):
-        both: Any = data, scene
-        return joint.fitted(*both, tolerance, progress, loss, residual)[0]
+        return joint.fitted(both[0], both[1], tolerance, progress, loss, residual)[0]
     if isinstance(scene, Surface):
         return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)
-    films: Any = measured(OF_A_FILM, data), scene
-    return fit_spectra(*films, tolerance=tolerance, loss=loss, progress=progress)
+    return fit_spectra(measured(OF_A_FILM, data), both[1], tolerance=tolerance, loss=loss, progress=progress)
 
 
 def sample(
