@@ -123,10 +123,8 @@ def table(
     terms = np.array([np.broadcast_to(t, points) for t in chebyshev(data.position, max(gains, 3))])
     offset_sd = offset_sd * (1.0 if free_scale else level)
     basis = _Basis(weight, scale, mean, terms, gain_sd, _offset_columns(weight, terms, offset_sd, gains))
-    blocks = [
-        basis.block(signal[first : first + _BATCH], slope[first : first + _BATCH][:, list(order)], near_by)
-        for first, near_by in ((i, near[i : i + _BATCH]) for i in range(0, len(units), _BATCH))
-    ]
+    parts = (slice(first, first + _BATCH) for first in range(0, len(units), _BATCH))
+    blocks = [basis.block(signal[own], slope[own][:, list(order)], near[own]) for own in parts]
     columns = np.concatenate([block.columns for block in blocks], axis=2)
     square, moved, limit, back, gain = (
         np.concatenate([getattr(block, name) for block in blocks]) for name in _Block._fields[1:]
