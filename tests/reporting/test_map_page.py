@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pellicle.mapping.pixels.results import CODES
+from pellicle.reporting.map_files import map_page
 from pellicle.reporting.map_summary import summarise
-from pellicle.reporting.map_text import map_page
 from tests.reporting.test_map_text import image, made
 from tests.reporting.test_page import Page
 

@@ -1,4 +1,4 @@
-"""Report, JSON record, page and folder of the map of a cube.
+"""Report and JSON record of the map of a cube.
 
 They have the shares of the statuses and where they are, values, errors and figures.
 """
@@ -6,22 +6,15 @@ They have the shares of the statuses and where they are, values, errors and figu
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
-from pellicle.files import write_text
 from pellicle.fitting.result import Status
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels.results import BY_NEIGHBOURS, NO_DATA
 from pellicle.reporting.fit_text import ADVICE
-from pellicle.reporting.folders import PAGE, REPORT
-from pellicle.reporting.json_record import strict, taken, versions, write_result
+from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise
-from pellicle.reporting.matplotlib_figure import save_figure
-from pellicle.reporting.page.document import Table, page, picture
 from pellicle.reporting.plain_text import block, facts, wrapped
 
 if TYPE_CHECKING:
@@ -244,53 +237,3 @@ def _parameter_json(p: ParameterSummary) -> dict[str, Any]:
     record = taken(p, "variable", "unit") | dict(zip(names, p.percentiles, strict=True))
     plane = {} if p.plane is None else {"plane": asdict(p.plane)}
     return record | taken(p, "stderr", "stderr_noise") | plane
-
-
-def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map) -> Path:
-    """Write result.json, report.txt, report.html and figures of a map, and return the folder.
-
-    Each file appears complete or not at all.
-
-    **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
-    """
-    from pellicle.reporting.map_figures import figures
-
-    summary, images = summarise(made), {}
-    target = write_result(folder, cube_json(made, summary), {REPORT: cube_report(made, summary)})
-    for name, figure in figures(made, summary):
-        path = save_figure(figure, target / f"{name}.png", overwrite=True)
-        images[name] = path.read_bytes()
-    write_text(target / PAGE, map_page(summary, images), overwrite=True)
-    return target
-
-
-def map_page(summary: MapSummary, images: Mapping[str, bytes]) -> str:
-    """Format the map of a cube as a page.
-
-    **Arguments:** `images`, the PNG image of each figure by its name, "map" first.
-    """
-    about = {
-        "map": "Values, standard errors, statuses and histogram",
-        "rival": "How much worse the best other answer of each pixel fits",
-    }
-    sentence = in_words(summary)
-    parameters = [row for p in summary.parameters for row in parameter_rows(p)]
-    path = str(summary.attributes.get("path", "")).replace("\\", "/")
-    return page(
-        "map.html",
-        f"Map of {PurePosixPath(path).name}" if path else "Map",
-        [],
-        tone="good" if 2 * summary.decided >= summary.with_data > 0 else "warn",
-        sentence=sentence,
-        decided=decided_in_words(summary),
-        pictures=[
-            picture(image, f"{about.get(name, f'{name}: values, standard errors and histogram')}. {sentence}")
-            for name, image in images.items()
-        ],
-        errors=ERRORS,
-        parameters=Table(decided_in_words(summary), (), parameters),
-        rates=Table("Rate of change: a straight line through the times", (), rate_rows(summary)),
-        statuses=Table("Statuses, and what to do", (), status_rows(summary)),
-        plan=Table("Effects of the simulation", (), plan_rows(summary)),
-        file=Table("File, and how it was read", (), file_rows(summary)),
-    )

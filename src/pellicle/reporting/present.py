@@ -67,10 +67,10 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
     # the module of a cube's map needs an optional package: no import, no such object
     module = sys.modules.get("pellicle.mapping.map_result")
     if module is not None and isinstance(result, module.Map):
-        from pellicle.reporting import map_figures, map_text
+        from pellicle.reporting import map_figures, map_files, map_text
 
         ways = _Ways(
-            map_text.cube_report, lambda made: next(map_figures.figures(made))[1], map_text.write_cube_map
+            map_text.cube_report, lambda made: next(map_figures.figures(made))[1], map_files.write_cube_map
         )
     way = None if ways is None else getattr(ways, name)
     if way is None:
