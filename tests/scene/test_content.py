@@ -5,7 +5,7 @@ import numpy as np
 import pellicle as pl
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import measured
-from pellicle.scene.free import KEPT, Content, remembered
+from pellicle.scene.free import KEPT, Content, constant, remembered
 
 NM = np.linspace(400.0, 800.0, 64)
 
@@ -41,13 +41,22 @@ def test_a_result_is_computed_once_for_equal_arguments_and_few_are_kept():
         calls.append(factor)
         return float(factor * np.sum(numbers))
 
-    assert total(NM, 2.0) == total(NM.copy(), 2.0) == total(Content(NM), 2.0) == 2 * NM.sum()
+    assert total(NM, 2.0) == total(NM.copy(), 2.0) == total(constant(NM.copy()), 2.0) == 2 * NM.sum()
     assert calls == [2.0]
     assert total(NM + 1, 2.0) == 2 * NM.sum() + 128
     for factor in range(KEPT):
         total(NM, float(factor + 10))
     total(NM, 2.0)
     assert calls.count(2.0) == 3
+
+
+def test_the_content_of_a_constant_is_read_once():
+    numbers = constant(NM.copy())
+    total = remembered(lambda numbers: float(numbers.sum()))
+    before = total(numbers)
+    numbers += 1.0  # what nobody may do
+    assert total(numbers) == before
+    assert total(numbers.copy()) == numbers.sum()
 
 
 def test_spectra_of_one_scene_and_grid_share_its_structure():
