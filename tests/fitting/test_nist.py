@@ -132,7 +132,8 @@ def test_certified_standard_deviations(name):
     scene = pl.Scene(pl.Layer(1.5, 100.0), 1.5)  # its instrument has no scale and no offset to solve for
     data = Data(problem.y, np.ones(points), np.linspace(-1, 1, points), 1.0, 1.0)
     takes = tuple(range(free))
-    view = SpectrumView("", pl.plan(scene), scene, data, takes, Noise(), points, 1, 1.0, scene.light.kind)
+    about = takes, Noise(), points, 1, 1.0, scene.light.kind, [np.arange(points)]
+    view = SpectrumView("", pl.plan(scene), scene, data, *about)
     # the unit of each parameter is its own size, as the range of its bounds is in a fit
     bounds = box(np.zeros(free), np.abs(result), [None] * free)
     parameters = tuple(Parameter(f"b{i + 1}", f"b{i + 1}", "", 0.0, 0.0, 1.0) for i in takes)
