@@ -41,7 +41,7 @@ def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
 
 
 def _parts(cost: Cost | SurfaceCost) -> list[Comparison]:
-    """What was compared: methods, solvers and intervals of a film, colours and values of a surface."""
+    """Comparisons of methods, solvers and intervals of a film, of colours and of values of a surface."""
     if isinstance(cost, Cost):
         parts = (cost.methods, cost.solvers, cost.intervals)
     else:

@@ -179,7 +179,7 @@ class Signal(ABC):
     every: ClassVar[tuple[str, ...]] = ()
     """Parts that it may have, in the order of the simulated light."""
     expected: ClassVar[str] = ""
-    """What a name among them must be, for a message."""
+    """Description of the allowed names of a list of them, for a message."""
     parts: tuple[str, ...] = ()
     """Names of the columns of `values`; empty for one column."""
     depolarisation: bool = False

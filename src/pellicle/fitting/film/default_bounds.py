@@ -106,7 +106,7 @@ def _moved(p: Parameter, value: float) -> Parameter:
 
 
 def _slabs(problem: Problem, before: Sequence[Parameter]) -> Iterator[Problem]:
-    """What was added to the box of a problem on each side of each parameter, with all of the others' bounds.
+    """Boxes beside that of a problem on each side of each parameter, with all of the others' bounds.
 
     Thin slabs are left out: what they contain is near the minima that rest on the bound.
     """

@@ -182,8 +182,11 @@ class _Block(NamedTuple):
 
 
 class _Basis(NamedTuple):
-    """What the columns of all nodes share: see `Lookup`. `terms` (terms, points) are those of the nuisances,
-    `gain_sd` the priors of the scale's, and `rotation` are the offset's columns."""
+    """Common part of the columns of all nodes: see `Lookup`.
+
+    `terms` (terms, points) are those of the nuisances, `gain_sd` the priors of the scale's, and `rotation`
+    are the offset's columns.
+    """
 
     weight: np.ndarray
     scale: float
