@@ -109,7 +109,7 @@ def medium(
         word = str(value).strip()
         if folder is not None and Path(word).suffix.lower() in MATERIAL_SUFFIXES:
             word = str(folder / word)
-        dispersion = _word(word, name)
+        dispersion = _index_model_or_material(word, name)
     return free_numbers(dispersion, free)
 
 
@@ -130,39 +130,33 @@ def scattering_back(
     return Constant(1.0), 0.0
 
 
-def _word(text: str, name: str) -> AbstractDispersion:
+def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
+    """The dispersion of a word. Raises UsageError."""
     try:
         index = complex(re.sub("i$", "j", text.replace(" ", "")))
     except ValueError:
-        return _model_or_material(text, name)
-    if not np.isfinite(index) or index.real < 0 or index.imag < 0:
+        index = None
+    if index is not None:
+        if np.isfinite(index) and index.real >= 0 and index.imag >= 0:
+            return Constant(index.real, index.imag if index.imag else None)
         raise UsageError(f"{name} must be an index n + ik with n and k finite and not negative, got {text}")
-    return Constant(index.real, index.imag if index.imag else None)
-
-
-def _model_or_material(text: str, name: str) -> AbstractDispersion:
     match = _CALL.fullmatch(text)
-    if match is None or match[1].lower() not in MODELS:
-        return _material(text)
-    model, numbers = match[1].lower(), match[2]
-    if numbers is None:
-        return free_model(model)
-    label = f"{name}: a parameter of {model}"
-    return fixed_model(model, [parse_number(v, label) for v in numbers.split(",") if v.strip()], name)
-
-
-def _material(name: str) -> AbstractDispersion:
+    if match is not None and (model := match[1].lower()) in MODELS:
+        if match[2] is None:
+            return free_model(model)
+        label = f"{name}: a parameter of {model}"
+        return fixed_model(model, [parse_number(v, label) for v in match[2].split(",") if v.strip()], name)
     try:
-        return material(name)
+        return material(text)
     except UnknownMaterial as error:
-        if name.lower() in (*MIXTURES, "oscillators"):
-            raise UsageError(f"{name} consists of several parts: describe it in a recipe") from None
-        if _DECIMAL_COMMA.fullmatch(name):
+        if text.lower() in (*MIXTURES, "oscillators"):
+            raise UsageError(f"{text} consists of several parts: describe it in a recipe") from None
+        if _DECIMAL_COMMA.fullmatch(text):
             raise UsageError(
-                f"{name!r} is no material; an index has a decimal point: {name.replace(',', '.')}"
+                f"{text!r} is no material; an index has a decimal point: {text.replace(',', '.')}"
             ) from None
-        close = did_you_mean(name.lower(), MODELS, 0.8)
-        raise UsageError(f"no material or model {name!r}{close}" if close else str(error)) from None
+        close = did_you_mean(text.lower(), MODELS, 0.8)
+        raise UsageError(f"no material or model {text!r}{close}" if close else str(error)) from None
 
 
 def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
@@ -199,15 +193,12 @@ def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> 
 
 
 def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
-    if name == "oscillators":
-        return _oscillators(values)
-    _check_word(name, [*MODELS, "oscillators"], "dispersion model")
-    parameter, more = (_parameters, ["knots"]) if name in SPLINES else (_parameter, [])
-    _check_keys(values, [*MODELS[name], *more], f"{name} has no parameter")
-    return build_model(name, {key: parameter(key, value) for key, value in values.items()})
-
-
-def _oscillators(values: dict[str, Any]) -> AbstractDispersion:
+    """A model by its name, or a sum of oscillators."""
+    if name != "oscillators":
+        _check_word(name, [*MODELS, "oscillators"], "dispersion model")
+        parameter, more = (_parameters, ["knots"]) if name in SPLINES else (_parameter, [])
+        _check_keys(values, [*MODELS[name], *more], f"{name} has no parameter")
+        return build_model(name, {key: parameter(key, value) for key, value in values.items()})
     terms = values.pop("terms", None)
     eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
     _check_keys(values, ("eps_inf", "terms"), "oscillators has no parameter")
@@ -329,10 +320,8 @@ def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> Abstra
                 " media, or to the angles of its axis"
             )
         bounds = parse_range(words, f"the range of {name}") if words else None
-        if name in ("n", "k"):
-            dispersion = _free_index(dispersion, name, bounds)
-        else:
-            dispersion = _free_parameter(dispersion, name, bounds)
+        free = _free_index if name in ("n", "k") else _free_parameter
+        dispersion = free(dispersion, name, bounds)
     return dispersion
 
 
@@ -342,7 +331,8 @@ def _free_parameter(
     """Free the model's own number of that name within `bounds` or the model's default ones."""
     leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
     numbers = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
-    known = {locate_parameter(dispersion, leaves[i][0]).name: i for i in numbers}
+    located = [locate_parameter(dispersion, leaves[i][0]) for i in numbers]
+    known = {at.name: (at, i) for at, i in zip(located, numbers, strict=True)}
     if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
         raise UsageError(f"cannot free {name!r}: the layer has no such number; n and k can always be freed")
     if name not in known:
@@ -350,12 +340,11 @@ def _free_parameter(
         listed = f"{', '.join(first)} and {last}" if first else last
         close = did_you_mean(name, known)
         raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
-    path, leaf = leaves[known[name]]
-    free = Free(*bounds) if bounds else free_by_default(locate_parameter(dispersion, path), leaf)
-    if free is None:
-        raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
+    at, position = known[name]
     replaced = [leaf for _, leaf in leaves]
-    replaced[known[name]] = free
+    replaced[position] = Free(*bounds) if bounds else free_by_default(at, replaced[position])
+    if replaced[position] is None:
+        raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
     return check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
 
 

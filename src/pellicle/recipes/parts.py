@@ -8,6 +8,7 @@ every key; the functions of each part add what differs.
 
 import os
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
@@ -52,33 +53,34 @@ def written_number(thing: Any, name: str) -> float | dict[str, Any]:
     if isinstance(thing, Free):
         limits = {} if thing.limits is None else {"limits": [*thing.limits]}
         start = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"value": thing.start}
-        return {**start, "lower": thing.lower, "upper": thing.upper, **limits, **_prior(thing)}
+        bounds, prior = {**start, "lower": thing.lower, "upper": thing.upper, **limits}, thing.prior
+        if prior is None:
+            return bounds
+        if isinstance(prior, Normal):
+            return bounds | {"prior": {"mean": prior.mean, "sd": prior.sd}}
+        return bounds | {
+            "prior": {"half_normal": prior.sd} if isinstance(prior, HalfNormal) else {"log_uniform": True}
+        }
     if isinstance(thing, bool) or np.ndim(thing) != 0 or not hasattr(thing, "__float__"):
         raise UsageError(f"{name} must be a number or pl.Free(lower, upper) in a recipe, not {thing!r}")
     return float(thing)
 
 
-def _prior(free: Free) -> dict[str, Any]:
-    if free.prior is None:
-        return {}
-    if isinstance(free.prior, Normal):
-        return {"prior": {"mean": free.prior.mean, "sd": free.prior.sd}}
-    if isinstance(free.prior, HalfNormal):
-        return {"prior": {"half_normal": free.prior.sd}}
-    return {"prior": {"log_uniform": True}}
-
-
 def layer_medium(dispersion: AbstractDispersion, name: str, folder: Path) -> dict[str, Any]:
     """Return the keys `material`, and `free` where it needs it, of a layer. Raises as `medium` does."""
     if isinstance(dispersion, Shifted) or _has_default_bounds(dispersion):
+        # items of `free`: those of default bounds, and any of a shifted index
+        items = []
+        for path, free in free_leaves(dispersion):
+            key = locate_parameter(dispersion, path).name
+            if free.limits is not None:
+                items.append(key)
+            elif isinstance(dispersion, Shifted):
+                items.append(f"{key}={free.lower!r}:{free.upper!r}")
         for base in _without_default_bounds(dispersion):
-            items = _freed(dispersion)
-            try:
-                again = same(free_numbers(base, items), dispersion)
-            except UsageError:
-                continue
-            if again:
-                return {"material": written_medium(base, name, folder), "free": items}
+            with suppress(UsageError):
+                if same(free_numbers(base, items), dispersion):
+                    return {"material": written_medium(base, name, folder), "free": items}
     return {"material": written_medium(dispersion, name, folder)}
 
 
@@ -87,8 +89,13 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
 
     **Raises:** UsageError for a medium that a recipe cannot express, naming it by `name`.
     """
-    for kind in _words(dispersion):
-        return kind
+    if _has_default_bounds(dispersion):
+        for model in MODELS:
+            if same(free_model(model), dispersion):
+                return model
+        spline = _NAME.get(type(dispersion))
+        if spline in SPLINES and same(fixed_model(spline, dispersion.knots, spline), dispersion):
+            return f"{spline}({','.join(repr(x) for x in dispersion.knots)})"
     if isinstance(dispersion, Material):
         return _material(dispersion, folder)
     if isinstance(dispersion, Constant):
@@ -111,7 +118,11 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         keys = {f"{key}{i}": x for i, pair in terms for key, x in zip("BC", pair, strict=True)}
         return {"model": "sellmeier"} | {key: written_number(x, f"{name}: {key}") for key, x in keys.items()}
     if isinstance(dispersion, Oscillators):
-        return _oscillators(dispersion, name)
+        eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
+        terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
+        if len(terms) != 1:
+            return {"model": "oscillators", **eps_inf, "terms": terms}
+        return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
     if kind in KINDS.values() and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:
         return {"model": _NAME[kind], **_numbers(dispersion, name)}
     raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
@@ -163,14 +174,6 @@ def _constant(dispersion: Constant, name: str) -> Any:
     return f"{n!r}+{k!r}j" if k else n
 
 
-def _oscillators(dispersion: Oscillators, name: str) -> dict[str, Any]:
-    eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
-    terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
-    if len(terms) != 1:
-        return {"model": "oscillators", **eps_inf, "terms": terms}
-    return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
-
-
 def _numbers(module: AbstractDispersion | AbstractOscillator | Any, name: str) -> dict[str, Any]:
     """The numbers of a module by its fields, lists of one for each knot included."""
     given = {field.name: getattr(module, field.name) for field in fields(module)}
@@ -183,32 +186,8 @@ def _numbers(module: AbstractDispersion | AbstractOscillator | Any, name: str) -
     }
 
 
-def _words(dispersion: Any) -> Iterable[str]:
-    """The word that leaves a model's parameters free within their default bounds."""
-    if not _has_default_bounds(dispersion):
-        return
-    for model in MODELS:
-        if same(free_model(model), dispersion):
-            yield model
-    kind = _NAME.get(type(dispersion))
-    if kind in SPLINES and same(fixed_model(kind, dispersion.knots, kind), dispersion):
-        yield f"{kind}({','.join(repr(x) for x in dispersion.knots)})"
-
-
 def _has_default_bounds(dispersion: Any) -> bool:
     return any(free.limits is not None for _, free in free_leaves(dispersion))
-
-
-def _freed(dispersion: AbstractDispersion) -> list[str]:
-    """Items of `free` for a layer: those of default bounds, and any of a shifted index."""
-    items = []
-    for path, free in free_leaves(dispersion):
-        name = locate_parameter(dispersion, path).name
-        if free.limits is not None:
-            items.append(name)
-        elif isinstance(dispersion, Shifted):
-            items.append(f"{name}={free.lower!r}:{free.upper!r}")
-    return items
 
 
 def _without_default_bounds(dispersion: AbstractDispersion) -> Sequence[AbstractDispersion]:

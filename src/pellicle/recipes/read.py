@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from pellicle.colour.observers import Sensor
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.cameras import Camera, Sight, band_sensor, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
@@ -27,7 +30,6 @@ from pellicle.recipes.schema import (
     ReadingTable,
     RecipeTable,
     SurfaceRecipeTable,
-    SurfaceTable,
 )
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
@@ -44,26 +46,9 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
 
     **Raises:** DataError in one sentence: which key, what was expected, the nearest known key.
     """
-    loaded = _load(Path(path))
     try:
+        loaded = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
         return checked(loaded, str(path))
-    except ValueError as error:
-        raise DataError(f"{path}: {error}") from None
-
-
-def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:
-    """Return the recipe of parsed tables. Raises UsageError for the first wrong key, in one sentence."""
-    data, scene = loaded.get("data"), loaded.get("scene")
-    by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
-    if by_signal or (isinstance(scene, dict) and "surface" in scene):
-        return SurfaceRecipe(path, _validated(loaded, SurfaceRecipeTable))
-    return FilmRecipe(path, _validated(loaded, RecipeTable))
-
-
-def _load(path: Path) -> dict[str, Any]:
-    """The parsed TOML. Raises DataError."""
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except IsADirectoryError:
         raise DataError(f"{path}: is a folder; give the recipe's TOML file") from None
     except OSError as error:
@@ -76,6 +61,17 @@ def _load(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: is not TOML, as a recipe must be: {error}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from None
+
+
+def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:
+    """Return the recipe of parsed tables. Raises UsageError for the first wrong key, in one sentence."""
+    data, scene = loaded.get("data"), loaded.get("scene")
+    by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
+    if by_signal or (isinstance(scene, dict) and "surface" in scene):
+        return SurfaceRecipe(path, _validated(loaded, SurfaceRecipeTable))
+    return FilmRecipe(path, _validated(loaded, RecipeTable))
 
 
 def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
@@ -130,16 +126,17 @@ def _classes(annotation: Any) -> Iterator[type]:
         yield annotation
 
 
-Built = TypeVar("Built", Scene, Surface)
-
-
-def _with_free(scene: Built, count: int, fitted: bool, path: str) -> Built:
-    """Return a scene with few enough free parameters, and with one at least if it is to be `fitted`."""
+@contextmanager
+def _of_recipe(path: str, kind: type[ValueError] = UsageError, part: str = "") -> Iterator[None]:
+    """Turn errors of this kind about the content of a recipe into DataErrors, its path in front."""
     try:
-        check_free_count(count, least=int(fitted))
-    except UsageError as error:
-        raise DataError(f"{path}: {error}".replace("`", "")) from None
-    return scene
+        yield
+    except kind as error:
+        # without backticks, which the command line would turn into flags
+        raise DataError(f"{path}: {part}{error}".replace("`", "")) from None
+    except RecursionError:
+        what = "base is" if part else "materials are"
+        raise DataError(f"{path}: {part}its {what} nested too deeply") from None
 
 
 @dataclass(frozen=True)
@@ -194,21 +191,27 @@ class FilmRecipe:
         """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""
         names = {field.name for field in fields(Camera)}
         camera = Camera(**{name: value for name, value in self.camera.items() if name in names})
-        try:
+        with _of_recipe(self.path, part="camera: "):
             return sight(camera, self.tables.data.signal or "srgb")
-        except UsageError as error:
-            raise DataError(f"{self.path}: camera: {error}".replace("`", "")) from None
 
     def scene(self, fitted: bool = False) -> Scene:
         """Build the scene. Raises DataError, the path in front; if `fitted`, where nothing is free."""
-        try:
-            scene = _scene(self.tables, Path(self.path).parent)
-        except ValueError as error:
-            # without backticks, which the command line would turn into flags
-            raise DataError(f"{self.path}: {error}".replace("`", "")) from None
-        except RecursionError:
-            raise DataError(f"{self.path}: its materials are nested too deeply") from None
-        return _with_free(scene, len(free_leaves(scene)), fitted, self.path)
+        tables = self.tables
+        described, data, folder = tables.scene, tables.data, Path(self.path).parent
+        azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
+        with _of_recipe(self.path, ValueError):
+            lit = light(data, tables.camera.transmitted, azimuth)
+            scene = Scene(
+                [parts.layer(layer, folder) for layer in described.layer],
+                parts.substrate(described.substrate, folder, lit.signal),
+                ambient=medium(described.ambient, name="ambient", folder=folder),
+                light=lit,
+                instrument=parts.instrument(tables.instrument),
+                uncertainty=parts.uncertainty(described, tables.instrument),
+                reference=None if tables.reference is None else parts.reference(tables.reference, folder),
+            )
+            check_free_count(len(free_leaves(scene)), least=int(fitted))
+        return scene
 
 
 def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
@@ -222,21 +225,6 @@ def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
     signal = of_colours if given.signal in SPACES else given.signal or "R"
     through = bool(given.transmission and given.signal)
     return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
-
-
-def _scene(tables: RecipeTable, folder: Path) -> Scene:
-    scene, data = tables.scene, tables.data
-    azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
-    lit = light(data, tables.camera.transmitted, azimuth)
-    return Scene(
-        [parts.layer(layer, folder) for layer in scene.layer],
-        parts.substrate(scene.substrate, folder, lit.signal),
-        ambient=medium(scene.ambient, name="ambient", folder=folder),
-        light=lit,
-        instrument=parts.instrument(tables.instrument),
-        uncertainty=parts.uncertainty(scene, tables.instrument),
-        reference=None if tables.reference is None else parts.reference(tables.reference, folder),
-    )
 
 
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
@@ -269,16 +257,29 @@ class SurfaceRecipe:
         """Data files, relative to the recipe."""
         return [os.path.normpath(Path(self.path).parent / name) for name in self.tables.data.files]
 
+    @cached_property
+    def sensor(self) -> Sensor | None:
+        """The sensor of the surface, whose files are read once; None without one. Raises DataError."""
+        table = self.tables.scene.surface
+        with _of_recipe(self.path, ValueError, "scene.surface: "):
+            return band_sensor(table.sensor, table.illuminant, table.lamp, Path(self.path).parent)
+
     def scene(self, fitted: bool = False) -> Surface:
         """Build the surface. Raises DataError as `FilmRecipe.scene` does."""
-        try:
-            surface = _surface(self.tables.scene.surface, Path(self.path).parent)
-        except ValueError as error:
-            # without backticks, which the command line would turn into flags
-            raise DataError(f"{self.path}: scene.surface: {error}".replace("`", "")) from None
-        except RecursionError:
-            raise DataError(f"{self.path}: scene.surface: its base is nested too deeply") from None
-        return _with_free(surface, len(surface.free_numbers()), fitted, self.path)
+        table = self.tables.scene.surface
+        folder, sensor = Path(self.path).parent, self.sensor
+        with _of_recipe(self.path, ValueError, "scene.surface: "):
+            surface = Surface(
+                table.model,
+                {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
+                None if table.wavelengths is None else tuple(table.wavelengths),
+                sensor,
+                None if table.film is None else medium(table.film, name="film", folder=folder),
+                None if table.base is None else medium(table.base, name="base", folder=folder),
+            )
+        with _of_recipe(self.path):
+            check_free_count(len(surface.free_numbers()), least=int(fitted))
+        return surface
 
     def read(self, file: str) -> BrdfSamples:
         """Read samples as `[data]` says, with σ where it gives `noise`. Raises DataError or UsageError.
@@ -297,26 +298,13 @@ class SurfaceRecipe:
         )
         if data.noise is None:
             return samples
-        try:
+        with _of_recipe(self.path, part="data."):
             return samples.with_noise(data.noise)
-        except UsageError as error:
-            raise DataError(f"{self.path}: data.{error}".replace("`", "")) from None
 
     def with_data(self, **keys: Any) -> SurfaceRecipe:
         """The recipe with these keys of `[data]` replaced."""
         data = self.tables.data.model_copy(update=keys)
         return replace(self, tables=self.tables.model_copy(update={"data": data}))
-
-
-def _surface(table: SurfaceTable, folder: Path) -> Surface:
-    return Surface(
-        table.model,
-        {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
-        None if table.wavelengths is None else tuple(table.wavelengths),
-        band_sensor(table.sensor, table.illuminant, table.lamp, folder),
-        None if table.film is None else medium(table.film, name="film", folder=folder),
-        None if table.base is None else medium(table.base, name="base", folder=folder),
-    )
 
 
 def _number(value: Any, key: str) -> Any:

@@ -77,13 +77,18 @@ def recipe_text(
         again: Any = checked(tomllib.loads(text), str(place / "recipe")).scene()
         _check_surface(scene, again)
         return text
+    of_files = []
+    for table in tables:
+        plain = {key: x for key, x in table.items() if key != "camera"}
+        keys, seen = _options(plain | table.get("camera", {}), place)
+        of_files.append(keys | {"path": _relative(table["path"], place)} | ({"camera": seen} if seen else {}))
     ambient = written_medium(scene.ambient, "the ambient", place)
     of_scene, of_instrument = parts.uncertainty_keys(scene.uncertainty)
     sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
     text = _document(
         {
             "data": _data(scene) | sampled | data,
-            "data.file": [_file(table, place) for table in tables],
+            "data.file": of_files,
             "scene": {
                 **({} if ambient == 1.0 else {"ambient": ambient}),
                 "substrate": parts.substrate_keys(scene.substrate, place),
@@ -110,13 +115,6 @@ def _options(reading: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], 
     keys = {name: _relative(x, folder) if name in files else x for name, x in reading.items()}
     camera = CameraOptions.declared().keys() & keys.keys()
     return {name: x for name, x in keys.items() if name not in camera}, {name: keys[name] for name in camera}
-
-
-def _file(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A table of `[[data.file]]`, with paths relative to `folder`."""
-    keys, camera = _options({**table, **table.get("camera", {})}, folder)
-    keys.pop("camera", None)
-    return keys | {"path": _relative(table["path"], folder)} | ({"camera": camera} if camera else {})
 
 
 def _data(scene: Scene) -> dict[str, Any]:
@@ -158,7 +156,19 @@ def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
     if scene.wavelengths is not None:
         keys["wavelengths"] = [float(nm) for nm in scene.wavelengths]
     if scene.sensor is not None:
-        keys |= _sensor(scene, folder)
+        keys |= next(
+            (
+                {"sensor": name, "illuminant": illuminant}
+                for name in (*OBSERVERS, SRGB)
+                for illuminant in ILLUMINANTS
+                if same(band_sensor(name, illuminant, None, folder), scene.sensor)
+            ),
+            {},
+        )
+        if "sensor" not in keys:
+            raise UsageError(
+                "the sensor is no observer of the CIE: name the file of its sensitivities in a recipe"
+            )
     for part in ("film", "base"):
         medium = getattr(scene, part)
         if medium is not None:
@@ -167,16 +177,6 @@ def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
         several = not isinstance(value, Free) and np.ndim(value) == 1
         keys[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
     return keys
-
-
-def _sensor(scene: Surface, folder: Path) -> dict[str, str]:
-    """Name of the observer and the illuminant that the sensor is. Raises UsageError for a camera."""
-    for name in (*OBSERVERS, SRGB):
-        for illuminant in ILLUMINANTS:
-            known = band_sensor(name, illuminant, None, folder)
-            if same(known, scene.sensor):
-                return {"sensor": name, "illuminant": illuminant}
-    raise UsageError("the sensor is no observer of the CIE: name the file of its sensitivities in a recipe")
 
 
 def _check_film(scene: Scene, again: Scene) -> None:
