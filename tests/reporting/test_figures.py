@@ -1,15 +1,27 @@
-"""Figures of fits: the right panels with the right things in them, and a file that is a PNG."""
+"""Figures of fits: the right panels with the right things in them, and the tables of some signals."""
 
 import os
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import pellicle as pl
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.fitting.curves import Index
+from pellicle.fitting.reported_layer import principal_indices
 from pellicle.fitting.result import Profile
+from pellicle.materials import material
 from pellicle.reporting.figures import draw_fit as draw
+from pellicle.reporting.figures import of_index, of_part
+from pellicle.reporting.fit_tables import fit_csv, nk_csvs
+from pellicle.reporting.fit_text import report
 from pellicle.reporting.matplotlib_figure import save_figure
+from pellicle.reporting.quantities import half_angle
+from tests.data.tables import assert_read
 
 
 def labels(drawn) -> list[str]:
@@ -131,3 +143,152 @@ def test_a_joint_fit_has_panels_for_each_file(fit, spectroscopic):
     assert drawn.axes[1].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[1])
     assert not drawn.axes[0].get_shared_x_axes().joined(drawn.axes[0], drawn.axes[2])
     assert drawn.get_suptitle().startswith("film.csv and film.csv: ambiguous")
+
+
+def named(axes) -> list[str]:
+    return [line.get_label() for line in axes.lines if not line.get_label().startswith("_")]
+
+
+def test_panels_of_several_angles(spectroscopic):
+    drawn = draw(spectroscopic)
+    assert labels(drawn) == ["Ψ (degrees)", "Δ (degrees)", "data − fit (degrees)", "misfit Δχ²", "n"]
+    psi, delta, residuals = drawn.axes[:3]
+    assert named(psi) == named(delta) == ["data", "fit, 65°", "fit, 75°"]
+    assert residuals.get_xlabel() == "wavelength (nm)"
+    for axes in (psi, delta):
+        assert axes.get_shared_x_axes().joined(axes, residuals)
+    curve, angle = spectroscopic.curve, spectroscopic.spectrum.angle
+    for line, value in zip(psi.lines[1:], (65.0, 75.0), strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), curve.wavelength[angle == value])
+        np.testing.assert_array_equal(line.get_ydata(), curve.model[angle == value])
+    np.testing.assert_array_equal(delta.lines[0].get_ydata(), curve.delta_data)
+
+
+def test_no_line_crosses_360_degrees(spectroscopic):
+    for line in draw(spectroscopic).axes[1].lines[1:]:
+        assert np.isnan(line.get_ydata()).sum() == 1
+        assert np.nanmax(np.abs(np.diff(line.get_ydata()))) < 180
+
+
+def test_residuals_of_delta_are_the_short_way_round(spectroscopic):
+    residuals = draw(spectroscopic).axes[2]
+    assert named(residuals) == ["Ψ", "Δ"]
+    of_delta = [line for line in residuals.lines if line.get_linestyle() == "--"]
+    np.testing.assert_allclose(np.concatenate([line.get_ydata() for line in of_delta[:2]]), 2.0, atol=1e-12)
+
+
+def test_one_wavelength_is_drawn_against_the_angle(angular):
+    drawn = draw(angular)
+    assert labels(drawn) == ["Ψ (degrees)", "Δ (degrees)", "data − fit (degrees)", "misfit Δχ²"]
+    assert drawn.axes[2].get_xlabel() == "angle of incidence (degrees)"
+    assert named(drawn.axes[0]) == ["data", "fit"]
+    np.testing.assert_array_equal(drawn.axes[0].lines[1].get_xdata(), angular.spectrum.angle)
+
+
+@pytest.mark.parametrize("sigma", [(None, None), (np.full(40, 0.1), np.full(40, 0.2))])
+def test_the_table_is_read_again_as_it_is(spectroscopic, with_part, write, sigma):
+    data = replace(spectroscopic.spectrum, sigma=sigma[0], delta_sigma=sigma[1])
+    again = read_spectrum(write(fit_csv(with_part(spectroscopic, data=data)), "fit.csv"))
+    names = ("signal", "wavelength", "angle", "values", "delta", "sigma", "delta_sigma")
+    assert_read(again, 1e-9, **{name: getattr(data, name) for name in names})
+
+
+def test_the_table_holds_model_and_residuals(spectroscopic):
+    header, first, *others = fit_csv(spectroscopic).splitlines()[3:]
+    assert {row.split(",")[-1] for row in others} == {"2"}
+    columns = "psi_deg,psi_model,psi_residual,delta_deg,delta_model,delta_residual"
+    assert header == f"wavelength_nm,angle_deg,{columns}"
+    _, _, _, *of_psi, _, model, residual = map(float, first.split(","))
+    assert [*of_psi, model, residual] == [20.0, 0.1, 300.0, 2.0]
+
+
+def test_reflectances_of_one_wavelength_are_drawn_against_the_angle(angular, with_part):
+    """As those of a laser: one wavelength has no spectrum, in the figure as in the page."""
+    values = angular.spectrum.values / 100
+    spectrum = replace(angular.spectrum, signal="R", delta=None, values=values)
+    curve = replace(angular.curve, delta_data=None, delta_model=None)
+    of_laser = with_part(angular, data=spectrum, curve=curve)
+    panel, residuals = draw(of_laser).axes[:2]
+    assert named(panel) == ["data", "fit"]
+    assert residuals.get_xlabel() == "angle of incidence (degrees)"
+    for line in (*panel.lines, residuals.lines[0]):
+        np.testing.assert_array_equal(line.get_xdata(), spectrum.angle)
+    assert of_part(of_laser, 0)["layout"]["xaxis"]["title"]["text"] == "angle of incidence (degrees)"
+
+
+def test_samples_model_and_residuals_in_sigma_are_drawn(brdf_fit):
+    np.testing.assert_allclose(half_angle(brdf_fit.samples), [10.0, 0.0, 10.0], atol=1e-6)
+    above, below = draw(brdf_fit).axes
+    shown, model = above.lines
+    np.testing.assert_allclose(shown.get_ydata(), [0.1, 1.0, 0.2])
+    np.testing.assert_allclose(model.get_ydata(), [0.2, 1.1, 0.3])
+    assert above.get_yscale() == "log"
+    np.testing.assert_allclose(below.lines[0].get_ydata(), -2.0, atol=1e-12)
+    assert below.get_ylabel() == "residual / σ"
+
+
+def test_without_sigma_residuals_have_the_unit_of_the_brdf(brdf_fit, with_part):
+    curve = replace(brdf_fit.parts[0].curve, model=brdf_fit.model - 0.3)
+    brdf_fit = with_part(brdf_fit, data=replace(brdf_fit.samples, sigma=None), curve=curve)
+    above, below = draw(brdf_fit).axes
+    assert above.get_yscale() == "linear"
+    np.testing.assert_allclose(below.lines[0].get_ydata(), 0.2, atol=1e-12)
+    assert below.get_ylabel() == "residual (1/sr)"
+
+
+NM = np.linspace(400.0, 800.0, 41)
+
+
+def index(n, error):
+    rising = n + 1e-4 * (NM - 400.0)
+    return Index(NM, rising, np.zeros(41), np.full(41, error), np.zeros(41))
+
+
+@pytest.fixture
+def birefringent(fit, with_part):
+    """n_o is 1.33, n_e 1.48."""
+    flat = Index(NM, np.linspace(0.15, 0.19, 41), np.zeros(41), np.full(41, 0.004), np.zeros(41))
+    principal = {"ordinary": index(1.33, 0.001), "extraordinary": index(1.48, 0.003), "birefringence": flat}
+    return with_part(fit, curve=replace(fit.curve, principal=principal))
+
+
+def test_each_principal_index_is_a_material(birefringent, tmp_path, write):
+    tables = nk_csvs(birefringent)
+    assert list(tables) == ["nk_ordinary.csv", "nk_extraordinary.csv"]
+    for name, n in (("nk_ordinary.csv", 1.33), ("nk_extraordinary.csv", 1.48)):
+        path = write(tables[name], name)
+        np.testing.assert_allclose(np.real(material(str(path))(NM)), n + 1e-4 * (NM - 400.0), rtol=1e-9)
+    frame = pd.read_csv(tmp_path / "nk_extraordinary.csv", comment="#")
+    np.testing.assert_allclose(frame["birefringence"], np.linspace(0.15, 0.19, 41))
+    np.testing.assert_allclose(frame["birefringence_stderr"], 0.004)
+
+
+def test_report_states_the_birefringence_with_its_error(birefringent, fit):
+    text = report(birefringent)
+    for line in ("400 nm  0.15000 ± 0.004", "600 nm  0.17000 ± 0.004", "800 nm  0.19000 ± 0.004"):
+        assert line in text
+    assert "Birefringence" not in report(fit)
+
+
+def test_figures_show_each_index_with_its_band(birefringent):
+    axes = [a for a in draw(birefringent).axes if a.get_ylabel() == "n"]
+    assert [line.get_label() for line in axes[0].lines] == ["ordinary", "extraordinary"]
+    assert axes[0].lines[1].get_ydata()[0] == pytest.approx(1.48)
+    assert [word in str(of_index(birefringent)) for word in ("extraordinary", "birefringence")] == [True] * 2
+
+
+def test_birefringence_has_the_error_of_a_difference():
+    """Variances of both indices less twice their covariance; slopes are those of n_o, n_e in themselves."""
+    free = [pl.dispersion.Constant(pl.Free(1.4, 1.9)) for _ in range(2)]
+    scene = pl.Scene(pl.Layer(pl.Anisotropic(*free), 100.0), 1.5)
+    slope = np.zeros((4, 3, 2))
+    slope[0, :, 0] = slope[2, :, 1] = 1.0
+    values = np.array([[1.5] * 3, [0.0] * 3, [1.7] * 3, [0.0] * 3])
+    at = SimpleNamespace(layer=values, layer_slope=slope)
+    covariance = np.array([[4.0, 3.0], [3.0, 9.0]]) * 1e-6
+    found = principal_indices(scene, at, covariance, NM[:3])
+    np.testing.assert_allclose(found["extraordinary"].n_stderr, 0.003)
+    np.testing.assert_allclose(found["birefringence"].n, 0.2)
+    np.testing.assert_allclose(found["birefringence"].n_stderr, np.sqrt(4 + 9 - 6) * 1e-3)
+    isotropic = pl.Scene(pl.Layer(free[0], 100.0), 1.5)
+    assert principal_indices(isotropic, at, covariance, NM[:3]) == {}

@@ -1,4 +1,4 @@
-"""Pages of fits: self-contained, escaped, with the numbers of the fit."""
+"""Pages of fits, comparisons and maps: self-contained, escaped, with their numbers."""
 
 import json
 import math
@@ -11,9 +11,14 @@ import equinox as eqx
 import numpy as np
 import pytest
 
+from pellicle.fitting.comparison import compare
 from pellicle.fitting.result import Estimate, Rival
+from pellicle.mapping.pixels.results import CODES
 from pellicle.recipes.read import read_recipe
+from pellicle.reporting.comparison import comparison_page
 from pellicle.reporting.json_record import failure, to_json
+from pellicle.reporting.map_files import map_page
+from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.page.batch_page import batch_page
 from pellicle.reporting.page.fit_page import fit_page
 from pellicle.reporting.page.repetition import repetition
@@ -22,6 +27,7 @@ from pellicle.scene.free import Free
 from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
 from pellicle.simulation.surface_sphere import in_plane
+from tests.reporting.test_map_text import image, made
 
 IMAGE = b"\x89PNG\r\n"
 VOID = {"meta", "img", "input", "br", "link", "hr"}
@@ -124,23 +130,20 @@ def test_rivals_are_buttons_where_their_curves_are_known(fit, curved):
 
 
 def test_a_missing_number_is_none(fit, with_part):
-    curve = fit.parts[0].curve
-    holes = np.where(np.arange(41) == 5, np.nan, curve.model)
+    holes = replace(fit.curve, model=np.where(np.arange(41) == 5, np.nan, fit.curve.model))
     fit = replace(fit, chi2_reduced=math.inf, correlation=np.full_like(fit.correlation, np.nan))
-    page = Page(fit_page(with_part(fit, curve=replace(curve, model=holes)), IMAGE))
+    page = Page(fit_page(with_part(fit, curve=holes), IMAGE))
     [drawn] = [t for t in page.figures["data-0"]["traces"] if t["name"] == "fit"]
-    assert drawn["y"][5] is None
-    assert drawn["y"][6] is not None
+    assert [y is None for y in drawn["y"][4:7]] == [False, True, False]
 
 
 def test_a_figure_of_many_points_is_thinned_and_says_so(fit, with_part):
     nm = np.linspace(400.0, 800.0, 50_000)
     names = ("data", "model", "sigma", "n", "k", "n_stderr", "k_stderr")
     wide = {name: np.full(nm.size, 0.3) for name in names}
-    curve = replace(fit.parts[0].curve, wavelength=nm, **wide)
-    data = replace(fit.parts[0].data, wavelength=nm, values=wide["data"])
-    text = fit_page(with_part(fit, curve=curve, data=data), IMAGE)
-    page = Page(text)
+    curve = replace(fit.curve, wavelength=nm, **wide)
+    data = replace(fit.data, wavelength=nm, values=wide["data"])
+    page = Page(text := fit_page(with_part(fit, curve=curve, data=data), IMAGE))
     assert len(page.figures["data-0"]["traces"][0]["x"]) <= 4000
     assert "One point of 13 is drawn" in page.text
     assert len(text.encode()) < 5_000_000
@@ -159,8 +162,7 @@ def test_the_page_has_what_repeats_the_fit(fit, write):
 
 def test_the_page_of_a_fit_without_a_recipe_has_one(fit, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    light = Light(np.array([500.0, 600.0]), 30.0)
-    film = Scene(Layer("SiO2", Free(10.0, 1000.0)), "Si", light=light)
+    film = Scene(Layer("SiO2", Free(10.0, 1000.0)), "Si", light=Light(np.array([500.0, 600.0]), 30.0))
     own = replace(fit, scene=film)
     [(name, text)] = repetition(own, None)
     assert repetition(own, {"flags": {"layer": "SiO2"}})[1] == (name, text)
@@ -212,8 +214,41 @@ def test_a_page_of_a_surface_has_the_lobes_of_the_fitted_numbers(brdf_fit):
     free = Surface("blinn-phong-film", numbers | {"thickness": Free(10.0, 500.0)}, (550.0,))
     parameters = {"thickness": Estimate("thickness", 40.0, 1.0, "nm", 10.0, 500.0, True)}
     page = Page(fit_page(replace(brdf_fit, scene=free, parameters=parameters), IMAGE))
-    fitted = Surface("blinn-phong-film", numbers | {"thickness": 40.0}, (550.0,))
+    fitted = replace(free, numbers=numbers | {"thickness": 40.0})
     exact = in_plane(fitted, 45.0, np.linspace(-88.0, 88.0, 177))
     [drawn] = [trace for trace in page.figures["lobes"]["traces"] if trace["yaxis"] == "y2"]
     assert np.allclose(drawn["y"], exact[:, 0], rtol=1e-5)
     assert [tag for tag, _ in page.elements].count("img") == 2
+
+
+def test_the_page_of_a_map_has_figures_and_tables():
+    status = image()
+    status[:6] = CODES["ambiguous"]  # a tenth
+    summary = summarise(made(status, path="/data/<b>wafer.nc"))
+    page = Page(map_page(summary, {"map": b"\x89PNG map", "rival": b"\x89PNG rival"}))
+    assert not page.open
+    assert "Map of <b>wafer.nc" in page.text
+    images = [own for tag, own in page.elements if tag == "img"]
+    assert [own["src"].startswith("data:image/png;base64,") for own in images] == [True, True]
+    assert images[0]["alt"].startswith("Values, standard errors")
+    assert "90.0 % converged; 10.0 % ambiguous along the top edge" in images[0]["alt"]
+    assert "median 300.00 nm" in page.text
+    assert f"{np.sum(status == CODES['converged'])} pixels" in page.text
+    assert "plotly" not in page.scripts
+
+
+def test_the_best_of_a_comparison_is_first_and_the_others_curves_can_be_shown(fit, with_part):
+    missing = replace(fit.curve, model=fit.curve.model + 0.02)
+    worse = replace(with_part(fit, curve=missing), rivals=())
+    page = Page(comparison_page(compare({"<b>a.toml": worse, "b c.toml": fit}), ["a/report.html", None]))
+    assert not page.open
+    figure = page.figures["data-0"]
+    [curve, residual] = figure["rivals"][0]
+    assert curve["name"] == "&lt;b&gt;a.toml"
+    np.testing.assert_allclose(curve["y"], missing.model, rtol=1e-5)
+    np.testing.assert_allclose(residual["y"], missing.residual, atol=1e-6)
+    buttons = [own for tag, own in page.elements if tag == "button" and "data-rival" in own]
+    assert [(own["data-rival"], own["data-about"]) for own in buttons] == [("0", "<b>a.toml")]
+    assert [own["href"] for tag, own in page.elements if tag == "a"] == ["a/report.html"]
+    rows = page.text.partition("Criteria relative")[2]
+    assert rows.index("b c.toml") < rows.index("<b>a.toml")

@@ -1,4 +1,4 @@
-"""The text of a report, as a user reads it."""
+"""The text of a report, as a user reads it; its uncertainty budget."""
 
 import math
 from dataclasses import replace
@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.reporting.fit_text import ADVICE, report
+from pellicle.fitting.result import Estimate, Rival, Status, SystematicEffect
+from pellicle.reporting.fit_text import ADVICE, budget, report
 
 
 def block(text: str, title: str) -> list[str]:
@@ -129,7 +129,8 @@ def test_no_line_is_longer_than_100_columns(fit, with_part):
 
 
 def test_a_joint_fit_has_a_line_for_each_file(fit, spectroscopic):
-    text = report(joint(fit, spectroscopic))
+    parts = replace(fit.parts[0], name="film"), replace(spectroscopic.parts[0], name="angles")
+    text = report(replace(fit, parts=parts, rms=None))
     verdict = block(text, "Verdict")
     assert "film    R, 41 points from 400 to 800 nm, worth 12 independent ones" in verdict
     described = "angles  psi-delta, 40 points from 400 to 800 nm, from 65 to 75 degrees, worth 12"
@@ -142,17 +143,64 @@ def test_a_joint_fit_has_a_line_for_each_file(fit, spectroscopic):
     assert max(map(len, text.splitlines())) <= 100
 
 
-def joint(fit, other):
-    parts = (replace(fit.parts[0], name="film"), replace(other.parts[0], name="angles"))
-    return replace(fit, parts=parts, rms=None)
-
-
 @pytest.mark.parametrize(
     ("source", "told"),
-    [
-        ("residuals", "sigma 0.002, estimated from the residuals: none was given"),
-        ("model", "sigma 0.002, the error allowed for a drifting lamp: none was given"),
-    ],
+    [("residuals", "estimated from the residuals"), ("model", "the error allowed for a drifting lamp")],
 )
 def test_it_says_where_the_noise_comes_from(fit, with_part, source, told):
-    assert f"noise               {told}" in block(report(with_part(fit, sigma_from=source)), "Fit statistics")
+    lines = block(report(with_part(fit, sigma_from=source)), "Fit statistics")
+    assert f"noise               sigma 0.002, {told}: none was given" in lines
+
+
+def effect(name, change, uncertainty=0.5, unit="nm"):
+    return SystematicEffect(name, uncertainty, unit, {"thickness": change, "A": 0.0}, 0.0, 0.0)
+
+
+def with_budget(fit, *rows, **changes):
+    """The fit with a thickness of 486.28 ± 3.6 nm, of which 0.9 nm is noise."""
+    return replace(with_parameter(fit, **{"stderr_noise": 0.9} | changes), budget=rows)
+
+
+def test_effects_in_their_own_unit_and_what_they_change(fit):
+    rows = effect("wavelength shift", -3.0), effect("scale", 0.2, 0.01, "")
+    title, noise, first, second, sums = budget(with_budget(fit, *rows))
+    assert title.strip() == "thickness: standard uncertainties, and what each alone would change"
+    assert words(noise) == "noise and residuals (type A) 0.9 nm"
+    assert words(first) == "wavelength shift 0.5 nm 3 nm"
+    assert words(second) == "scale 1 % 0.2 nm"
+    # a normal distribution: 1.96 · 3.6
+    assert sums.strip() == (
+        "together, less what the residuals exclude: 3.6 nm; expanded, 95 %: 7.1 nm (coverage factor 1.96)"
+    )
+
+
+def test_few_degrees_of_freedom_are_said(fit):
+    """Without systematic effects: Student's t of 5 degrees of freedom, 2.571 (GUM 2008, table G.2)."""
+    lines = budget(with_budget(fit, effect("scale", 0.2), stderr_noise=3.6, degrees_of_freedom=5.0))
+    end = "expanded, 95 %: 9.3 nm (coverage factor 2.57, 5 degrees of freedom)"
+    assert words(" ".join(lines)).endswith(end)
+
+
+def test_small_effects_are_counted_and_eight_are_listed(fit):
+    """Below a hundredth of the error of 3.6 nm an effect is small."""
+    lines = budget(with_budget(fit, effect("scale", 0.04), effect("offset", 0.03), effect("angle", 0.0)))
+    assert len(lines) == 5
+    assert lines[3].strip() == "... and 2 smaller in the JSON"
+    lines = budget(with_budget(fit, *(effect(f"e{i}", 9.0 - i) for i in range(9))))
+    assert [line.split()[0] for line in lines[2:10]] == [f"e{i}" for i in range(8)]
+    assert lines[10].strip() == "... and 1 smaller in the JSON"
+
+
+def test_no_budget_of_an_infinite_error_or_without_effects_or_free_parameters(fit):
+    for stderr in (math.inf, math.nan):
+        assert budget(with_budget(fit, effect("scale", 1.0), stderr=stderr)) == []
+    assert budget(with_budget(fit)) == []
+    fixed = {name: replace(p, free=False) for name, p in fit.parameters.items()}
+    assert budget(replace(with_budget(fit, effect("scale", 1.0)), parameters=fixed)) == []
+    assert "Uncertainty budget" not in report(fit)
+
+
+def test_the_report_has_it_after_the_parameters_within_100_columns(fit):
+    text = report(with_budget(fit, effect("mixed interface with the substrate of a long name " * 3, 1.0)))
+    assert text.index("[[Parameters]]") < text.index("[[Uncertainty budget]]") < text.index("[[Correlations")
+    assert max(map(len, text.splitlines())) <= 100
