@@ -142,11 +142,10 @@ def test_files_that_are_refused(tmp_path, shape, size, said):
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_without_a_valid_cell(tmp_path):
+def test_a_file_without_a_valid_cell(tmp_path, refused):
     path = head(tmp_path / "void.binary", SHAPE, 34992012)
     np.memmap(path, "<f8", "r+", offset=12, shape=(3, *SHAPE))[:] = -1
-    with pytest.raises(DataError, match="has no valid cell"):
-        read_brdf_samples(path)
+    refused(path, "has no valid cell", read=read_brdf_samples, error=DataError)
 
 
 def test_half_and_difference_angles_there_and_back():

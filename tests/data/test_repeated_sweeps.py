@@ -96,12 +96,11 @@ def test_other_repetitions_are_refused(write, refusal, text, words):
     refusal(pl.read_spectrum, write("wavelength_nm,R\n" + text), DataError, *words)
 
 
-def test_two_angles_without_their_column_are_no_repeats(tmp_path):
+def test_two_angles_without_their_column_are_no_repeats(tmp_path, refused):
     nm, path = np.arange(400.0, 800.0, 10.0), tmp_path / "film.csv"
     text = "".join(rows(nm, *pl.ellipsometry(nm, 100.0, "SiO2", "Si", angle=a)) for a in (65.0, 75.0))
     path.write_text("wavelength_nm,psi_deg,delta_deg\n" + text)
-    with pytest.raises(DataError, match="2 sweeps over the same wavelengths differ by"):
-        pl.read_spectrum(path)
+    refused(path, "2 sweeps over the same wavelengths differ by", error=DataError)
 
 
 def test_noise_is_no_difference(tmp_path):

@@ -1,10 +1,16 @@
-"""Spectra and BRDF samples made in Python: the same limits as for files, in one sentence."""
+"""Spectra and BRDF samples made in Python: limits, settings of one measurement, noise as users write it."""
 
 import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.read_spectrum import read_spectrum
+from pellicle.data.spectrum import Spectrum, named, setting_numbers, settings
+from pellicle.data.write_spectrum import write_spectrum
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.limits import noise_level
+from tests.data.tables import assert_read
 
 NM = np.array([500.0, 600.0, 700.0])
 ANGLES = {"signal": "psi-delta", "delta": NM / 10}
@@ -72,3 +78,101 @@ def test_impossible_samples(changes, message):
     angles = dict.fromkeys(("theta_i", "phi_i", "theta_o", "phi_o"), np.full(2, 30.0))
     with pytest.raises(DataError, match=message):
         pl.BrdfSamples(**(angles | {"values": np.ones((2, 1)), "channels": ("value",)} | changes))
+
+
+ROWS = np.tile(np.linspace(400.0, 800.0, 6), 4)
+ANGLE = np.repeat([60.0, 60.0, 70.0, 70.0], 6)
+AZIMUTH = np.repeat([0.0, 45.0, 0.0, 45.0], 6)
+
+
+SIGNALS = {
+    "R": [np.linspace(0.1, 0.3, 24)],
+    "T": [np.linspace(0.9, 0.8, 24)],
+    "psi_deg,delta_deg": [np.linspace(20.0, 40.0, 24), np.linspace(100.0, 300.0, 24)],
+    "m12,m33": [np.linspace(-0.5, 0.1, 24), np.linspace(0.2, 0.4, 24)],
+    "psi_aps_deg,delta_aps_deg": [np.linspace(1.0, 3.0, 24), np.linspace(100.0, 300.0, 24)],
+}
+
+
+@pytest.mark.parametrize("names", SIGNALS)
+def test_several_azimuths_are_one_measurement(write_columns, names, tmp_path):
+    """An anisotropic sample has another spectrum at each azimuth: rows at one wavelength are no repeats."""
+    header = f"nm,{names},angle_deg,azimuth_deg"
+    spectrum = read_spectrum(write_columns(header, ROWS, *SIGNALS[names], ANGLE, AZIMUTH))
+    assert not spectrum.sweeps
+    assert len(spectrum) == 24
+    assert "'azimuth_deg' read as the azimuth of the sample in degrees" in spectrum.notes
+    for setting in spectrum.settings:
+        rows = (setting.angle == ANGLE) & (setting.azimuth == AZIMUTH)
+        own = spectrum.values.reshape(24, -1)[setting.rows, 0]
+        np.testing.assert_allclose(own, SIGNALS[names][0][rows], rtol=1e-8)
+    back = read_spectrum(write_spectrum(tmp_path / "again.csv", spectrum))
+    assert_read(back, values=spectrum.values, azimuth=spectrum.azimuth)
+
+
+def test_repeats_at_each_azimuth_are_averaged(write_columns):
+    twice = [np.tile(column, 2) for column in (ROWS, *SIGNALS["R"], AZIMUTH, ANGLE)]
+    twice[1][24:] += 0.01
+    mean = read_spectrum(write_columns("nm,R,azimuth_deg,angle_deg", *twice))
+    assert len(mean.sweeps) == 2
+    assert len(mean.settings) == 4
+    np.testing.assert_allclose(np.sort(mean.values), np.sort(SIGNALS["R"][0] + 0.005), rtol=1e-8)
+
+
+def test_a_repeated_point_names_its_line(write_columns, refused):
+    columns = (np.append(x[:12], x[11]) for x in (ROWS, *SIGNALS["R"], AZIMUTH))
+    path = write_columns("nm,R,azimuth_deg", *columns)
+    refused(path, "repeats 800 of line 13; within one angle and azimuth", error=DataError)
+    with pytest.raises(DataError, match="comes twice at one angle"):
+        Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.full(2, 30.0))
+    assert len(Spectrum(np.full(2, 500.0), np.full(2, 0.1), "R", azimuth=np.array([0.0, 30.0]))) == 2
+
+
+def test_an_azimuth_in_other_units_is_refused(write_columns):
+    with pytest.raises(DataError, match="is in 'rad'; write angles in degrees"):
+        read_spectrum(write_columns("nm,R,azimuth [rad]", ROWS[:6], SIGNALS["R"][0][:6], AZIMUTH[:6]))
+
+
+def test_names_of_settings():
+    every = settings(ANGLE, AZIMUTH, 24)
+    names = [f"{angle}°, azimuth {azimuth}°" for angle in (60, 70) for azimuth in (0, 45)]
+    assert [named(one, every) for one in every] == names
+    turned = settings(np.full(24, 60.0), AZIMUTH, 24)
+    assert [named(one, turned) for one in turned] == ["azimuth 0°", "azimuth 45°"]
+    [alone] = settings(None, None, 3)
+    assert alone.rows.tolist() == [0, 1, 2]
+    assert named(alone, [alone]) is None
+    assert setting_numbers(ANGLE, None) is ANGLE
+
+
+RGB = BrdfSamples(*np.zeros((4, 3)), np.array([[1.0, 2, 4], [10, 20, 40], [0, 2, 4]]), ("R", "G", "B"))
+
+
+@pytest.mark.parametrize(
+    ("given", "value", "relative"),
+    [(0.01, 0.01, False), ("0.01", 0.01, False), ("2 %", 0.02, True), ("0.5%", 0.005, True)],
+)
+def test_a_noise_is_a_number_or_a_share(given, value, relative):
+    assert noise_level(given) == pytest.approx((value, relative))
+
+
+@pytest.mark.parametrize("wrong", [0, -1, "-2 %", "two", "%", "nan", "inf", ""])
+def test_a_wrong_noise_is_refused(wrong):
+    with pytest.raises(UsageError, match="--noise must be a standard deviation above zero"):
+        noise_level(wrong, "--noise")
+
+
+def test_a_share_of_the_signal():
+    data = RGB.with_noise("10 %")
+    np.testing.assert_allclose(data.sigma[:2], 0.1 * RGB.values[:2])
+    assert data.sigma[2, 0] == pytest.approx(0.1 * 1e-3 * 4)  # a thousandth of the median, not zero
+    assert data.relative == (0.1, 0.1, 0.1)
+
+
+def test_a_noise_for_each_channel():
+    data = RGB.with_noise(["10 %", 0.5, "1 %"])
+    np.testing.assert_allclose(data.sigma[1], [1.0, 0.5, 0.4])
+    assert data.relative == (0.1, 0.0, 0.01)
+    assert RGB.with_noise(0.5).relative is None
+    with pytest.raises(UsageError, match="2 numbers for 3 channels"):
+        RGB.with_noise([0.1, 0.2])
