@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.data.options import SPACES
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.signals.limits import Where, refuse_first
 
-SPACES = ("rgb", "srgb", "xyz", "lab")
 USUAL_NOISE = {"srgb": 1.5 / 255, "rgb": 0.01, "xyz": 0.005, "lab": 0.5}
 """Standard deviation of each channel where none is given: that of a good camera, or of a colorimeter."""
 _REMEDY = "correct or delete that row"

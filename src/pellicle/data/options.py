@@ -8,8 +8,9 @@ nothing heavy: `pellicle --help` loads it.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Annotated, Any, TypeVar, get_type_hints
+from functools import cache, partial
+from inspect import get_annotations
+from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
 
 from pellicle.errors import UsageError
 
@@ -19,6 +20,8 @@ SPACES = ("srgb", "rgb", "xyz", "lab")
 SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
 
+
+_ILLUMINANTS = ("E", "A", "D50", "D55", "D65", "D75")
 
 Record = TypeVar("Record", bound="Options")
 
@@ -87,8 +90,8 @@ class Option:
     """
 
     help: str
+    kinds: tuple[str, ...]
     metavar: str = ""
-    kinds: tuple[str, ...] = (SPECTRA, COLOURS)
     words: tuple[str, ...] = ()
     find: Callable[[str], tuple[str | None, tuple[str, ...]]] | None = None
     least: float = -math.inf
@@ -141,25 +144,17 @@ class Option:
         return schema
 
 
-@dataclass(frozen=True)
-class SpectrumOption(Option):
-    """An option of spectra alone."""
-
-    kinds: tuple[str, ...] = (SPECTRA,)
+def _option_of(*kinds: str) -> Callable[..., Any]:
+    return partial(Option, kinds=kinds)
 
 
-@dataclass(frozen=True)
-class ColourOption(Option):
-    """An option of colours alone."""
-
-    kinds: tuple[str, ...] = (COLOURS,)
-
-
-@dataclass(frozen=True)
-class CommonOption(Option):
-    """An option of spectra, colours and BRDF samples."""
-
-    kinds: tuple[str, ...] = (SPECTRA, COLOURS, BRDF)
+_FOR_FILMS, _FOR_SPECTRA, _FOR_COLOURS = (
+    _option_of(SPECTRA, COLOURS),
+    _option_of(SPECTRA),
+    _option_of(COLOURS),
+)
+_FOR_ALL = _option_of(SPECTRA, COLOURS, BRDF)
+"""Declarations of options by the kinds of data to which they apply."""
 
 
 class Options:
@@ -191,161 +186,117 @@ def _declared(record: type[Options]) -> dict[str, tuple[Any, Option]]:
     return declared
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+def _record(cls: type[Record]) -> type[Record]:
+    """Make a record of options from a class whose fields have their declarations as values.
+
+    Each option is None where it is not given.
+    """
+    declared = {name: Annotated[hint, vars(cls)[name]] for name, hint in get_annotations(cls).items()}
+    cls.__annotations__ = declared
+    for name in declared:
+        setattr(cls, name, None)
+    return dataclass(frozen=True, kw_only=True)(cls)
+
+
+@_record
 class CameraOptions(Options):
     """Observer or camera of the colours of a film, and its light; `[camera]` of a recipe. Files are CSV."""
 
-    observer: Annotated[
-        str | None, ColourOption("1931 (2 degrees) or 1964 (10 degrees).", words=("1931", "1964"))
-    ] = None
-    illuminant: Annotated[
-        str | None,
-        ColourOption("E, A, D50, D55, D65 or D75 (D65).", words=("E", "A", "D50", "D55", "D65", "D75")),
-    ] = None
-    lamp: Annotated[
-        str | None, ColourOption("CSV of the lamp's spectrum, for --illuminant.", is_file=True)
-    ] = None
-    sensitivities: Annotated[
-        str | None, ColourOption("CSV of a camera's three sensitivities (signal rgb).", is_file=True)
-    ] = None
-    chart: Annotated[
-        str | None,
-        ColourOption(
-            "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).", is_file=True
-        ),
-    ] = None
-    gamma: Annotated[
-        float | None, ColourOption("Coding of the signal rgb: linear^(1/GAMMA) (1).", least=0.1, most=10)
-    ] = None
-    white_balance: Annotated[
-        str | None,
-        ColourOption("fixed, or free for an unknown factor of each channel.", words=("fixed", "free")),
-    ] = None
-    white: Annotated[
-        str | list[int] | None, ColourOption("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
-    ] = None
-    transmitted: Annotated[bool | None, ColourOption("The light has passed the film.")] = None
+    observer: str | None = _FOR_COLOURS("1931 (2 degrees) or 1964 (10 degrees).", words=("1931", "1964"))
+    illuminant: str | None = _FOR_COLOURS("E, A, D50, D55, D65 or D75 (D65).", words=_ILLUMINANTS)
+    lamp: str | None = _FOR_COLOURS("CSV of the lamp's spectrum, for --illuminant.", is_file=True)
+    sensitivities: str | None = _FOR_COLOURS(
+        "CSV of a camera's three sensitivities (signal rgb).", is_file=True
+    )
+    chart: str | None = _FOR_COLOURS(
+        "CSV of a photographed chart: R, G, B and reference X, Y, Z (signal rgb).", is_file=True
+    )
+    gamma: float | None = _FOR_COLOURS("Coding of the signal rgb: linear^(1/GAMMA) (1).", least=0.1, most=10)
+    white_balance: str | None = _FOR_COLOURS(
+        "fixed, or free for an unknown factor of each channel.", words=("fixed", "free")
+    )
+    white: str | list[int] | None = _FOR_COLOURS("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
+    transmitted: bool | None = _FOR_COLOURS("The light has passed the film.")
 
 
-@dataclass(frozen=True, kw_only=True)
+@_record
 class SpectrumOptions(Options):
     """Options of reading a spectrum: arguments of `pellicle.read_spectrum`."""
 
-    spectrum: Annotated[str | None, Option("Name of one of several spectra or films in a file, or all.")] = (
-        None
+    spectrum: str | None = _FOR_FILMS("Name of one of several spectra or films in a file, or all.")
+    signal: str | None = _FOR_ALL(
+        f"{', '.join(SIGNALS[:-1])} or {SIGNALS[-1]} (that of the file).",
+        words=(*SIGNALS, "brdf"),
     )
-    signal: Annotated[
-        str | None,
-        CommonOption(
-            "R, T, psi-delta, mueller, generalised-psi-delta, contrast, srgb, rgb, xyz or lab (that of the"
-            " file).",
-            words=(*SIGNALS, "brdf"),
-        ),
-    ] = None
-    polarisation: Annotated[str | None, Option("s, p or unpolarised.", words=("s", "p", "unpolarised"))] = (
-        None
+    polarisation: str | None = _FOR_FILMS("s, p or unpolarised.", words=("s", "p", "unpolarised"))
+    range: tuple[float, float] | None = _FOR_SPECTRA(
+        "Wavelengths to use in nm.", metavar="LO:HI", parse=parse_range
     )
-    range: Annotated[
-        tuple[float, float] | None,
-        SpectrumOption("Wavelengths to use in nm.", metavar="LO:HI", parse=parse_range),
-    ] = None
-    columns: Annotated[
-        str | Sequence[str] | None,
-        CommonOption("Names of the columns in order, _ to skip.", metavar="NAME,..."),
-    ] = None
-    wavelength_unit: Annotated[
-        str | None, SpectrumOption("nm, um, A, eV, cm-1 or THz.", find=_wavelength_unit)
-    ] = None
-    signal_unit: Annotated[
-        str | None, Option("fraction, percent or absorbance; 8-bit or 16-bit of colours.", find=_signal_unit)
-    ] = None
-    folded: Annotated[
-        bool | None,
-        SpectrumOption(
-            "Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).", negative=True
-        ),
-    ] = None
-    transmission: Annotated[
-        bool | None,
-        SpectrumOption("Psi and delta are those of transmitted light, t_p/t_s (that of the file)."),
-    ] = None
-    analyser: Annotated[
-        float | None,
-        SpectrumOption(
-            "Analyser angle in degrees (for alpha and beta columns).",
-            least=0,
-            most=90,
-            exclusive=True,
-            unit="degrees",
-        ),
-    ] = None
-    spot: Annotated[int | None, SpectrumOption("Spot of an Accurion file, counted from 1.", least=1)] = None
-    elements: Annotated[
-        Sequence[str] | None,
-        SpectrumOption(
-            "Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
-            metavar="m12,...",
-            parse=lambda text, name: [word.strip() for word in text.split(",")],
-        ),
-    ] = None
+    columns: str | Sequence[str] | None = _FOR_ALL(
+        "Names of the columns in order, _ to skip.", metavar="NAME,..."
+    )
+    wavelength_unit: str | None = _FOR_SPECTRA("nm, um, A, eV, cm-1 or THz.", find=_wavelength_unit)
+    signal_unit: str | None = _FOR_FILMS(
+        "fraction, percent or absorbance; 8-bit or 16-bit of colours.", find=_signal_unit
+    )
+    folded: bool | None = _FOR_SPECTRA(
+        "Δ is known in 0 to 180 degrees only: cos Δ (by default where it has kinks there).", negative=True
+    )
+    transmission: bool | None = _FOR_SPECTRA(
+        "Psi and delta are those of transmitted light, t_p/t_s (that of the file)."
+    )
+    analyser: float | None = _FOR_SPECTRA(
+        "Analyser angle in degrees (for alpha and beta columns).",
+        **{"least": 0, "most": 90, "exclusive": True, "unit": "degrees"},
+    )
+    spot: int | None = _FOR_SPECTRA("Spot of an Accurion file, counted from 1.", least=1)
+    elements: Sequence[str] | None = _FOR_SPECTRA(
+        "Elements of a Mueller matrix, or ratios ane, aps, asp, to use (all).",
+        metavar="m12,...",
+        parse=lambda text, name: [word.strip() for word in text.split(",")],
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
+@_record
 class ReadingOptions(SpectrumOptions):
     """Options of reading files of data; `[data]` and `[[data.file]]` of a recipe."""
 
-    noise: Annotated[
-        float | str | None,
-        CommonOption(
-            'Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
-            metavar="SIGMA",
-            parse=_number_or_text,
-        ),
-    ] = None
-    region: Annotated[
-        str | list[int] | list[list[int]] | None,
-        ColourOption("X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."),
-    ] = None
-    points: Annotated[
-        str | list[int] | list[list[int]] | None,
-        ColourOption("X,Y of a film in a photograph; ';' between several."),
-    ] = None
-    angle: Annotated[
-        float | list[float] | None,
-        Option(
-            "Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
-            metavar="DEG",
-            parse=parse_angles,
-            least=0,
-            most=90,
-            unit="degrees",
-        ),
-    ] = None
-    reference: Annotated[
-        str | None,
-        SpectrumOption("Raw counts of a bare reference; DATA are then raw counts too.", is_file=True),
-    ] = None
-    reference_material: Annotated[str | None, SpectrumOption("Material of the reference (Si).")] = None
-    dark: Annotated[str | None, SpectrumOption("Raw counts without light.", is_file=True)] = None
+    noise: float | str | None = _FOR_ALL(
+        'Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
+        metavar="SIGMA",
+        parse=_number_or_text,
+    )
+    region: str | list[int] | list[list[int]] | None = _FOR_COLOURS(
+        "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."
+    )
+    points: str | list[int] | list[list[int]] | None = _FOR_COLOURS(
+        "X,Y of a film in a photograph; ';' between several."
+    )
+    angle: float | list[float] | None = _FOR_FILMS(
+        "Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
+        **{"metavar": "DEG", "parse": parse_angles, "least": 0, "most": 90, "unit": "degrees"},
+    )
+    reference: str | None = _FOR_SPECTRA(
+        "Raw counts of a bare reference; DATA are then raw counts too.", is_file=True
+    )
+    reference_material: str | None = _FOR_SPECTRA("Material of the reference (Si).")
+    dark: str | None = _FOR_SPECTRA("Raw counts without light.", is_file=True)
 
 
-@dataclass(frozen=True, kw_only=True)
+@_record
 class FitOptions(Options):
     """Options of a fit; keys of `[data]` of a recipe."""
 
-    loss: Annotated[
-        str | None,
-        CommonOption(
-            "least-squares, or huber or student-t to give outliers little weight.",
-            words=("least-squares", "huber", "student-t"),
-        ),
-    ] = None
-    tolerance: Annotated[
-        float | None,
-        CommonOption("Leave out effects that change the signal by less than this (0: none).", least=0),
-    ] = None
+    loss: str | None = _FOR_ALL(
+        "least-squares, or huber or student-t to give outliers little weight.",
+        words=("least-squares", "huber", "student-t"),
+    )
+    tolerance: float | None = _FOR_ALL(
+        "Leave out effects that change the signal by less than this (0: none).", least=0
+    )
 
 
-@dataclass(frozen=True, kw_only=True)
+@_record
 class FileOptions(ReadingOptions, CameraOptions):
     """Every option of reading a file of spectra or colours."""

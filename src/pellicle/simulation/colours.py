@@ -15,7 +15,8 @@ from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.colour.observers import sensor as observer
 from pellicle.colour.spaces import measured_encoding
 from pellicle.colour.table import REFERENCE, TOLERANCE, FilmColourTable
-from pellicle.data.colours import SPACES, CameraMatrix, Colours
+from pellicle.data.colours import CameraMatrix, Colours
+from pellicle.data.options import SPACES
 from pellicle.effects.differences import signals
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
