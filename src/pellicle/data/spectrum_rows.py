@@ -219,7 +219,6 @@ def _check_monotone(table: Table, axis: AxisColumns, values: np.ndarray, rows: n
                 f"{equal} repeated ones by their mean"
             )
         raise DataError(
-            f"{place}: {values[here]:.10g} {verb} {values[before]:.10g} of "
-            f"{table.place(before)}; within one {one} wavelengths must rise or fall strictly, or come "
-            f"in several complete sweeps, so {remedy}"
+            f"{place}: {values[here]:.10g} {verb} {values[before]:.10g} of {table.place(before)}; within one "
+            f"{one} wavelengths must rise or fall strictly, or come in several complete sweeps, so {remedy}"
         )

@@ -25,7 +25,7 @@ DELTA = np.array([[170.0, 171.0, 172.0], [160.0, 161.0, 162.0]])
 def in_this_process(request, monkeypatch):
     """Read without a child process, whose start takes 0.25 s; tests/data/test_write_spectrum.py has it."""
     if "in_a_child" not in request.node.name:
-        own = lambda reader, content, path: nexus_reader.read_hdf5(content, path)  # noqa: E731
+        own = lambda reader, content: nexus_reader.read_hdf5(content)  # noqa: E731
         monkeypatch.setattr(isolated, "call", own)
 
 
@@ -259,4 +259,4 @@ def test_a_reader_that_fails_in_a_child_is_stopped(function, words, tmp_path, mo
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(isolated, "TIMEOUT", 1.0 if function == "hang" else 60.0)
     with pytest.raises(DataError, match=f"^file.nxs: is a damaged file, on which its reader {words}"):
-        isolated.call(f"fragile_readers:{function}", b"", "file.nxs")
+        isolated.call(f"fragile_readers:{function}", b"")

@@ -30,7 +30,7 @@ def read(file: TextFile, spot: int | None = None) -> Table | None:
 
     Raises UsageError where `spot`, from 1, is missing or wrong, DataError for several zones.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     headings = [comment.text.split("\t") for comment in file.comments]
     heading = next((i for i, names in enumerate(headings) if set(_UNITS) <= set(names)), None)
     if heading is None or not lines:
@@ -42,28 +42,28 @@ def read(file: TextFile, spot: int | None = None) -> Table | None:
         unit = units[columns[name]] if columns[name] < len(units) else ""
         if unit != expected:
             raise DataError(
-                f"{path}: the heading of an Accurion file gives {name} in {unit!r}, not in {expected!r}; "
+                f"the heading of an Accurion file gives {name} in {unit!r}, not in {expected!r}; "
                 "export it in that unit"
             )
     rows = [(line, [cell.strip() for cell in line.text.split("\t")]) for line in lines]
     short = next((line for line, cells in rows if len(cells) < len(names)), None)
     if short is not None:
         raise DataError(
-            f"{path}: line {short.number} has fewer values than the {len(names)} columns of the heading; "
+            f"line {short.number} has fewer values than the {len(names)} columns of the heading; "
             "correct that line"
         )
     notes = ["read as an Accurion data file"]
     if "Zone" in columns:
         zones, note = _zones(rows, columns["Zone"])
-        of_zones = [_select_spot(zone, columns, spot, path) for zone in zones]
+        of_zones = [_select_spot(zone, columns, spot) for zone in zones]
         notes += [note, *of_zones[0][1]]
         rows = _mean([spot_rows for spot_rows, _ in of_zones], columns)
     else:
-        rows, spot_notes = _select_spot(rows, columns, spot, path)
+        rows, spot_notes = _select_spot(rows, columns, spot)
         notes += spot_notes
     points, missing = measured(rows, (columns["Psi"], columns["Delta"]))
     if not points:
-        raise DataError(f"{path}: has no point with psi and delta; check the measurement")
+        raise DataError("has no point with psi and delta; check the measurement")
     kept = [(line, [cells[columns[name]] for name in _UNITS]) for line, cells in points]
     return plain_columns(_NAMES, kept, [*notes, *missing])
 
@@ -108,7 +108,7 @@ def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
     return means
 
 
-def _spots(rows: Rows, columns: dict[str, int], path: str) -> list[Rows]:
+def _spots(rows: Rows, columns: dict[str, int]) -> list[Rows]:
     """The rows of each spot or time: a repeated point begins another spot, in any order of rows.
 
     Positions do not separate spots: stages drift by a tenth of a millimetre while angles change. Raises
@@ -127,9 +127,8 @@ def _spots(rows: Rows, columns: dict[str, int], path: str) -> list[Rows]:
             apart = _distance(_position(first, columns), _position(cells, columns))
             if apart > DRIFT_MM:
                 raise DataError(
-                    f"{path}: line {line.number} lies {apart:.3g} mm from line {before.number}, which should "
-                    "be of the same spot: some of its points are missing; keep the rows of one spot in the "
-                    "file"
+                    f"line {line.number} lies {apart:.3g} mm from line {before.number}, which should be of "
+                    "the same spot: some of its points are missing; keep the rows of one spot in the file"
                 )
     return spots
 
@@ -149,9 +148,9 @@ def _distance(one: tuple[float, ...], other: tuple[float, ...]) -> float:
     return dist(one, other) if len(one) == len(other) else 0.0
 
 
-def _select_spot(rows: Rows, columns: dict[str, int], spot: int | None, path: str) -> tuple[Rows, list[str]]:
+def _select_spot(rows: Rows, columns: dict[str, int], spot: int | None) -> tuple[Rows, list[str]]:
     """The rows of one spot, and notes. Raises UsageError where `spot` is missing or wrong."""
-    spots = _spots(rows, columns, path)
+    spots = _spots(rows, columns)
     if spot is None and len(spots) == 1:
         return spots[0], []
     heads = [(line, _region(cells, columns), _position(cells, columns)) for (line, cells), *_ in spots]
@@ -164,10 +163,10 @@ def _select_spot(rows: Rows, columns: dict[str, int], spot: int | None, path: st
     if spot is not None and 1 <= spot <= len(spots):
         return spots[spot - 1], [f"spot {spot} of {len(spots)}{labels[spot - 1] if len(spots) > 1 else ''}"]
     if len(spots) == 1:
-        raise UsageError(f"{path}: has one spot only; leave `spot` out")
+        raise UsageError("has one spot only; leave `spot` out")
     listed = "; ".join(f"{i}{label}" for i, label in enumerate(labels[:_MOST_LISTED], start=1))
     more = "; ..." if len(labels) > _MOST_LISTED else ""
     raise UsageError(
-        f"{path}: has {len(spots)} spots or times of one sample, which may differ: {listed}{more}; choose "
+        f"has {len(spots)} spots or times of one sample, which may differ: {listed}{more}; choose "
         f"one, from `spot=1` to `spot={len(spots)}`"
     )

@@ -1,8 +1,8 @@
 """Detection of a file's format by its content, and the tables in it.
 
 A text reader takes a `TextFile` and returns the tables of plain columns of its spectra, whose rows keep
-their line numbers, or None for another format. A binary reader takes the content. Cells, units and axes are
-then checked as in any other file, and messages name the lines of the user's file.
+their line numbers, or None for another format. A binary reader takes the content. Their errors name the line;
+the file is put in front here. Cells, units and axes are then checked as in any other file.
 """
 
 import os
@@ -12,13 +12,13 @@ from dataclasses import replace
 from pellicle.data.formats import accurion, jcamp, nexus, spectrometers, vendor_binary, woollam
 from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
 from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
-from pellicle.data.tabular.layout import bulk_layout, find_layout
+from pellicle.data.tabular.layout import bulk_layout, layout_of
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.text import TextFile, read_bytes, text_file
+from pellicle.data.tabular.text import TextFile, in_file, read_bytes, text_file
 from pellicle.errors import UsageError
 
 TextReader = Callable[[TextFile], Sequence[Table] | None]
-BinaryReader = Callable[[bytes, str], Sequence[Table] | None]
+BinaryReader = Callable[[bytes], Sequence[Table] | None]
 
 TEXT_READERS: tuple[TextReader, ...] = (
     jcamp.read,
@@ -46,19 +46,21 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     ambiguous file, UsageError for a missing or wrong spot.
     """
     content, digest = read_bytes(path)
-    for reader in BINARY_READERS:
-        if tables := reader(content, str(path)):
-            return [replace(table, path=str(path), sha256=digest) for table in tables]
+    with in_file(path):
+        binary = next((tables for reader in BINARY_READERS if (tables := reader(content))), ())
+    if binary:
+        return [replace(table, path=str(path), sha256=digest) for table in binary]
     if spot is None:
         plain = bulk_layout(
             content,
             lambda head: text_file(head, digest, path),
-            lambda head: None if _export_tables(head, None) else find_layout(head),
+            lambda head: None if _export_tables(head, None) else layout_of(head),
         )
         if plain is not None:
             return [replace(plain, path=str(path), sha256=digest)]
     file = text_file(content, digest, path)
-    tables = _export_tables(file, spot) or [find_layout(file)]
+    with in_file(path):
+        tables = _export_tables(file, spot) or [layout_of(file)]
     return [replace(table, path=file.path, sha256=digest) for table in tables]
 
 
@@ -68,5 +70,5 @@ def _export_tables(file: TextFile, spot: int | None) -> Sequence[Table] | None:
     if table is not None:
         return [table]
     if spot is not None:
-        raise UsageError(f"{file.path}: `spot` selects a spot of an Accurion file, which this is not")
+        raise UsageError("`spot` selects a spot of an Accurion file, which this is not")
     return next((tables for reader in TEXT_READERS if (tables := reader(file))), None)

@@ -41,7 +41,7 @@ def horiba(file: TextFile) -> list[Table] | None:
 
     Raises DataError where the file has none, but Is and Ic.
     """
-    path, blocks = file.path, _horiba_blocks(file)
+    blocks = _horiba_blocks(file)
     if not {_HORIBA_DATA, _HORIBA_ANGLE} <= set(blocks):
         return None
     header, rows = blocks[_HORIBA_DATA][:1], blocks[_HORIBA_DATA][1:]
@@ -52,21 +52,19 @@ def horiba(file: TextFile) -> list[Table] | None:
     unit = wavelength_unit(names[0]) if names else None
     if unit is None or not is_number(angle):
         raise DataError(
-            f"{path}: a Horiba file should give its angle below {_HORIBA_ANGLE} and the names of its "
+            f"a Horiba file should give its angle below {_HORIBA_ANGLE} and the names of its "
             f"columns, nm or eV first, below {_HORIBA_DATA}; export it again"
         )
     columns = [name.lower() for name in names]
     if not set(_PSI_DELTA) <= set(columns):
         raise DataError(
-            f"{path}: line {header[0].number} names {', '.join(names)}, not Psi and Delta; export these, "
+            f"line {header[0].number} names {', '.join(names)}, not Psi and Delta; export these, "
             "since the meaning of Is and Ic depends on the setting of the modulator"
         )
     odd = next((line for line, cells in table if len(cells) != len(names)), None)
     if odd is not None or not table:
         place = f"line {odd.number} has other values than the" if odd else "there are no rows below the"
-        raise DataError(
-            f"{path}: {place} {len(names)} columns of the heading; correct that, or export it again"
-        )
+        raise DataError(f"{place} {len(names)} columns of the heading; correct that, or export it again")
     psi, delta = (columns.index(name) for name in _PSI_DELTA)
     points: Rows = [(line, [cells[0], angle, cells[psi], cells[delta]]) for line, cells in table]
     ignored = [name for name, column in zip(names[1:], columns[1:], strict=True) if column not in _PSI_DELTA]
@@ -99,7 +97,7 @@ def spectraray(file: TextFile) -> list[Table] | None:
 
     Raises DataError where the pairs of columns do not match.
     """
-    path, heading = file.path, file.lines[0]
+    heading = file.lines[0]
     word, *numbers = heading.text.lstrip(";").replace(",", ".").split() or [""]
     if word.upper() not in _SENTECH_AXES or not numbers or not all(map(is_number, numbers)):
         return None
@@ -108,22 +106,21 @@ def spectraray(file: TextFile) -> list[Table] | None:
     count = len(quantities)
     if numbers != [angle for angle in angles for _ in quantities]:
         raise DataError(
-            f"{path}: line {heading.number} should name each angle of incidence twice, for psi and for "
-            f"delta, or {len(MUELLER)} times, for a Mueller matrix, but says {' '.join(numbers)}; export it"
-            " again"
+            f"line {heading.number} should name each angle of incidence twice, for psi and for delta, or "
+            f"{len(MUELLER)} times, for a Mueller matrix, but says {' '.join(numbers)}; export it again"
         )
     rows: Rows = []
     for line in file.lines[1:]:
         cells = _points(line).split()
         if len(cells) != 1 + len(numbers):
             raise DataError(
-                f"{path}: line {line.number} has {len(cells)} values where a wavelength and {count} values "
+                f"line {line.number} has {len(cells)} values where a wavelength and {count} values "
                 f"at {len(angles)} angles make {1 + len(numbers)}; correct that line"
             )
         for i, angle in enumerate(angles):
             rows.append((line, [cells[0], angle, *cells[1 + count * i : 1 + count * (i + 1)]]))
     if not rows:
-        raise DataError(f"{path}: has a heading of SpectraRay but no rows; export it again")
+        raise DataError("has a heading of SpectraRay but no rows; export it again")
     names = (_SENTECH_AXES[word.upper()], "angle_deg", *quantities)
     notes = [f"measured at {', '.join(angles)} degrees"]
     return [export("Sentech SpectraRay text", names, rows, notes=notes, decimal=".")]
@@ -140,7 +137,7 @@ def regress_pro(file: TextFile) -> list[Table] | None:
 
     Raises DataError for a row of another length, or none.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     heading = lines[0].text.split()
     if heading not in (_ALPHA_BETA, _TAN_COS):
         return None
@@ -154,11 +151,11 @@ def regress_pro(file: TextFile) -> list[Table] | None:
             rows.append((line, cells))
         else:
             raise DataError(
-                f"{path}: line {line.number} is not {_ROW}, a wavelength and two values, as the rows of a "
+                f"line {line.number} is not {_ROW}, a wavelength and two values, as the rows of a "
                 f"file of {' '.join(heading)} are; correct that line"
             )
     if not rows:
-        raise DataError(f"{path}: has the heading {' '.join(heading)} but no rows; export it again")
+        raise DataError(f"has the heading {' '.join(heading)} but no rows; export it again")
     names, notes = ["wavelength (nm)", "alpha", "beta"], []
     if heading == _TAN_COS:
         names = ["wavelength (nm)", "tan_psi", "cos_delta"]
@@ -190,19 +187,19 @@ def film_sense(file: TextFile) -> list[Table] | None:
 
     Raises DataError for a file that is not complete.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     kind = lines[0].text.strip()
     if not kind.startswith(_FILM_SENSE):
         return None
     if kind not in (_STATIC, _DYNAMIC):
         raise DataError(
-            f"{path}: is a Film Sense file of the kind {kind}, which is not read; export each measurement as "
+            f"is a Film Sense file of the kind {kind}, which is not read; export each measurement as "
             f"{_STATIC}, or those of one spot as {_DYNAMIC}"
         )
     counts = lines[1].text.split() if len(lines) > 1 else []
     if len(counts) < 3 or not counts[0].isdigit() or not counts[1].isdigit() or not is_number(counts[2]):
         raise DataError(
-            f"{path}: line 2 of a Film Sense file should give the numbers of LEDs and of measurements and "
+            "line 2 of a Film Sense file should give the numbers of LEDs and of measurements and "
             "the angle of incidence; export it again"
         )
     leds, angle = int(counts[0]), f"{abs(float(counts[2])):g}"
@@ -210,48 +207,44 @@ def film_sense(file: TextFile) -> list[Table] | None:
     rows = lines[2 + leds :]
     facts = [("date", date[1]) for line in rows[-1:] if (date := _DATE.search(line.text))]
     if kind == _DYNAMIC:
-        return _film_sense_times(rows, settings, facts, path)
+        return _film_sense_times(rows, settings, facts)
     if int(counts[1]) != 1:
         raise DataError(
-            f"{path}: has {counts[1]} measurements by its line 2, where a static Film Sense file has one; "
+            f"has {counts[1]} measurements by its line 2, where a static Film Sense file has one; "
             "export each as a file of its own"
         )
     if len(rows) < leds:
-        raise DataError(
-            f"{path}: has {len(rows)} lines of N, C, S for {leds} LEDs; it is cut short, export it again"
-        )
+        raise DataError(f"has {len(rows)} lines of N, C, S for {leds} LEDs; it is cut short, export it again")
     points: Rows = [
-        (line, [*setting, *_film_sense_values(line.text.split(), line, path)])
+        (line, [*setting, *_film_sense_values(line.text.split(), line)])
         for line, setting in zip(rows[:leds], settings, strict=True)
     ]
     return [export("Film Sense text", _LED_NAMES, points, facts=facts, decimal=".")]
 
 
-def _film_sense_times(
-    lines: Sequence[Line], settings: Sequence[list[str]], facts: Facts, path: str
-) -> list[Table]:
+def _film_sense_times(lines: Sequence[Line], settings: Sequence[list[str]], facts: Facts) -> list[Table]:
     """The measurement of each time; `settings` has the wavelength and the angle of each LED."""
     names = lines[0].text.split() if lines else []
     ends = [name.rpartition("_")[2] for name in names]
     columns = {value: [i for i, end in enumerate(ends) if end == value and i] for value in _LED_VALUES}
     if not names or names[0] != "Time" or any(len(of) != len(settings) for of in columns.values()):
         raise DataError(
-            f"{path}: the heading of a dynamic Film Sense file should name Time and N, C, S and P of each of "
+            f"the heading of a dynamic Film Sense file should name Time and N, C, S and P of each of "
             f"its {len(settings)} LEDs; export it again"
         )
     rows = [(line, cells) for line in lines[1:] if is_number((cells := line.text.split())[0])]
     if not rows:
-        raise DataError(f"{path}: has a Film Sense heading but no measurement; export it again")
+        raise DataError("has a Film Sense heading but no measurement; export it again")
     layouts = []
     for line, cells in rows:
         if len(cells) < len(names):
             raise DataError(
-                f"{path}: line {line.number} has {len(cells)} values where the heading names {len(names)}; "
+                f"line {line.number} has {len(cells)} values where the heading names {len(names)}; "
                 "correct that line"
             )
         points: Rows = []
         for setting, places in zip(settings, zip(*columns.values(), strict=True), strict=True):
-            values = _film_sense_values([cells[place] for place in places], line, path)
+            values = _film_sense_values([cells[place] for place in places], line)
             points.append((line, [*setting, *values]))
         time = f"{cells[0]} s"
         notes = [f"measured at {time}"]
@@ -260,10 +253,10 @@ def _film_sense_times(
     return layouts
 
 
-def _film_sense_values(cells: Sequence[str], line: Line, path: str) -> list[str]:
+def _film_sense_values(cells: Sequence[str], line: Line) -> list[str]:
     """N, C, S and the depolarisation 1 − P². Raises DataError where P is missing."""
     if len(cells) < len(_LED_VALUES) or not is_number(cells[3]):
         raise DataError(
-            f"{path}: line {line.number} is not N, C, S and the degree of polarisation; correct that line"
+            f"line {line.number} is not N, C, S and the degree of polarisation; correct that line"
         )
     return [*cells[:3], repr(1 - float(cells[3]) ** 2)]

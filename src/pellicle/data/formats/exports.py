@@ -165,7 +165,7 @@ def signal_column(text: str) -> str | None:
     return f"{column.role}{column.polarisation or ''}{unit}" if not column.unknown_unit else text
 
 
-def readable(curves: Sequence[Curve], path: str) -> list[Table]:
+def readable(curves: Sequence[Curve]) -> list[Table]:
     """Return the layouts of the curves that are spectra of R, T or absorbance, under different names.
 
     Where there is none, the quantity of the first is declared, and refused when it is read. Raises DataError
@@ -174,7 +174,7 @@ def readable(curves: Sequence[Curve], path: str) -> list[Table]:
     along = [curve for curve in curves if axis_column(curve.axis)]
     if not along:
         raise DataError(
-            f"{path}: its axis is {curves[0].axis!r}, which is no wavelength, energy or wavenumber; export a "
+            f"its axis is {curves[0].axis!r}, which is no wavelength, energy or wavenumber; export a "
             "spectrum as CSV"
         )
     named = [(curve, signal_column(curve.quantity)) for curve in along]

@@ -23,7 +23,7 @@ _MOST_LINKS = 20  # soft links that point to soft links
 _MOST_DEPTH = 20
 
 
-def groups(file: Any, path: str) -> Iterator[tuple[str, Any]]:
+def groups(file: Any) -> Iterator[tuple[str, Any]]:
     """Yield the root and every group below it once, with its name; links to elsewhere are not followed.
 
     Raises DataError for more than 1000 groups.
@@ -35,7 +35,7 @@ def groups(file: Any, path: str) -> Iterator[tuple[str, Any]]:
     while pending:
         name, group = pending.pop(0)
         if len(seen) > _MOST_GROUPS:
-            raise DataError(f"{path}: has more than {_MOST_GROUPS} groups; export one spectrum as CSV")
+            raise DataError(f"has more than {_MOST_GROUPS} groups; export one spectrum as CSV")
         if group in seen or name.count("/") > _MOST_DEPTH:  # equal groups are one under two names
             continue
         seen.add(group)
@@ -47,7 +47,7 @@ def groups(file: Any, path: str) -> Iterator[tuple[str, Any]]:
                     pending.append((f"{name.rstrip('/')}/{child}", member))
 
 
-def member(group: Any, name: str, path: str, links: int = 0) -> Any:
+def member(group: Any, name: str, links: int = 0) -> Any:
     """Return a member by its name or path, None where it is missing.
 
     Raises DataError for a link to another file, and for links in a circle.
@@ -60,19 +60,17 @@ def member(group: Any, name: str, path: str, links: int = 0) -> Any:
         if link is None:
             return None
         if isinstance(link, h5py.ExternalLink):
-            raise DataError(
-                f"{path}: {name} is a link to another file, {link.filename!r}; export the data into one"
-            )
+            raise DataError(f"{name} is a link to another file, {link.filename!r}; export the data into one")
         if isinstance(link, h5py.SoftLink):
             if links > _MOST_LINKS:
-                raise DataError(f"{path}: {name} is a link to itself; export it again")
-            here = member(here, link.path, path, links + 1)
+                raise DataError(f"{name} is a link to itself; export it again")
+            here = member(here, link.path, links + 1)
         else:
             here = here[part]
     return here
 
 
-def numbers(dataset: Any, name: str, path: str) -> np.ndarray | None:
+def numbers(dataset: Any, name: str) -> np.ndarray | None:
     """Return the values of a dataset of numbers, None for anything else.
 
     Raises DataError for one that is stored in another file, or too large.
@@ -82,12 +80,10 @@ def numbers(dataset: Any, name: str, path: str) -> np.ndarray | None:
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu" or dataset.shape is None:
         return None
     if dataset.is_virtual or dataset.external:
-        raise DataError(f"{path}: {name} is stored in another dataset or file; export the data into one")
+        raise DataError(f"{name} is stored in another dataset or file; export the data into one")
     chunk = prod(dataset.chunks or (1,)) * dataset.dtype.itemsize
     if dataset.size is None or dataset.size > MOST_NUMBERS or chunk > _MOST_CHUNK:
-        raise DataError(
-            f"{path}: {name} has {dataset.size} values, more than a spectrum; export one spectrum as CSV"
-        )
+        raise DataError(f"{name} has {dataset.size} values, more than a spectrum; export one spectrum as CSV")
     return np.asarray(dataset[()], dtype=np.float64)
 
 

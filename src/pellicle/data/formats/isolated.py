@@ -21,22 +21,20 @@ TIMEOUT = 60.0
 _CHILD = "from pellicle.data.formats.isolated import answer; answer()"
 
 
-def call(reader: str, content: bytes, path: str) -> list[Table]:
-    """Return `function(content, path)` for a reader "module:function" of numbers, called in a child process.
+def call(reader: str, content: bytes) -> list[Table]:
+    """Return `function(content)` for a reader "module:function" of numbers, called in a child process.
 
     Raises DataError as the reader does, and where it crashes or does not end.
     """
-    command = [sys.executable, "-P", "-c", _CHILD, reader, path]
+    command = [sys.executable, "-P", "-c", _CHILD, reader]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    damaged = f"{path}: is a damaged file, on which its reader"
+    damaged = "is a damaged file, on which its reader"
     try:
         done = subprocess.run(command, input=content, capture_output=True, timeout=TIMEOUT, env=environment)
     except subprocess.TimeoutExpired:
         raise DataError(f"{damaged} does not end; copy or export it again") from None
     except OSError as error:
-        raise DataError(
-            f"{path}: its reader cannot be started ({error.strerror}); export the file as CSV"
-        ) from None
+        raise DataError(f"its reader cannot be started ({error.strerror}); export the file as CSV") from None
     head, _, numbers = done.stdout.partition(b"\n")
     if done.returncode or not head:
         raise DataError(f"{damaged} crashes; copy or export it again")
@@ -59,7 +57,7 @@ def answer() -> None:
     """Answer a parent process: call the reader that the arguments name on the standard input."""
     module, _, function = sys.argv[1].partition(":")
     try:
-        layouts = getattr(importlib.import_module(module), function)(sys.stdin.buffer.read(), sys.argv[2])
+        layouts = getattr(importlib.import_module(module), function)(sys.stdin.buffer.read())
     except DataError as error:
         sys.stdout.buffer.write(json.dumps({"error": str(error)}).encode())
         return

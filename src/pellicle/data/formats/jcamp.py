@@ -77,13 +77,12 @@ def read(file: TextFile) -> list[Table] | None:
     if "JCAMPDX" not in heads and not {"TITLE", "XUNITS", "YUNITS"} <= set(heads):
         return None
     blocks = _blocks(file)
-    curves = [curve for block in blocks for curve in _curves(block, file.path)]
+    curves = [curve for block in blocks for curve in _curves(block)]
     if not curves:
         raise DataError(
-            f"{file.path}: is a JCAMP-DX file without a table of a spectrum (XYDATA or XYPOINTS); export "
-            "it as CSV"
+            "is a JCAMP-DX file without a table of a spectrum (XYDATA or XYPOINTS); export it as CSV"
         )
-    return readable(curves, file.path)
+    return readable(curves)
 
 
 def _label(text: str) -> str:
@@ -121,19 +120,19 @@ def _blocks(file: TextFile) -> list[_Block]:
     return blocks
 
 
-def _curves(block: _Block, path: str) -> Iterator[Curve]:
+def _curves(block: _Block) -> Iterator[Curve]:
     """The curve of each table of a block."""
     paged = "NTUPLES" in block.records
     for table in block.tables:
         if paged:
-            page = _paged(block, table, path)
+            page = _paged(block, table)
             if page is None:
                 continue
             axis, quantity, scales = page
         else:
             axis, quantity = block.text("XUNITS"), block.text("YUNITS")
-            scales = _scales(block, path)
-        x, y = points_of(table, scales, path)
+            scales = _scales(block)
+        x, y = points_of(table, scales)
         names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
             (line, [repr(float(abscissa)), repr(value)])
@@ -142,9 +141,7 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
         ]
         unknown = len(y) - len(rows)
         if not rows:
-            raise DataError(
-                f"{path}: line {table.line.number} begins a table without points; the file is cut short"
-            )
+            raise DataError(f"line {table.line.number} begins a table without points; the file is cut short")
         notes = [f"{unknown} points of unknown value (?) left out"] if unknown else []
         title, facts = block.text("TITLE"), first_stated(_FACTS, block.text)
         layout = export(
@@ -153,20 +150,20 @@ def _curves(block: _Block, path: str) -> Iterator[Curve]:
         yield Curve(layout, axis, quantity, block.records.get("YUNITS", ("", table.line))[1].number)
 
 
-def _scales(block: _Block, path: str) -> Scales:
+def _scales(block: _Block) -> Scales:
     comma = any(_COMMA.match(block.text(label)) for label in _LIMITS)
     return Scales(
-        _number(block, "FIRSTX", path),
-        _number(block, "LASTX", path),
-        _number(block, "DELTAX", path),
-        _count(block, "NPOINTS", path),
-        _factor(block, "XFACTOR", path),
-        _factor(block, "YFACTOR", path),
+        _number(block, "FIRSTX"),
+        _number(block, "LASTX"),
+        _number(block, "DELTAX"),
+        _count(block, "NPOINTS"),
+        _factor(block, "XFACTOR"),
+        _factor(block, "YFACTOR"),
         "," if comma else ".",
     )
 
 
-def _paged(block: _Block, table: Rows, path: str) -> tuple[str, str, Scales] | None:
+def _paged(block: _Block, table: Rows) -> tuple[str, str, Scales] | None:
     """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
     form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
     symbols = [symbol.strip().upper() for symbol in block.text("SYMBOL").split(",")]
@@ -174,99 +171,99 @@ def _paged(block: _Block, table: Rows, path: str) -> tuple[str, str, Scales] | N
         return None
     x, y = symbols.index(form[1].upper()), symbols.index(form[2].upper())
     scales = Scales(
-        _number(block, "FIRST", path, x),
-        _number(block, "LAST", path, x),
+        _number(block, "FIRST", x),
+        _number(block, "LAST", x),
         None,
-        _count(block, "VARDIM", path, y),
-        _factor(block, "FACTOR", path, x),
-        _factor(block, "FACTOR", path, y),
+        _count(block, "VARDIM", y),
+        _factor(block, "FACTOR", x),
+        _factor(block, "FACTOR", y),
         ".",
     )
     return block.text("UNITS", x), block.text("UNITS", y) or block.text("VARNAME", y), scales
 
 
-def _number(block: _Block, label: str, path: str, place: int | None = None) -> float | None:
+def _number(block: _Block, label: str, place: int | None = None) -> float | None:
     """The number of a record, of a variable of NTUPLES that at its `place`; None where there is none."""
     text = block.text(label, place)
     if not text:
         return None
     line = block.records[label][1]
     if not _NUMBER.fullmatch(text):
-        raise DataError(f"{path}: line {line.number}: {label} is {text[:40]!r}, not a number; correct it")
+        raise DataError(f"line {line.number}: {label} is {text[:40]!r}, not a number; correct it")
     value = float(text.replace(",", "."))
     if not np.isfinite(value):
-        raise DataError(f"{path}: line {line.number}: {label} is not a finite number; correct it")
+        raise DataError(f"line {line.number}: {label} is not a finite number; correct it")
     return value
 
 
-def _factor(block: _Block, label: str, path: str, place: int | None = None) -> float:
-    value = _number(block, label, path, place)
+def _factor(block: _Block, label: str, place: int | None = None) -> float:
+    value = _number(block, label, place)
     if value == 0:
-        raise DataError(f"{path}: {label} is 0, which leaves no values; export it again")
+        raise DataError(f"{label} is 0, which leaves no values; export it again")
     return 1.0 if value is None else value
 
 
-def _count(block: _Block, label: str, path: str, place: int | None = None) -> int | None:
-    value = _number(block, label, path, place)
+def _count(block: _Block, label: str, place: int | None = None) -> int | None:
+    value = _number(block, label, place)
     if value is None:
         return None
     if value != int(value) or not 1 <= value <= MOST_POINTS:
         raise DataError(
-            f"{path}: line {block.records[label][1].number}: {label} is {value:g}, which is no number of "
+            f"line {block.records[label][1].number}: {label} is {value:g}, which is no number of "
             f"points from 1 to {MOST_POINTS}; export it again"
         )
     return int(value)
 
 
-def points_of(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], Sequence[Point]]:
+def points_of(table: Rows, scales: Scales) -> tuple[Sequence[float], Sequence[Point]]:
     """Abscissae and ordinates of a table. Raises DataError where they contradict the records."""
     form = re.sub(r"\s", "", table.form).upper()
     if form.startswith("(XY..XY)"):
-        x, y = _pairs(table, scales, path)
+        x, y = _pairs(table, scales)
     elif re.match(r"\(\w\+\+\(\w\.\.\w\)\)", form):
-        x, y = _even(table, scales, path)
+        x, y = _even(table, scales)
     else:
         raise DataError(
-            f"{path}: line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and "
+            f"line {table.line.number}: a table {table.form!r} is not read, only (X++(Y..Y)) and "
             "(XY..XY); export it as CSV"
         )
     return x, [(value * scales.y_factor, line) for value, line in y]
 
 
-def _pairs(table: Rows, scales: Scales, path: str) -> tuple[list[float], list[Point]]:
+def _pairs(table: Rows, scales: Scales) -> tuple[list[float], list[Point]]:
     x: list[float] = []
     y: list[Point] = []
     for line, text in table.rows:
-        numbers = plain_numbers(line, text, scales.decimal, path)
+        numbers = plain_numbers(line, text, scales.decimal)
         if len(numbers) % 2:
             raise DataError(
-                f"{path}: line {line.number} has {len(numbers)} numbers where pairs of x and y are expected; "
+                f"line {line.number} has {len(numbers)} numbers where pairs of x and y are expected; "
                 "correct that line"
             )
         x += [value * scales.x_factor for value in numbers[::2]]
         y += [(value, line) for value in numbers[1::2]]
-    _check_number(len(y), scales, table, path)
+    _check_number(len(y), scales, table)
     step = abs(x[-1] - x[0]) / max(len(x) - 1, 1) if x else 0.0
     ends = ((scales.first, x[0], "FIRSTX"), (scales.last, x[-1], "LASTX")) if x else ()
     for stated, read, label in ends:
         if stated is not None and abs(stated - read) > step + 1e-3 * abs(read):
             raise DataError(
-                f"{path}: {label} is {stated:g}, but the table has {read:g} there; check its decimal "
+                f"{label} is {stated:g}, but the table has {read:g} there; check its decimal "
                 "marks, or export it as CSV"
             )
     return x, y
 
 
-def _even(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], list[Point]]:
+def _even(table: Rows, scales: Scales) -> tuple[Sequence[float], list[Point]]:
     most = scales.points or MOST_POINTS
-    y, starts = ordinates(table.rows, most, scales.decimal, path)
-    _check_number(len(y), scales, table, path)
+    y, starts = ordinates(table.rows, most, scales.decimal)
+    _check_number(len(y), scales, table)
     if not y:
         return [], []
     first, last = scales.first, scales.last
     if first is None or (last is None and scales.step is None):
         raise DataError(
-            f"{path}: line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its "
+            f"line {table.line.number}: the table needs FIRSTX and LASTX above it, which give its "
             "axis; export it as CSV"
         )
     if last is None:
@@ -274,7 +271,7 @@ def _even(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], list
     step = (last - first) / max(len(y) - 1, 1)
     if scales.step is not None and abs(abs(scales.step) - abs(step)) > 0.01 * abs(step):
         raise DataError(
-            f"{path}: DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX "
+            f"DELTAX is {scales.step:g}, but {len(y)} points from FIRSTX {first:g} to LASTX "
             f"{last:g} are {step:g} apart; export it again"
         )
     factor = scales.x_factor
@@ -284,15 +281,15 @@ def _even(table: Rows, scales: Scales, path: str) -> tuple[Sequence[float], list
         # some programs write the abscissae of a table without the factor
         if min(abs(abscissa * factor - expected), abs(abscissa - expected)) > room:
             raise DataError(
-                f"{path}: line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and "
+                f"line {line.number} begins at {abscissa * factor:g}, where FIRSTX, LASTX and "
                 f"NPOINTS put {expected:g}; points are missing or the records are wrong, so export it again"
             )
     return np.linspace(first, last, len(y)).tolist(), y
 
 
-def _check_number(count: int, scales: Scales, table: Rows, path: str) -> None:
+def _check_number(count: int, scales: Scales, table: Rows) -> None:
     if scales.points is not None and count != scales.points:
         raise DataError(
-            f"{path}: the table from line {table.line.number} has {count} points where NPOINTS states "
+            f"the table from line {table.line.number} has {count} points where NPOINTS states "
             f"{scales.points}; the file is cut short or damaged, so export it again"
         )

@@ -30,19 +30,17 @@ Point = tuple[float, Line]
 """A value and the line it is from; NaN for an ordinate that the file marks as unknown (`?`)."""
 
 
-def plain_numbers(line: Line, text: str, decimal: str, path: str) -> list[float]:
+def plain_numbers(line: Line, text: str, decimal: str) -> list[float]:
     """Return the numbers of a line in plain form (AFFN or PAC). Raises DataError for other text."""
     pattern = _COMMA if decimal == "," else _PLAIN
     rest = _BETWEEN.fullmatch(pattern.sub("", text))
     if not rest:
-        raise DataError(
-            f"{path}: line {line.number}: {text.strip()[:40]!r} is no row of numbers; correct that line"
-        )
+        raise DataError(f"line {line.number}: {text.strip()[:40]!r} is no row of numbers; correct that line")
     return [float("nan") if x == "?" else float(x.replace(",", ".")) for x in pattern.findall(text)]
 
 
 def ordinates(
-    lines: Sequence[tuple[Line, str]], most: int, decimal: str, path: str
+    lines: Sequence[tuple[Line, str]], most: int, decimal: str
 ) -> tuple[list[Point], list[tuple[float, int]]]:
     """Return the ordinates of a table (X++(Y..Y)), and the abscissa of each line with its first ordinate.
 
@@ -54,16 +52,16 @@ def ordinates(
     differences = False
     for line, text in lines:
         if packed:
-            abscissa, read, ends_in_difference = _packed(line, text, most, path)
+            abscissa, read, ends_in_difference = _packed(line, text, most)
         else:
-            numbers = plain_numbers(line, text, decimal, path)
+            numbers = plain_numbers(line, text, decimal)
             if not numbers:
-                raise _unreadable(line, text, path)
+                raise _unreadable(line, text)
             (abscissa, *read), ends_in_difference = numbers, False
         if differences and read:
             if not isclose(read[0], values[-1][0], rel_tol=1e-9, abs_tol=1e-9):
                 raise DataError(
-                    f"{path}: line {line.number} begins with {read[0]:g}, not with {values[-1][0]:g}, the "
+                    f"line {line.number} begins with {read[0]:g}, not with {values[-1][0]:g}, the "
                     "last value of the line before; the file is damaged, so export it again"
                 )
             read = read[1:]
@@ -72,15 +70,14 @@ def ordinates(
             starts.append((abscissa, len(values)))
         if len(values) + len(read) > most:
             raise DataError(
-                f"{path}: line {line.number} goes beyond the {most} points that NPOINTS states; export it "
-                "again"
+                f"line {line.number} goes beyond the {most} points that NPOINTS states; export it again"
             )
         values += [(value, line) for value in read]
         differences = ends_in_difference
     return values, starts
 
 
-def _packed(line: Line, text: str, most: int, path: str) -> tuple[float, list[float], bool]:
+def _packed(line: Line, text: str, most: int) -> tuple[float, list[float], bool]:
     """The abscissa and ordinates of a line with pseudo-digits, and whether it ends in a difference."""
     abscissa: float | None = None
     values: list[float] = []
@@ -90,7 +87,7 @@ def _packed(line: Line, text: str, most: int, path: str) -> tuple[float, list[fl
     while position < len(text):
         match = _PACKED.match(text, position)
         if match is None or match.end() == position:
-            raise _unreadable(line, text[position:], path)
+            raise _unreadable(line, text[position:])
         position, digit = match.end(), match["digit"]
         number = match["number"].replace(",", ".")
         if match["unknown"]:
@@ -99,37 +96,37 @@ def _packed(line: Line, text: str, most: int, path: str) -> tuple[float, list[fl
         elif digit in _DUP:
             count = int(float(_DUP[digit] + number))
             if not values or count > most + 1:
-                raise _unreadable(line, match.group(), path)
+                raise _unreadable(line, match.group())
             for _ in range(count - 1):
                 values.append(values[-1] + (step or 0))
         elif digit in _DIF:
             if not values:
-                raise _unreadable(line, match.group(), path)
-            step = _float(_DIF[digit] + number, line, path)
+                raise _unreadable(line, match.group())
+            step = _float(_DIF[digit] + number, line)
             values.append(values[-1] + step)
         else:
-            value = _float(_SQZ.get(digit, digit) + number, line, path)
+            value = _float(_SQZ.get(digit, digit) + number, line)
             step = None
             if abscissa is None:
                 abscissa = value
             else:
                 values.append(value)
         if len(values) > most + 1:
-            raise _unreadable(line, match.group(), path)
+            raise _unreadable(line, match.group())
     if abscissa is None:
-        raise _unreadable(line, text, path)
+        raise _unreadable(line, text)
     return abscissa, values, step is not None
 
 
-def _float(text: str, line: Line, path: str) -> float:
+def _float(text: str, line: Line) -> float:
     try:
         return float(text)
     except ValueError:
-        raise _unreadable(line, text, path) from None
+        raise _unreadable(line, text) from None
 
 
-def _unreadable(line: Line, text: str, path: str) -> DataError:
+def _unreadable(line: Line, text: str) -> DataError:
     return DataError(
-        f"{path}: line {line.number}: {text.strip()[:40]!r} is no JCAMP-DX ordinate here; the file is "
+        f"line {line.number}: {text.strip()[:40]!r} is no JCAMP-DX ordinate here; the file is "
         "damaged, so export it again"
     )

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
 from pellicle.data.tabular.columns import Column, is_header, recognise
-from pellicle.data.tabular.layout import find_layout
+from pellicle.data.tabular.layout import layout_of
 from pellicle.data.tabular.table import Table, declarations, plain_columns
 from pellicle.data.tabular.text import TextFile, is_number
 
@@ -149,7 +149,7 @@ def stacked_tables(file: TextFile) -> list[Table] | None:
     layouts = []
     for i, (start, header) in enumerate(zip(starts, headers, strict=True)):
         stop = starts[i + 1] if i + 1 < len(starts) else len(lines)
-        layout = find_layout(TextFile(file.path, file.sha256, lines[start:stop]))
+        layout = layout_of(TextFile(file.path, file.sha256, lines[start:stop]))
         title = lines[start].text.strip('"') if start < header else f"table {i + 1}"
         note = f"table {i + 1} of {len(headers)} in the file"
         layouts.append(dataclasses.replace(layout, name=title, remarks=(note, *layout.remarks)))

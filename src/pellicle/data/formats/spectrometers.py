@@ -76,9 +76,7 @@ def avantes(file: TextFile) -> list[Table] | None:
     # a closing delimiter leaves an empty cell
     rows = [(line, cells[:-1] if cells[len(columns) :] == [""] else cells) for line, cells in rows]
     if not rows:
-        raise DataError(
-            f"{file.path}: has no rows below the units on line {lines[below].number}; export it again"
-        )
+        raise DataError(f"has no rows below the units on line {lines[below].number}; export it again")
     above, settings = lines[: below - 1], {}
     for line in above:
         key, value = keyword(line)
@@ -129,7 +127,7 @@ def ocean_optics(file: TextFile) -> list[Table] | None:
 
     Raises DataError for a series of spectra, or an axis that is no wavelength.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     begin = next((i for i, line in enumerate(lines[:_MOST_HEADING]) if BEGIN.match(line.text)), None)
     if begin is None:
         return None
@@ -140,18 +138,16 @@ def ocean_optics(file: TextFile) -> list[Table] | None:
         delimiter = delimiter_of(line.text)
         rows.append((line, all_cells(line.text, " " if delimiter == "," else delimiter)))
     if not rows:
-        raise DataError(f"{path}: has no rows below {lines[begin].text!r}; export it again")
+        raise DataError(f"has no rows below {lines[begin].text!r}; export it again")
     for line in above:
         key, value = keyword(line)
         if _X_AXIS.fullmatch(key) and "wavelength" not in value.lower():  # pixels or Raman shifts
-            raise DataError(
-                f"{path}: line {line.number} states the axis {value!r}; export it with wavelengths"
-            )
+            raise DataError(f"line {line.number} states the axis {value!r}; export it with wavelengths")
     header = None if is_number(rows[0][1][0], ",") else rows.pop(0)[1]
     if not rows or (header is None and len(rows[0][1]) > _MOST_COLUMNS):
         what = "is a series of spectra in rows" if rows else "has a header but no rows"
-        raise DataError(f"{path}: {what}; export one spectrum in two columns")
-    quantity = _ocean_quantity(above, path)
+        raise DataError(f"{what}; export one spectrum in two columns")
+    quantity = _ocean_quantity(above, file.path)
     if header is None:
         names = ["wavelength (nm)", quantity, *["_"] * (len(rows[0][1]) - 2)][: max(2, len(rows[0][1]))]
     else:
@@ -211,7 +207,7 @@ def stellarnet(file: TextFile) -> list[Table] | None:
     heading = [line for line in file.lines if line.text.startswith('"')]
     rows = [(line, line.bare.replace(";", " ").split()) for line in file.lines if line not in heading]
     if not rows:
-        raise DataError(f"{file.path}: has no rows below its heading; export it again")
+        raise DataError("has no rows below its heading; export it again")
     names = ["wavelength (nm)", _STELLARNET.get(named["suffix"].upper(), "scope")]
     sample = re.split(r"[\\/]", named["name"])[-1]
     return [export("StellarNet SpectraWiz text", names, rows, facts=facts(heading, sample=sample))]
@@ -226,27 +222,27 @@ def perkin_elmer(file: TextFile) -> list[Table] | None:
 
     Raises DataError where it lacks the block `#GR` or rows, or has another axis or quantity.
     """
-    path, first = file.path, file.lines[0].text
+    first = file.lines[0].text
     if not first.startswith("PE ") or "PEDS" not in first:
         return None
     keywords = {comment.text.strip(): comment.number for comment in file.comments}
     if not {"GR", "DATA"} <= set(keywords):
-        raise DataError(f"{path}: lacks the block #GR or #DATA of a PerkinElmer file; export it again")
+        raise DataError("lacks the block #GR or #DATA of a PerkinElmer file; export it again")
     scale = [line for line in file.lines if keywords["GR"] < line.number < keywords["DATA"]]
     rows: Rows = [(line, line.bare.split()) for line in file.lines if line.number > keywords["DATA"]]
     if len(scale) < 2 or not rows:
-        raise DataError(f"{path}: has no rows below #DATA, or no units below #GR; export it again")
+        raise DataError("has no rows below #DATA, or no units below #GR; export it again")
     for line, usual in zip(scale[2:4], _UNSCALED, strict=False):
         if not is_number(line.text) or float(line.text) != usual:
             raise DataError(
-                f"{path}: line {line.number} scales the ordinate ({line.text!r}, where {usual:g} "
+                f"line {line.number} scales the ordinate ({line.text!r}, where {usual:g} "
                 "is usual), which programs treat differently; export it again without"
             )
     axis, ordinate = scale[:2]
     unit = wavelength_unit(axis.text)
     if unit is None:
         raise DataError(
-            f"{path}: line {axis.number} gives the unit of the axis as {axis.text!r}; export it in nm or cm-1"
+            f"line {axis.number} gives the unit of the axis as {axis.text!r}; export it in nm or cm-1"
         )
     word = ordinate.text.strip()
     # another quantity is refused where it is read
@@ -267,7 +263,7 @@ def jasco(file: TextFile) -> list[Table] | None:
 
     Raises DataError where it has no rows, no unit of the axis or several values at each wavelength.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     heading = (i for i, line in enumerate(lines[:_MOST_HEADING]) if line.text.upper().startswith("XYDATA"))
     begin = next(heading, None)
     if begin is None or lines[0].text.startswith("##"):
@@ -278,12 +274,12 @@ def jasco(file: TextFile) -> list[Table] | None:
         return None
     rows = _rows_to_section(lines[begin + 1 :], file.comments)
     if not rows:
-        raise DataError(f"{path}: has no rows below XYDATA on line {lines[begin].number}; export it again")
+        raise DataError(f"has no rows below XYDATA on line {lines[begin].number}; export it again")
     if len(all_cells(lines[begin].text)) > 2:
-        raise DataError(f"{path}: has spectra at several temperatures or times; export one of them")
+        raise DataError("has spectra at several temperatures or times; export one of them")
     unit = wavelength_unit(header["XUNITS"]) or recognise(header["XUNITS"]).unit
     if unit is None:
-        raise DataError(f"{path}: states XUNITS {header['XUNITS']!r}; export it along nm, eV or cm-1")
+        raise DataError(f"states XUNITS {header['XUNITS']!r}; export it along nm, eV or cm-1")
     names = [f"wavelength ({unit})", _jasco_quantity(header.get("YUNITS", ""))]
     names += [header.get(f"YUNITS{i}") or "_" for i in range(2, max(2, len(rows[0][1])))]
     stated = [(fact, header.get(key, "")) for key, fact in _JASCO_FACTS.items()]

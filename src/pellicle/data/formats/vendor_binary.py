@@ -66,7 +66,7 @@ _MODES = {
 _PROCSPEC = "Ocean Optics ProcSpec"
 
 
-def by_openreadout(content: bytes, path: str) -> list[Table] | None:
+def by_openreadout(content: bytes) -> list[Table] | None:
     """Return the spectra of such a file, or None for another format.
 
     Raises DataError where openreadout is absent or cannot read the file, and for other quantities.
@@ -79,7 +79,7 @@ def by_openreadout(content: bytes, path: str) -> list[Table] | None:
         import openreadout
     except ImportError:
         raise DataError(
-            f"{path}: is a {name} file, which needs the package openreadout: {install_command('formats')}; "
+            f"is a {name} file, which needs the package openreadout: {install_command('formats')}; "
             "or export the spectrum as CSV"
         ) from None
     try:
@@ -87,19 +87,17 @@ def by_openreadout(content: bytes, path: str) -> list[Table] | None:
             findings = file.check()["findings"]
             if damage := next((x["message"] for x in findings if x["severity"] == "error"), ""):
                 raise DataError(  # openreadout reads what is left
-                    f"{path}: is a damaged {name} file ({_plain(damage)}); copy or export it again"
+                    f"is a damaged {name} file ({_plain(damage)}); copy or export it again"
                 )
-            curves = list(_curves(file, name, len(content), path))
+            curves = list(_curves(file, name, len(content)))
     except DataError:
         raise
     except Exception as error:  # a foreign reader on a damaged file may raise anything
         reason = _plain(str(error).partition(" (hint")[0]) or type(error).__name__
-        raise DataError(
-            f"{path}: is a {name} file that cannot be read ({reason}); export it as CSV"
-        ) from None
+        raise DataError(f"is a {name} file that cannot be read ({reason}); export it as CSV") from None
     if not curves:
-        raise DataError(f"{path}: is a {name} file without a spectrum; export it as CSV")
-    return readable(curves, path)
+        raise DataError(f"is a {name} file without a spectrum; export it as CSV")
+    return readable(curves)
 
 
 def _kind(content: bytes) -> str | None:
@@ -122,13 +120,13 @@ def _kind(content: bytes) -> str | None:
     return "spc" if plausible else None
 
 
-def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
+def _curves(file: Any, name: str, size: int) -> Iterator[Curve]:
     """The sweeps of each trace of an open file."""
     for index, trace in enumerate(file.traces):
         channels, sweeps, points = trace["channels"], trace["sweep_count"], trace["sample_count"]
         if points * sweeps > size or sweeps > _MOST_SPECTRA:  # no value takes less than a byte
             raise DataError(
-                f"{path}: is a {name} file of {sweeps} spectra of {points} points, more than its {size} "
+                f"is a {name} file of {sweeps} spectra of {points} points, more than its {size} "
                 "bytes hold or pellicle reads; export the spectrum as CSV"
             )
         extra = trace["extra"]
@@ -140,7 +138,7 @@ def _curves(file: Any, name: str, size: int, path: str) -> Iterator[Curve]:
                 if extra["axis"].get("channel") == position:
                     continue
                 quantity = _quantity(channel, extra)
-                columns, notes = _measured(x, values[position], name, path)
+                columns, notes = _measured(x, values[position], name)
                 label = trace["name"] if sweeps == 1 else f"{trace['name']} {sweep + 1}"
                 layout = array_columns(
                     (axis_column(axis) or axis, signal_column(quantity) or quantity),
@@ -176,20 +174,20 @@ def _quantity(channel: dict[str, Any], extra: dict[str, Any]) -> str:
     return "relative intensity" if name == "intensity" and not text else text or name.replace("_", " ")
 
 
-def _measured(x: np.ndarray, y: np.ndarray, name: str, path: str) -> tuple[Sequence[np.ndarray], list[str]]:
+def _measured(x: np.ndarray, y: np.ndarray, name: str) -> tuple[Sequence[np.ndarray], list[str]]:
     """The columns without points that JASCO marks as not measured, and a note on these."""
     if x.shape != y.shape:
         raise DataError(
-            f"{path}: is a {name} file of {y.size} values for an axis of {x.size} points; export it as CSV"
+            f"is a {name} file of {y.size} values for an axis of {x.size} points; export it as CSV"
         )
     invalid = (y < 0) & (y > _JASCO_INVALID) if name == _FORMATS["jws"] else np.zeros(y.shape, dtype=bool)
     notes = [f"{invalid.sum()} points marked as not measured left out"] if invalid.any() else []
     if invalid.all():
-        raise DataError(f"{path}: is a {name} file without a measured point; export it again")
+        raise DataError(f"is a {name} file without a measured point; export it again")
     return (x[~invalid], y[~invalid]), notes
 
 
-def procspec(content: bytes, path: str) -> list[Table] | None:
+def procspec(content: bytes) -> list[Table] | None:
     """Return the processed spectrum of an Ocean Optics ProcSpec file, or None for another format.
 
     It is a zip of `ps_N.xml`, OOISignatures.xml and OOIVersion.txt. The XML is a `ProcessedSpectrum` of
@@ -207,7 +205,7 @@ def procspec(content: bytes, path: str) -> list[Table] | None:
             members = [info for info in archive.infolist() if _MEMBER.fullmatch(info.filename)]
             if not members or len(archive.infolist()) > _MOST_MEMBERS:
                 return None
-            documents = [_unpacked(archive, info, path) for info in members]
+            documents = [_unpacked(archive, info) for info in members]
     except (
         zipfile.BadZipFile,
         zlib.error,
@@ -222,12 +220,12 @@ def procspec(content: bytes, path: str) -> list[Table] | None:
         if not _ANYWHERE.search(content):
             return None
         raise DataError(
-            f"{path}: is an {_PROCSPEC} file that cannot be unpacked ({_plain(str(e))}); copy it again"
+            f"is an {_PROCSPEC} file that cannot be unpacked ({_plain(str(e))}); copy it again"
         ) from None
-    return readable([_processed(_parsed(document, path), path) for document in documents], path)
+    return readable([_processed(_parsed(document)) for document in documents])
 
 
-def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: str) -> bytes:
+def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
     """The content of a member. Raises DataError for one that is too large, before it is unpacked."""
     document = b""
     too_large = info.file_size > LARGEST_XML or info.file_size > MOST_RATIO * max(info.compress_size, 1)
@@ -236,25 +234,25 @@ def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo, path: str) -> byt
             document = member.read(LARGEST_XML + 1)  # the size that the directory states may be wrong
     if too_large or len(document) > LARGEST_XML:
         raise DataError(
-            f"{path}: is an {_PROCSPEC} file whose {info.filename} unpacks to {info.file_size} bytes, which "
+            f"is an {_PROCSPEC} file whose {info.filename} unpacks to {info.file_size} bytes, which "
             "no spectrum has; export the spectrum as text"
         )
     return document
 
 
-def _parsed(document: bytes, path: str) -> Element:
+def _parsed(document: bytes) -> Element:
     try:
         from defusedxml.ElementTree import fromstring
     except ImportError:
         raise DataError(
-            f"{path}: is an {_PROCSPEC} file, which needs the package defusedxml: "
+            f"is an {_PROCSPEC} file, which needs the package defusedxml: "
             f"{install_command('formats')}; or export the spectrum as text"
         ) from None
     try:
         return fromstring(_UNPRINTABLE.sub(b"", document), forbid_dtd=True)
     except Exception as error:  # syntax errors, and entities and document types that defusedxml refuses
         raise DataError(
-            f"{path}: is an {_PROCSPEC} file whose XML cannot be read ({type(error).__name__}: "
+            f"is an {_PROCSPEC} file whose XML cannot be read ({type(error).__name__}: "
             f"{_plain(str(error))}); export the spectrum as text"
         ) from None
 
@@ -264,13 +262,13 @@ def _plain(error: str) -> str:
     return " ".join(error.split())[:200]
 
 
-def _processed(root: Element, path: str) -> Curve:
-    wavelength = _doubles(root, "channelWavelengths", path)
-    processed = _doubles(root, "processedPixels", path)
-    values = processed if processed.size else _doubles(root, "pixelValues", path)
+def _processed(root: Element) -> Curve:
+    wavelength = _doubles(root, "channelWavelengths")
+    processed = _doubles(root, "processedPixels")
+    values = processed if processed.size else _doubles(root, "pixelValues")
     if not wavelength.size or wavelength.size != values.size:
         raise DataError(
-            f"{path}: is an {_PROCSPEC} file of {wavelength.size} wavelengths and {values.size} processed "
+            f"is an {_PROCSPEC} file of {wavelength.size} wavelengths and {values.size} processed "
             "values; export the spectrum as text"
         )
     quantity = "counts (the file has no processed spectrum)"
@@ -304,7 +302,7 @@ def _processed(root: Element, path: str) -> Curve:
     return Curve(layout, "wavelength (nm)", quantity)
 
 
-def _doubles(root: Element, tag: str, path: str) -> np.ndarray:
+def _doubles(root: Element, tag: str) -> np.ndarray:
     """The numbers of the first element of this name that has some."""
     for element in root.iter(tag):
         texts = [child.text or "" for child in element.iter("double")]
@@ -312,7 +310,5 @@ def _doubles(root: Element, tag: str, path: str) -> np.ndarray:
             try:
                 return np.array([float(text) for text in texts])
             except ValueError as error:
-                raise DataError(
-                    f"{path}: {tag} has no number ({error}); export the spectrum as text"
-                ) from None
+                raise DataError(f"{tag} has no number ({error}); export the spectrum as text") from None
     return np.empty(0)

@@ -60,7 +60,7 @@ def read(file: TextFile) -> list[Table] | None:
 
     Raises DataError where the file has none.
     """
-    lines, path = file.lines, file.path
+    lines = file.lines
     at = _unit_line(lines)
     if at is None:
         return None
@@ -78,9 +78,9 @@ def read(file: TextFile) -> list[Table] | None:
     facts += [("light", "transmitted")] if transmitted else []
     axis = f"wavelength ({wavelength_unit(unit[0])})"
     kept, left_out = [], {}
-    for time, groups in _by_time(rows, dynamic, path).items():
+    for time, groups in _by_time(rows, dynamic).items():
         name = f"{time} min" if dynamic else ""
-        kept += [(name, one) for one in _spectra(groups, TRIGONOMETRIC in unit, transmitted, path)]
+        kept += [(name, one) for one in _spectra(groups, TRIGONOMETRIC in unit, transmitted)]
         left_out |= dict.fromkeys(groups)
     kinds, described = defaultdict(list), []
     for label in left_out:
@@ -92,7 +92,7 @@ def read(file: TextFile) -> list[Table] | None:
     ignored = "; ".join(described)
     if not kept:
         raise DataError(
-            f"{path}: looks like a Woollam file, but has no psi and delta, reflectance or transmittance, "
+            f"looks like a Woollam file, but has no psi and delta, reflectance or transmittance, "
             f"only {ignored or 'a heading'}; export psi and delta as text"
         )
     said = [f"rows of other quantities ignored: {ignored}"] if ignored else []
@@ -118,7 +118,7 @@ def _cells(line: Line) -> list[str]:
     return line.bare.replace(",", ".").split()
 
 
-def _by_time(rows: Rows, dynamic: bool, path: str) -> dict[str, dict[str, Rows]]:
+def _by_time(rows: Rows, dynamic: bool) -> dict[str, dict[str, Rows]]:
     """The rows of each time and label, without both, in the order of the file.
 
     The time of static data is "".
@@ -133,7 +133,7 @@ def _by_time(rows: Rows, dynamic: bool, path: str) -> dict[str, dict[str, Rows]]
         if dynamic:
             if len(cells) not in (5, 7) or not is_number(cells[-1]):
                 raise DataError(
-                    f"{path}: line {line.number} of dynamic data does not end with its time behind "
+                    f"line {line.number} of dynamic data does not end with its time behind "
                     f"wavelength, angle, values and errors: {len(cells)} values; correct that line"
                 )
             *cells, time = cells
@@ -141,13 +141,13 @@ def _by_time(rows: Rows, dynamic: bool, path: str) -> dict[str, dict[str, Rows]]
     return times
 
 
-def _spectra(groups: dict[str, Rows], trigonometric: bool, transmitted: bool, path: str) -> list[Selected]:
+def _spectra(groups: dict[str, Rows], trigonometric: bool, transmitted: bool) -> list[Selected]:
     """The spectra of one time. Labels that are read leave `groups`."""
     spectra: list[Selected] = []
     if LABEL in groups and trigonometric:
-        spectra.append(_tan_cos(groups.pop(LABEL), path))
+        spectra.append(_tan_cos(groups.pop(LABEL)))
     elif LABEL in groups:
-        spectra.append(_psi_delta(groups.pop(LABEL), path))
+        spectra.append(_psi_delta(groups.pop(LABEL)))
         shares = next((label for label in groups if label.lower() == DEPOLARISATION), None)
         if shares is not None:
             spectra = [_with_depolarisation(spectra[0], shares, groups.pop(shares))]
@@ -157,30 +157,30 @@ def _spectra(groups: dict[str, Rows], trigonometric: bool, transmitted: bool, pa
 
     others = []
     if not (transmitted or trigonometric) and (ratios := take(r"(?i:AnE|Aps|Asp)")):
-        others.append(("generalised psi and delta", ratios, _generalised(ratios, path)))
+        others.append(("generalised psi and delta", ratios, _generalised(ratios)))
     if not transmitted and any(re.fullmatch(r"(?i:mm(?!11)[1-4][1-4])", label) for label in groups):
         elements = take(r"(?i:mm[1-4][1-4])")
-        others.append(("Mueller elements", elements, _mueller(elements, path)))
+        others.append(("Mueller elements", elements, _mueller(elements)))
     for what, labels, selected in others:
         if spectra and not spectra[0].quantity:
             said = f'{what} beside psi and delta: `signal="{selected.quantity}"` reads {", ".join(labels)}'
             spectra[0].notes.append(said)
         spectra.append(selected)
     for label in _POWERS:
-        if label in groups and (selected := _power(label, groups[label], path)):
+        if label in groups and (selected := _power(label, groups[label])):
             del groups[label]
             spectra.append(selected)
     return spectra
 
 
-def _psi_delta(rows: Rows, path: str, label: str = "") -> Selected:
+def _psi_delta(rows: Rows, label: str = "") -> Selected:
     """Ψ, Δ and, where they are not all zero, their errors. Raises DataError for rows of other lengths."""
     notes: list[str] = []
     of = f"{label} " if label else ""
     width, odd = len(rows[0][1]), _odd(rows, (4, 6, 8))
     if odd is not None:
         raise DataError(
-            f"{path}: looks like a Woollam file, but line {odd} is not wavelength, angle, {of}psi, delta and "
+            f"looks like a Woollam file, but line {odd} is not wavelength, angle, {of}psi, delta and "
             "their errors, as the other rows; export psi and delta as text, or correct that line"
         )
     if width == 8:  # CompleteEASE and programs of other makers write 1 and 1 there
@@ -188,7 +188,7 @@ def _psi_delta(rows: Rows, path: str, label: str = "") -> Selected:
         notes.append("2 columns behind the errors ignored")
     rows, missing = measured(rows, (2, 3))
     if not rows:
-        raise DataError(f"{path}: has no point with {of}psi and delta; check the measurement")
+        raise DataError(f"has no point with {of}psi and delta; check the measurement")
     names = ("angle_deg", "psi_deg", "delta_deg", "sigma_psi", "sigma_delta")[: len(rows[0][1]) - 1]
     if len(names) == 5 and all(_is(x, 0.0) for _, cells in rows for x in cells[4:]):
         names, rows = names[:3], [(line, cells[:4]) for line, cells in rows]  # as simulations are written
@@ -196,18 +196,18 @@ def _psi_delta(rows: Rows, path: str, label: str = "") -> Selected:
     return Selected(names, rows, [*notes, *missing])
 
 
-def _tan_cos(rows: Rows, path: str) -> Selected:
+def _tan_cos(rows: Rows) -> Selected:
     """tan Ψ and cos Δ; their errors are left out. Raises DataError for shorter rows."""
     notes = ["errors of tan(psi) and cos(delta) ignored"] if len(rows[0][1]) > 4 else []
     for line, cells in rows:
         if len(cells) < 4:
             raise DataError(
-                f"{path}: line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
+                f"line {line.number} has {len(cells)} values where wavelength, angle, tan(psi) and "
                 "cos(delta) are expected; correct that line"
             )
     rows, missing = measured([(line, cells[:4]) for line, cells in rows], (2, 3))
     if not rows:
-        raise DataError(f"{path}: has no point with tan(psi) and cos(delta); check the measurement")
+        raise DataError("has no point with tan(psi) and cos(delta); check the measurement")
     return Selected(("angle_deg", "tan_psi", "cos_delta"), rows, [*notes, *missing])
 
 
@@ -242,7 +242,7 @@ def _with_depolarisation(selected: Selected, label: str, shares: Rows) -> Select
     return Selected((*names, *("depolarisation (%)", "sigma_depolarisation (%)")[:count]), rows, notes)
 
 
-def _power(label: str, rows: Rows, path: str) -> Selected | None:
+def _power(label: str, rows: Rows) -> Selected | None:
     """A reflectance or transmittance and its error; None for an intensity, whose errors are written as 1.
 
     Raises DataError for rows of other lengths.
@@ -250,7 +250,7 @@ def _power(label: str, rows: Rows, path: str) -> Selected | None:
     width, odd = len(rows[0][1]), _odd(rows, (3, 4))
     if odd is not None:
         raise DataError(
-            f"{path}: line {odd} is not {label}, wavelength, angle, a value and its error, as the other "
+            f"line {odd} is not {label}, wavelength, angle, a value and its error, as the other "
             "rows; correct that line"
         )
     errors = [cells[3] for _, cells in rows] if width == 4 else []
@@ -264,14 +264,14 @@ def _power(label: str, rows: Rows, path: str) -> Selected | None:
     return Selected(names, rows, [*notes, *missing], _POWERS[label]) if rows else None
 
 
-def _generalised(groups: dict[str, Rows], path: str) -> Selected:
+def _generalised(groups: dict[str, Rows]) -> Selected:
     """Ψ and Δ of each ratio, one label each, at the points that all have, and their errors.
 
     Raises DataError for rows of other lengths, and without a point that all ratios have.
     """
-    selected = {label: _psi_delta(rows, path, label) for label, rows in groups.items()}
+    selected = {label: _psi_delta(rows, label) for label, rows in groups.items()}
     notes = [f"{label}: {note}" for label, of in selected.items() for note in of.notes]
-    points, common = _in_common({label: of.rows for label, of in selected.items()}, ", ".join(groups), path)
+    points, common = _in_common({label: of.rows for label, of in selected.items()}, ", ".join(groups))
     notes += common
     with_errors = [len(of.names) == 5 for of in selected.values()]
     if any(with_errors) and not all(with_errors):
@@ -288,7 +288,7 @@ def _generalised(groups: dict[str, Rows], path: str) -> Selected:
     return Selected(names, rows, notes, "generalised-psi-delta")
 
 
-def _mueller(groups: dict[str, Rows], path: str) -> Selected:
+def _mueller(groups: dict[str, Rows]) -> Selected:
     """Elements of a Mueller matrix, one label each, at the points that all have, and their errors.
 
     Raises DataError for rows of other lengths, and without a point that all elements have.
@@ -298,12 +298,12 @@ def _mueller(groups: dict[str, Rows], path: str) -> Selected:
         odd = next((line for line, cells in rows if len(cells) not in (3, 4)), None)
         if odd is not None:
             raise DataError(
-                f"{path}: line {odd.number} is not {label}, wavelength, angle, a value and its error; "
+                f"line {odd.number} is not {label}, wavelength, angle, a value and its error; "
                 "correct that line"
             )
         by_label[label], missing = measured(rows, (2,))
         notes += [f"{label}: {note}" for note in missing]
-    points, common = _in_common(by_label, "its Mueller elements", path)
+    points, common = _in_common(by_label, "its Mueller elements")
     errors = [cells[3:] for rows in by_label.values() for _, cells in rows]
     # 0 and 1 stand for unknown errors
     known = all(errors) and not any(all(_is(error, x) for [error] in errors) for x in (0.0, 1.0))
@@ -317,7 +317,7 @@ def _mueller(groups: dict[str, Rows], path: str) -> Selected:
 
 
 def _in_common(
-    groups: dict[str, Rows], subject: str, path: str
+    groups: dict[str, Rows], subject: str
 ) -> tuple[list[tuple[Line, list[str], dict[str, list[str]]]], list[str]]:
     """The points that all labels have: line, wavelength and angle, values of each label; and a note if fewer.
 
@@ -326,7 +326,7 @@ def _in_common(
     by_point = [dict(zip(_points(rows, False), rows, strict=True)) for rows in groups.values()]
     common = [point for point in by_point[0] if all(point in other for other in by_point)]
     if not common:
-        raise DataError(f"{path}: {subject} have no point in common; export them together")
+        raise DataError(f"{subject} have no point in common; export them together")
     notes = []
     if len(common) < max(map(len, by_point)):
         notes.append(f"{len(common)} points that {subject} have in common")

@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.data.tabular.columns import is_header, is_unit_row, recognise_all
 from pellicle.data.tabular.table import DELIMITERS, SELECTED, ArrayCells, Table, TextCells, declarations
-from pellicle.data.tabular.text import Line, TextFile, is_number, read_bytes, split, text_file
+from pellicle.data.tabular.text import Line, TextFile, in_file, is_number, read_bytes, split, text_file
 from pellicle.errors import DataError
 
 _BLANK_NAMES = re.compile(r'"[^"]*"|[^\s(\[]+(?:\s*[(\[][^)\]]*[)\]])?|\S+')
@@ -36,8 +36,14 @@ _SAMPLE = 60  # lines that vote on the dialect, spread over the file so that a p
 
 def find_layout(file: TextFile) -> Table:
     """Find the layout of a file's lines. Raises DataError if no line has two numbers."""
-    lines, path = _without_quotes(_without_empty_columns(file.lines)), file.path
-    delimiter, decimal = _dialect(lines, path)
+    with in_file(file.path):
+        return layout_of(file)
+
+
+def layout_of(file: TextFile) -> Table:
+    """Find the layout as `find_layout` does, with errors that do not name the file."""
+    lines = _without_quotes(_without_empty_columns(file.lines))
+    delimiter, decimal = _dialect(lines)
     first = _first_numeric(lines, delimiter, decimal)
     if first is None:
         last, hint = lines[-1], ""
@@ -46,7 +52,7 @@ def find_layout(file: TextFile) -> Table:
         elif re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", last.text):
             hint = "; export numbers without thousands separators"
         raise DataError(
-            f"{path}: line {last.number} ends the file without any row of two numbers; "
+            f"line {last.number} ends the file without any row of two numbers; "
             f"expected rows of a wavelength and a value, as 550,0.21{hint}"
         )
     width = len(split(lines[first].bare, delimiter))
@@ -56,7 +62,7 @@ def find_layout(file: TextFile) -> Table:
         notes.append("column names taken from the comment above the first row")
     if names and width > len(names):
         raise DataError(
-            f"{path}: line {lines[first].number} has {width} values but the header on line "
+            f"line {lines[first].number} has {width} values but the header on line "
             f"{lines[header or 0].number} names {len(names)} columns; make them agree"
             f"{_COMMAS if delimiter == ',' and width == 2 * len(names) else ''}"
         )
@@ -68,14 +74,14 @@ def find_layout(file: TextFile) -> Table:
         notes.append(f"text from line {lines[end].number} on, below the rows, skipped")
     rows = [line for line in lines[start:end] if not line.text.startswith(_MARKER)]
     if not rows:
-        raise DataError(f"{path}: has no row of numbers below its header; expected rows as 550,0.21")
+        raise DataError("has no row of numbers below its header; expected rows as 550,0.21")
     trailing = len(lines[first].bare.split(delimiter)) if delimiter != " " else width
     above = [comment for comment in file.comments if comment.number < lines[start].number]
     declared = declarations([*above, *lines[:skipped], *lines[end:]])
     width = max(width, len(names or ()))
     cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
     found = tuple(names) if names else None
-    return Table(found, width, cells, tuple(notes), "", declared, path, file.sha256)
+    return Table(found, width, cells, tuple(notes), "", declared, file.path, file.sha256)
 
 
 def _without_empty_columns(lines: Sequence[Line]) -> Sequence[Line]:
@@ -135,7 +141,7 @@ def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, in
     return sum(is_number(cell, decimal) for cell in cells), len(cells)
 
 
-def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
+def _dialect(lines: Sequence[Line]) -> tuple[str, str]:
     """Delimiter with which most lines are all numbers (ties: tab, `;`, `,`, blank), and decimal mark."""
     sample = lines[:: max(1, len(lines) // _SAMPLE)]
     if any(SELECTED in line.bare for line in sample):
@@ -148,7 +154,7 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
     delimiter = max(DELIMITERS, key=votes)
     grouped = next((match[0] for line in sample if (match := _GROUPED.search(line.text))), None)
     if grouped is not None:
-        raise DataError(f"{path}: writes {grouped!r}; export numbers without thousands separators")
+        raise DataError(f"writes {grouped!r}; export numbers without thousands separators")
     if delimiter == ",":
         return delimiter, "."
     cells = [
@@ -161,7 +167,7 @@ def _dialect(lines: Sequence[Line], path: str) -> tuple[str, str]:
     point = next((cell for cell in cells if "." in cell), None)
     if comma and point:
         raise DataError(
-            f"{path}: writes {comma!r} with a comma and {point!r} with a point, so the "
+            f"writes {comma!r} with a comma and {point!r} with a point, so the "
             "decimal mark is unclear; export it again with one of them and no thousands separators"
         )
     return delimiter, "," if comma else "."

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path
 
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 
 _NUMBER = re.compile(
     r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE | re.ASCII
@@ -60,6 +60,15 @@ def open_binary(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
         raise DataError(
             f"{path}: cannot be read ({error.strerror}); check its name and permissions"
         ) from None
+
+
+@contextmanager
+def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Put the path of a file in front of errors about its content, which name the line."""
+    try:
+        yield
+    except (DataError, UsageError) as error:
+        raise type(error)(f"{path}: {error}") from None
 
 
 def read_bytes(path: str | os.PathLike[str]) -> tuple[bytes, str]:
