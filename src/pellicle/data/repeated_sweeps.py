@@ -61,15 +61,8 @@ def one_way(wavelength: np.ndarray) -> bool:
 
 
 _EQUAL = (
-    "signal",
-    "transmission",
-    "elements",
-    "ratios",
-    "polarisation",
-    "folded",
-    "wavelength",
-    "angle",
-    "azimuth",
+    *("signal", "transmission", "elements", "ratios", "polarisation", "folded"),
+    *("wavelength", "angle", "azimuth"),
 )
 """What sweeps that are averaged have in common."""
 

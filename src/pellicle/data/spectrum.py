@@ -19,18 +19,6 @@ POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
 """A range that keeps fewer points is a mistake in the range."""
 
-_ARRAYS = (
-    "wavelength",
-    "values",
-    "sigma",
-    "angle",
-    "azimuth",
-    "lines",
-    "delta",
-    "delta_sigma",
-    "depolarisation",
-    "depolarisation_sigma",
-)
 _OF_PARTS = ("values", "sigma", "delta", "delta_sigma")
 """Arrays with a column for each part of a signal."""
 _REMEDY = "correct or delete that point"
@@ -106,15 +94,8 @@ class Spectrum:
                 raise UsageError(f"`{name}` must be an array, not {value!r}: pl.read_spectrum reads files")
         self._check_words()
         size, parts = np.size(self.wavelength), self.kind.parts
-        rising = (
-            self.angle is None
-            and self.azimuth is None
-            and size > 0
-            and bool(np.all(np.diff(self.wavelength) > 0))
-        )
-        order = None
-        if not rising:
-            given = [x for x in (self.azimuth, self.angle) if x is not None]
+        given, order = [x for x in (self.azimuth, self.angle) if x is not None], None
+        if given or not size or not np.all(np.diff(self.wavelength) > 0):
             order = np.lexsort((*given, self.wavelength))
         for name in _ARRAYS:
             value = getattr(self, name)
@@ -233,6 +214,9 @@ class Spectrum:
         }
         sweeps = tuple(sweep.cut(low, high) for sweep in self.sweeps)
         return dataclasses.replace(self, **kept, notes=(*self.notes, note), sweeps=sweeps)
+
+
+_ARRAYS = tuple(field.name for field in dataclasses.fields(Spectrum) if "ndarray" in str(field.type))
 
 
 def inside_range(

@@ -1,6 +1,7 @@
 """Effects of the instrument on the signal: scale, offset, bandwidth, spreads and the cone of light."""
 
 import math
+from functools import partial
 from typing import final
 
 import equinox as eqx
@@ -24,14 +25,6 @@ class Drift(eqx.Module):
 SLOW_SCALE, SLOW_OFFSET, ONE_NUMBER = Drift(3), Drift(2), Drift(0)
 
 
-def _scale(value: float | str | Drift | Free) -> float | Drift:
-    return _number_or_drift(value, SLOW_SCALE, "scale")
-
-
-def _offset(value: float | str | Drift | Free) -> float | Drift:
-    return _number_or_drift(value, SLOW_OFFSET, "offset")
-
-
 def _number_or_drift(value: float | str | Drift | Free, slow: Drift, name: str) -> float | Drift:
     if isinstance(value, str):
         drifts = {"free": ONE_NUMBER, "slow": slow}
@@ -41,6 +34,10 @@ def _number_or_drift(value: float | str | Drift | Free, slow: Drift, name: str) 
     if isinstance(value, Free):
         raise ValueError(f"`{name}` has no bounds: give 'free', 'slow' or a number")
     return value
+
+
+_SCALE = partial(_number_or_drift, slow=SLOW_SCALE, name="scale")
+_OFFSET = partial(_number_or_drift, slow=SLOW_OFFSET, name="offset")
 
 
 @final
@@ -64,8 +61,8 @@ class Instrument(eqx.Module):
     3
     """
 
-    scale: float | Drift = eqx.field(converter=_scale, default=1.0)
-    offset: float | Drift = eqx.field(converter=_offset, default=0.0)
+    scale: float | Drift = eqx.field(converter=_SCALE, default=1.0)
+    offset: float | Drift = eqx.field(converter=_OFFSET, default=0.0)
     bandwidth: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     angle_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)

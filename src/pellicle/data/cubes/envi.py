@@ -5,6 +5,7 @@
 
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,41 @@ _FIELD = re.compile(r"^[ \t]*([^=;{}\n]+?)[ \t]*=[ \t]*(\{[^}]*\}|[^\n]*)", re.M
 _MOST_HEADER = 2**24
 
 
+class _Header(NamedTuple):
+    """Header: its path, and its fields by name in lower case with single blanks, values without braces."""
+
+    path: Path
+    fields: dict[str, str]
+
+    def number(self, name: str, default: float | None) -> float | None:
+        """The number of a field, or the default without one. Raises DataError."""
+        if not (text := self.fields.get(name, "")):
+            return default
+        try:
+            return float(text)
+        except ValueError:
+            raise self.fault(f"`{name}` is {text!r}, no number: correct the header") from None
+
+    def integer(self, name: str, default: int | None = None) -> int:
+        """The whole number of a field, above zero where it has no default. Raises DataError."""
+        value = self.number(name, None if default is None else float(default))
+        if value is None or value != int(value) or value < 0 or (default is None and value == 0):
+            written = self.fields.get(name, "missing")
+            raise self.fault(f"`{name}` is {written!r}, no whole number: correct the header")
+        return int(value)
+
+    def numbers(self, name: str) -> np.ndarray:
+        """The numbers of a field. Raises DataError."""
+        try:
+            return np.array([float(word) for word in re.split(r"[,\s]+", self.fields[name]) if word])
+        except ValueError:
+            raise self.fault(f"`{name}` is no list of numbers: correct the header") from None
+
+    def fault(self, text: str) -> DataError:
+        """The error of a header."""
+        return DataError(f"{self.path}: {text}")
+
+
 def _header_of(path: Path) -> Path | None:
     """The ENVI header of a file: itself, or the one beside it; None for a file of another format."""
     for header in (path, path.with_name(path.name + ".hdr"), path.with_suffix(".hdr")):
@@ -45,75 +81,74 @@ def is_envi(path: Path) -> bool:
 
 def read_envi(path: Path, asked: Asked) -> RawCube:
     """Read the cube of an ENVI header, or of the data file beside one. Raises DataError or UsageError."""
-    header = _header_of(path)
-    assert header is not None, "the file was recognised by it"
-    fields = _fields(header)
-    stored = _stored(fields, header, path if path != header else _data_file(header))
+    file = _header_of(path)
+    assert file is not None, "the file was recognised by it"
+    with open_binary(file) as opened:
+        text = opened.read(_MOST_HEADER).decode("utf-8-sig", "replace")
+    fields = {
+        " ".join(name.lower().replace("_", " ").split()): " ".join(value.strip("{} \t\n").split())
+        for name, value in _FIELD.findall(text.replace("\r\n", "\n").replace("\r", "\n"))
+    }
+    header = _Header(file, fields)
+    stored = _stored(header, path if path != file else _data_file(file))
     mapped, bands = stored.data, stored.sizes["wavelength"]
     wavelength, unit = asked.wavelength, asked.unit
     if wavelength is None and "wavelength" in fields:
-        wavelength, unit = _numbers(fields, "wavelength", header), fields.get("wavelength units")
+        wavelength, unit = header.numbers("wavelength"), fields.get("wavelength units")
     if wavelength is None:
-        raise need_wavelengths(mapped.shape, str(header))
+        raise need_wavelengths(mapped.shape, str(file))
     if wavelength.size != bands:
-        raise DataError(
-            f"{header}: has {wavelength.size} wavelengths for {bands} bands: give one for each with "
-            "`wavelengths`"
-        )
+        told = f"has {wavelength.size} wavelengths for {bands} bands: give one for each with `wavelengths`"
+        raise header.fault(told)
     scaled = "reflectance scale factor" in fields
-    divisor = _number(fields, "reflectance scale factor", header, 1.0) or 1.0
+    divisor = header.number("reflectance scale factor", 1.0) or 1.0
     form = fields.get("interleave", "bsq").lower()
     notes = [f"ENVI, {form}, {mapped.dtype.name}, {Path(mapped.path).name}"]
     if "fwhm" in fields:
-        notes.append(_width_note(_numbers(fields, "fwhm", header), unit))
+        notes.append(_width_note(header.numbers("fwhm"), unit))
     if divisor != 1.0:
         notes.append(f"values divided by {divisor:g}, the reflectance scale factor")
-    good = None
-    if "bbl" in fields:
-        good = _numbers(fields, "bbl", header) != 0
-        if good.size != bands:
-            raise DataError(
-                f"{header}: `bbl` has {good.size} numbers for {bands} bands: correct or delete it"
-            )
+    good = header.numbers("bbl") != 0 if "bbl" in fields else None
+    if good is not None and good.size != bands:
+        raise header.fault(f"`bbl` has {good.size} numbers for {bands} bands: correct or delete it")
     return RawCube(
         str(path),
         {"values": stored},
         ("y", "x"),
         wavelength,
         unit,
-        files=(header, Path(mapped.path)),
+        files=(file, Path(mapped.path)),
         signal="R" if scaled else None,
         signal_unit="fraction" if scaled else COUNTS if mapped.dtype.kind in "iu" else None,
         divisor=divisor,
-        missing=_number(fields, "data ignore value", header, None),
+        missing=header.number("data ignore value", None),
         good=good,
         notes=tuple(notes),
     )
 
 
-def _stored(fields: dict[str, str], header: Path, data: Path) -> Stored:
+def _stored(header: _Header, data: Path) -> Stored:
     """The numbers that a header describes. Raises DataError for what ENVI does not define."""
+    fields = header.fields
     interleave = fields.get("interleave", "bsq").lower()
     if interleave not in _AXES:
-        raise DataError(f"{header}: `interleave` is {interleave!r}, not bsq, bil or bip: correct the header")
-    code = _integer(fields, "data type", header)
+        raise header.fault(f"`interleave` is {interleave!r}, not bsq, bil or bip: correct the header")
+    code = header.integer("data type")
     if code not in _TYPES:
-        raise DataError(f"{header}: `data type` is {code}, which ENVI does not define: correct the header")
+        raise header.fault(f"`data type` is {code}, which ENVI does not define: correct the header")
     if fields.get("file compression", "0") not in ("", "0"):
-        raise DataError(f"{header}: its data are compressed: save the cube without compression")
+        raise header.fault("its data are compressed: save the cube without compression")
     if "spectral library" in fields.get("file type", "").lower():
-        raise DataError(
-            f"{header}: is a spectral library and no image: export its spectra as CSV and fit them"
-        )
+        raise header.fault("is a spectral library and no image: export its spectra as CSV and fit them")
     dtype = np.dtype((">" if fields.get("byte order", "0") == "1" else "<") + _TYPES[code])
     names = {"y": "lines", "x": "samples", "wavelength": "bands"}
-    shape = tuple(_integer(fields, names[axis], header) for axis in _AXES[interleave])
-    offset = _integer(fields, "header offset", header, 0)
+    shape = tuple(header.integer(names[axis]) for axis in _AXES[interleave])
+    offset = header.integer("header offset", 0)
     needed = offset + int(np.prod(shape)) * dtype.itemsize
     if data.stat().st_size < needed:
         raise DataError(
-            f"{data}: has {data.stat().st_size:,} bytes and its header {header.name} describes {needed:,}: "
-            "the copy is incomplete, or `lines`, `bands` or `data type` of the header are wrong"
+            f"{data}: has {data.stat().st_size:,} bytes and its header {header.path.name} describes "
+            f"{needed:,}: the copy is incomplete, or `lines`, `bands` or `data type` of the header are wrong"
         )
     return Stored(MappedFile(str(data), dtype, shape, offset), _AXES[interleave])
 
@@ -128,16 +163,6 @@ def _width_note(widths: np.ndarray, unit: str | None) -> str:
     )
 
 
-def _fields(header: Path) -> dict[str, str]:
-    """Fields of a header by name in lower case with single blanks, values without braces."""
-    with open_binary(header) as file:
-        text = file.read(_MOST_HEADER).decode("utf-8-sig", "replace")
-    return {
-        " ".join(name.lower().replace("_", " ").split()): " ".join(value.strip("{} \t\n").split())
-        for name, value in _FIELD.findall(text.replace("\r\n", "\n").replace("\r", "\n"))
-    }
-
-
 def _data_file(header: Path) -> Path:
     """The file of numbers beside a header: `cube`, `cube.img` or the like beside `cube.hdr`."""
     stem = header.name[: -len(header.suffix)]
@@ -150,29 +175,3 @@ def _data_file(header: Path) -> Path:
         f"{header}: the file with its numbers is not beside it: looked for {stem} and "
         f"{', '.join(stem + suffix for suffix in _SUFFIXES[1:5])} and others; put it there"
     )
-
-
-def _integer(fields: dict[str, str], name: str, header: Path, default: int | None = None) -> int:
-    value = _number(fields, name, header, None if default is None else float(default))
-    if value is None or value != int(value) or value < 0 or (default is None and value == 0):
-        raise DataError(
-            f"{header}: `{name}` is {fields.get(name, 'missing')!r}, no whole number: correct the header"
-        )
-    return int(value)
-
-
-def _number(fields: dict[str, str], name: str, header: Path, default: float | None) -> float | None:
-    text = fields.get(name, "")
-    if not text:
-        return default
-    try:
-        return float(text)
-    except ValueError:
-        raise DataError(f"{header}: `{name}` is {text!r}, no number: correct the header") from None
-
-
-def _numbers(fields: dict[str, str], name: str, header: Path) -> np.ndarray:
-    try:
-        return np.array([float(word) for word in re.split(r"[,\s]+", fields[name]) if word])
-    except ValueError:
-        raise DataError(f"{header}: `{name}` is no list of numbers: correct the header") from None

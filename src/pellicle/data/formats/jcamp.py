@@ -124,14 +124,25 @@ def _curves(block: _Block) -> Iterator[Curve]:
     """The curve of each table of a block."""
     paged = "NTUPLES" in block.records
     for table in block.tables:
+        axis, quantity, place, other = block.text("XUNITS"), block.text("YUNITS"), None, None
+        labels = ("FIRSTX", "LASTX", "DELTAX", "NPOINTS", "XFACTOR", "YFACTOR")
         if paged:
-            page = _paged(block, table)
-            if page is None:
+            # a page of NTUPLES; one whose variables are not X and one Y is left out
+            form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
+            symbols = [symbol.strip().upper() for symbol in block.text("SYMBOL").split(",")]
+            if form is None or not {form[1].upper(), form[2].upper()} <= set(symbols):
                 continue
-            axis, quantity, scales = page
-        else:
-            axis, quantity = block.text("XUNITS"), block.text("YUNITS")
-            scales = _scales(block)
+            place, other = symbols.index(form[1].upper()), symbols.index(form[2].upper())
+            axis = block.text("UNITS", place)
+            quantity = block.text("UNITS", other) or block.text("VARNAME", other)
+            labels = ("FIRST", "LAST", "", "VARDIM", "FACTOR", "FACTOR")
+        scales = Scales(
+            *(_number(block, label, place) for label in labels[:3]),
+            _count(block, labels[3], other),
+            _factor(block, labels[4], place),
+            _factor(block, labels[5], other),
+            "," if not paged and any(_COMMA.match(block.text(label)) for label in _LIMITS) else ".",
+        )
         x, y = points_of(table, scales)
         names = (axis_column(axis) or axis, signal_column(quantity) or quantity)
         rows = [
@@ -148,38 +159,6 @@ def _curves(block: _Block) -> Iterator[Curve]:
             "JCAMP-DX", names, rows, facts=facts, notes=notes, name=title or quantity, decimal="."
         )
         yield Curve(layout, axis, quantity, block.records.get("YUNITS", ("", table.line))[1].number)
-
-
-def _scales(block: _Block) -> Scales:
-    comma = any(_COMMA.match(block.text(label)) for label in _LIMITS)
-    return Scales(
-        _number(block, "FIRSTX"),
-        _number(block, "LASTX"),
-        _number(block, "DELTAX"),
-        _count(block, "NPOINTS"),
-        _factor(block, "XFACTOR"),
-        _factor(block, "YFACTOR"),
-        "," if comma else ".",
-    )
-
-
-def _paged(block: _Block, table: Rows) -> tuple[str, str, Scales] | None:
-    """Axis, quantity and scales of a page of NTUPLES; None where its variables are not X and one Y."""
-    form = re.match(r"\(\s*(\w)\s*\+\+\s*\(\s*(\w)\.\.\2\s*\)\s*\)", table.form)
-    symbols = [symbol.strip().upper() for symbol in block.text("SYMBOL").split(",")]
-    if form is None or not {form[1].upper(), form[2].upper()} <= set(symbols):
-        return None
-    x, y = symbols.index(form[1].upper()), symbols.index(form[2].upper())
-    scales = Scales(
-        _number(block, "FIRST", x),
-        _number(block, "LAST", x),
-        None,
-        _count(block, "VARDIM", y),
-        _factor(block, "FACTOR", x),
-        _factor(block, "FACTOR", y),
-        ".",
-    )
-    return block.text("UNITS", x), block.text("UNITS", y) or block.text("VARNAME", y), scales
 
 
 def _number(block: _Block, label: str, place: int | None = None) -> float | None:
