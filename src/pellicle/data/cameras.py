@@ -13,16 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pellicle.colour import delta_e76, delta_e2000, lab
-from pellicle.colour.observers import (
-    OBSERVERS,
-    Sensor,
-    camera_sensor,
-    illuminant_spectrum,
-    observer_sensor,
-    sensor,
-    srgb_sensor,
-)
+from pellicle.colour import delta_e76, delta_e2000, lab, observers
 from pellicle.colour.spaces import Encoding, camera_encoding, encoding
 from pellicle.data.colour_rows import bare_name, colour_cells, scaled
 from pellicle.data.colours import CameraMatrix
@@ -67,7 +58,7 @@ class Camera:
 class Sight(NamedTuple):
     """Sensor of a camera, its matrix by a chart, the coding of its values, and sentences on them."""
 
-    sensor: Sensor
+    sensor: observers.Sensor
     matrix: CameraMatrix | None
     coding: Encoding
     notes: tuple[str, ...]
@@ -97,27 +88,31 @@ def sight(camera: Camera, space: str) -> Sight:
         return Sight(eye, None, encoding(space, eye.white), notes)
     coding = camera_encoding(camera.gamma)
     if camera.chart is None:
-        return Sight(srgb_sensor(eye), None, coding, (*notes, "R, G, B: channels of linear sRGB"))
+        return Sight(observers.srgb_sensor(eye), None, coding, (*notes, "R, G, B: channels of linear sRGB"))
     matrix, told = _by_chart(camera.chart, coding, eye.white)
     return Sight(eye, matrix, coding, (*notes, *told))
 
 
-def _sensor(camera: Camera) -> Sensor:
+def _sensor(camera: Camera) -> observers.Sensor:
     """The sensor of an observer of the CIE, or of a camera of known sensitivities, under its light.
 
     Raises UsageError for an unknown observer or illuminant, DataError for a file.
     """
     if camera.lamp is camera.sensitivities is None:
         with _as_error(UsageError, ""):
-            return sensor(camera.observer, camera.illuminant)
+            return observers.sensor(camera.observer, camera.illuminant)
     seen = None if camera.sensitivities is None else read_sensitivities(camera.sensitivities)
     if camera.lamp is None:
         with _as_error(UsageError, "`illuminant`: "):
-            light = illuminant_spectrum(camera.illuminant)
+            light = observers.illuminant_spectrum(camera.illuminant)
     else:
         light = read_lamp(camera.lamp)
     with _as_error(DataError, f"{camera.sensitivities or camera.lamp}: "):
-        return observer_sensor(camera.observer, *light) if seen is None else camera_sensor(*seen, *light)
+        return (
+            observers.observer_sensor(camera.observer, *light)
+            if seen is None
+            else observers.camera_sensor(*seen, *light)
+        )
 
 
 @contextmanager
@@ -129,7 +124,9 @@ def _as_error(kind: type[DataError | UsageError], where: str) -> Iterator[None]:
         raise kind(f"{where}{error}") from None
 
 
-def band_sensor(name: str | None, illuminant: str | None, lamp: str | None, folder: Path) -> Sensor | None:
+def band_sensor(
+    name: str | None, illuminant: str | None, lamp: str | None, folder: Path
+) -> observers.Sensor | None:
     """Return the sensor of a surface's recipe, None without one; paths are relative to `folder`.
 
     **Arguments:** `name` "1931" or "1964", whose channels are X, Y and Z; "srgb", the linear R, G and B of
@@ -145,16 +142,16 @@ def band_sensor(name: str | None, illuminant: str | None, lamp: str | None, fold
     if illuminant and lamp:
         raise UsageError("illuminant and lamp exclude each other: both are the light")
     observer = "1931" if name == SRGB else name
-    known = observer in OBSERVERS
+    known = observer in observers.OBSERVERS
     if not known and not (folder / name).suffix and not (folder / name).exists():
         raise UsageError(
-            f"sensor {name!r} is unknown: expected {', '.join(OBSERVERS)}, {SRGB} or a file of a camera's"
-            " sensitivities"
+            f"sensor {name!r} is unknown: expected {', '.join(observers.OBSERVERS)}, {SRGB} or a file of a"
+            " camera's sensitivities"
         )
     lamp = str(folder / lamp) if lamp else None
     sensitivities = None if known else str(folder / name)
     eye = _sensor(Camera(observer, illuminant or "D65", lamp, sensitivities))
-    return srgb_sensor(eye) if name == SRGB else eye
+    return observers.srgb_sensor(eye) if name == SRGB else eye
 
 
 def _by_chart(path: str, coding: Encoding, white: np.ndarray) -> tuple[CameraMatrix, tuple[str, ...]]:

@@ -10,17 +10,10 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour.spaces import Encoding
+from pellicle.data import photographs
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colour_rows import ColourRows, read_colour_rows
 from pellicle.data.colours import Colours
-from pellicle.data.photographs import (
-    Photograph,
-    Region,
-    image_format,
-    parse_points,
-    parse_regions,
-    read_photograph,
-)
 from pellicle.errors import DataError, UsageError
 
 Pixels = str | Sequence[int] | Sequence[Sequence[int]]
@@ -106,10 +99,12 @@ def read_colours_by_film(
     camera = Camera(
         observer, illuminant, lamp, sensitivities, chart, gamma, white_balance, transmitted=signal == "T"
     )
-    if image_format(path) is not None:
+    if photographs.image_format(path) is not None:
         if columns is not None or signal_unit is not None:
             raise UsageError(f"{path}: is a photograph: leave `columns` and `signal_unit` out")
-        films, seen = _photograph_colours(read_photograph(path), space, camera, region, points, white, angle)
+        films, seen = _photograph_colours(
+            photographs.read_photograph(path), space, camera, region, points, white, angle
+        )
         angle = None
     else:
         if not region is points is white is None:
@@ -162,7 +157,7 @@ def _assembled(
 
 
 def _photograph_colours(
-    photograph: Photograph,
+    photograph: photographs.Photograph,
     space: str | None,
     camera: Camera,
     region: Pixels | None,
@@ -180,7 +175,11 @@ def _photograph_colours(
         width, height = photograph.size
         either = '`region="x,y,width,height"` or `points="x,y"`'
         raise UsageError(f"{photograph.path}: is a photograph of {width} by {height} pixels: give {either}")
-    regions = parse_points(points, photograph) if points is not None else parse_regions(region or "")
+    regions = (
+        photographs.parse_points(points, photograph)
+        if points is not None
+        else photographs.parse_regions(region or "")
+    )
     reference, notes = white_reference(photograph, seen.coding, white)
     angles = None if angle is None else np.asarray(angle, float)
     if angles is not None and angles.ndim and len(angles) != len(regions):
@@ -211,7 +210,7 @@ def _photograph_colours(
     return [joined], seen
 
 
-def check_photograph(photograph: Photograph, space: str | None) -> str:
+def check_photograph(photograph: photographs.Photograph, space: str | None) -> str:
     """Return the space of a photograph, "srgb" by default. Raises UsageError or DataError for another one."""
     if space not in (None, "srgb", "rgb"):
         raise UsageError(
@@ -226,12 +225,12 @@ def check_photograph(photograph: Photograph, space: str | None) -> str:
 
 
 def white_reference(
-    photograph: Photograph, coding: Encoding, white: Pixels | None
+    photograph: photographs.Photograph, coding: Encoding, white: Pixels | None
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """Linear channels (3,) of the region `white`, 1 without one. Raises UsageError where it is clipped."""
     if white is None:
         return np.ones(3), ()
-    one, *others = parse_regions(white, "white")
+    one, *others = photographs.parse_regions(white, "white")
     if others:
         raise UsageError("`white` must be one region")
     pixels = one.pixels(photograph, "white")
@@ -251,7 +250,7 @@ def white_reference(
 
 
 def _region_colour(
-    region: Region, photograph: Photograph, coding: Encoding, white: np.ndarray
+    region: photographs.Region, photograph: photographs.Photograph, coding: Encoding, white: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | None, tuple[str, ...]]:
     """Mean colour of a region in linear light, coded again: (1, 3), its σ (1, 3), and sentences on it.
 

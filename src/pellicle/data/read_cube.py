@@ -10,31 +10,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.cubes import envi, numpy_files, spectra_folder, tiff_stacks, xarray_cubes
-from pellicle.data.cubes.checks import (
-    check_angles,
-    check_level,
-    check_type,
-    chosen_bands,
-    in_nm,
-    live_bands,
-    parse_wavelengths,
-    sample,
-    sample_blocks,
-)
+from pellicle.data.cubes import checks, envi, numpy_files, raw_cube, spectra_folder, tiff_stacks, xarray_cubes
 from pellicle.data.cubes.frames import camera_frames, read_mask
-from pellicle.data.cubes.raw_cube import (
-    ANGLE,
-    WAVELENGTH,
-    Asked,
-    PixelArray,
-    RawCube,
-    Scale,
-    Share,
-    Step,
-    Stored,
-    value_scale,
-)
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
 from pellicle.data.photographs import image_format
 from pellicle.data.spectrum import POLARISATIONS
@@ -46,7 +23,7 @@ SIGNALS = ("R", "T", "psi-delta")
 LARGEST_SPECTRUM = 2**27
 """Bytes of a larger HDF5 file are no spectrum's."""
 READ = "zarr, NetCDF, ENVI (.hdr), TIFF stacks, .npy, .npz, and folders of spectra with a table of file, x, y"
-READERS: dict[Callable[[Path], bool], Callable[[Path, Asked], RawCube]] = {
+READERS: dict[Callable[[Path], bool], Callable[[Path, raw_cube.Asked], raw_cube.RawCube]] = {
     xarray_cubes.is_zarr: xarray_cubes.read_zarr,
     Path.is_dir: spectra_folder.read_folder,
     xarray_cubes.is_netcdf: xarray_cubes.read_netcdf,
@@ -57,7 +34,7 @@ READERS: dict[Callable[[Path], bool], Callable[[Path, Asked], RawCube]] = {
 }
 """Readers of cubes by the test of a file or folder that they read; the first that holds is taken."""
 PathLike = str | os.PathLike[str]
-_FRAME_AXES = {1: (WAVELENGTH,), 2: ("x", WAVELENGTH), 3: ("y", "x", WAVELENGTH)}
+_FRAME_AXES = {1: (raw_cube.WAVELENGTH,), 2: ("x", raw_cube.WAVELENGTH), 3: ("y", "x", raw_cube.WAVELENGTH)}
 
 
 def read_cube(
@@ -121,10 +98,10 @@ def read_cube(
         raise UsageError(
             "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
         )
-    given, unit = (None, "") if wavelengths is None else parse_wavelengths(wavelengths)
-    raw = _raw(source, Asked(given, wavelength_unit or unit or None, variable, signal))
-    nm, notes = in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
-    bands, told = chosen_bands(nm, range, without_bands, raw.good, raw.path)
+    given, unit = (None, "") if wavelengths is None else checks.parse_wavelengths(wavelengths)
+    raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, signal))
+    nm, notes = checks.in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
+    bands, told = checks.chosen_bands(nm, range, without_bands, raw.good, raw.path)
     notes = [*raw.notes, *notes, *told]
     kind = signal or raw.signal or "R"
     if signal is raw.signal is None:
@@ -133,7 +110,7 @@ def read_cube(
         raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
     frames = None
     if white_frame is not None:
-        if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
+        if raw_cube.ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
             raise UsageError(
                 f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
             )
@@ -142,7 +119,9 @@ def read_cube(
         frames, told = camera_frames(raw, nm, white, dark, white_reflectance, saturation)
         notes += told
     calibrated = raw.calibrated if calibrated is None else calibrated
-    scale, told = value_scale(raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None)
+    scale, told = raw_cube.value_scale(
+        raw, kind, signal_unit, calibrated=calibrated, framed=frames is not None
+    )
     notes += [told] if told else []
     used = None if mask is None else read_mask(mask, raw)
     steps = (scale,) if frames is None else (scale, frames)
@@ -171,7 +150,7 @@ def read_cube(
     return cube
 
 
-def _raw(source: Any, asked: Asked) -> RawCube:
+def _raw(source: Any, asked: raw_cube.Asked) -> raw_cube.RawCube:
     """The content of a file, an xarray object or an array. Raises DataError or UsageError."""
     if xarray_cubes.is_xarray(source):
         path = str(source.encoding.get("source", "")) or f"the {type(source).__name__}"
@@ -183,40 +162,46 @@ def _raw(source: Any, asked: Asked) -> RawCube:
     else:
         raise UsageError(f"a cube must be a path, an xarray object or an array, not {type(source).__name__}")
     for stored in raw.arrays.values():
-        check_type(stored.data.dtype, raw.path)
+        checks.check_type(stored.data.dtype, raw.path)
     if not np.prod(raw.arrays["values"].data.shape):
         sizes = ", ".join(f"{axis} {n}" for axis, n in raw.arrays["values"].sizes.items())
         raise DataError(f"{raw.path}: has no pixels or no bands ({sizes}): check how it was written")
     return raw
 
 
-def _lazy(raw: RawCube, names: Sequence[str], bands: np.ndarray, *steps: Step) -> dict[str, PixelArray]:
+def _lazy(
+    raw: raw_cube.RawCube, names: Sequence[str], bands: np.ndarray, *steps: raw_cube.Step
+) -> dict[str, raw_cube.PixelArray]:
     """Arrays of the file by name, as far as it has them, at some bands, with conversions."""
-    angles = raw.arrays["values"].sizes.get(ANGLE)
+    angles = raw.arrays["values"].sizes.get(raw_cube.ANGLE)
     stored = {name: raw.arrays[name] for name in names if name in raw.arrays}
-    return {name: PixelArray(one, raw.pixels, bands, angles, steps) for name, one in stored.items()}
+    return {name: raw_cube.PixelArray(one, raw.pixels, bands, angles, steps) for name, one in stored.items()}
 
 
 def _live(
-    raw: RawCube, measured: Mapping[str, PixelArray], signal: str, used: np.ndarray | None, calibrated: bool
+    raw: raw_cube.RawCube,
+    measured: Mapping[str, raw_cube.PixelArray],
+    signal: str,
+    used: np.ndarray | None,
+    calibrated: bool,
 ) -> tuple[np.ndarray, list[str]]:
     """Check a sample of the values; returns which bands have some, and a note. Raises DataError."""
-    seen = sample(measured, len(raw.dims), used)
-    live, notes = live_bands(seen["values"], int(np.prod(raw.shape)), raw.path)
+    seen = checks.sample(measured, len(raw.dims), used)
+    live, notes = checks.live_bands(seen["values"], int(np.prod(raw.shape)), raw.path)
     seen = {name: array[:, live] for name, array in seen.items()}
     if signal == "psi-delta":
-        check_angles(seen["values"], seen["delta"], raw.path)
+        checks.check_angles(seen["values"], seen["delta"], raw.path)
     elif calibrated:
-        check_level(seen["values"], signal, raw.path)
+        checks.check_level(seen["values"], signal, raw.path)
     return live, notes
 
 
 def _errors(
-    raw: RawCube,
-    measured: Mapping[str, PixelArray],
+    raw: raw_cube.RawCube,
+    measured: Mapping[str, raw_cube.PixelArray],
     noise: float | str | None,
     bands: np.ndarray,
-    scale: Scale,
+    scale: raw_cube.Scale,
     *,
     framed: bool,
 ) -> dict[str, Any]:
@@ -235,10 +220,12 @@ def _errors(
         return {names[name]: np.full(bands.size, level.value) for name in measured}
     if "delta" in measured:
         raise UsageError(f"`noise` {level} is a share of the signal: give that of psi and delta in degrees")
-    return {"sigma": measured["values"].then(Share(level.value))}
+    return {"sigma": measured["values"].then(raw_cube.Share(level.value))}
 
 
-def _with_fingerprint(cube: Cube, raw: RawCube, frames: Sequence[Any], facts: tuple[Any, ...]) -> Cube:
+def _with_fingerprint(
+    cube: Cube, raw: raw_cube.RawCube, frames: Sequence[Any], facts: tuple[Any, ...]
+) -> Cube:
     """The cube with a digest of its content and of how it was read, and a note where that is of a sample.
 
     Of files, and of arrays in memory, of more than 64 MB some samples are read.
@@ -257,7 +244,7 @@ def _with_fingerprint(cube: Cube, raw: RawCube, frames: Sequence[Any], facts: tu
             if getattr(stored.data, "chunks", None) is not None:
                 graph = str(getattr(getattr(stored.data, "data", stored.data), "name", ""))
             dims = [axis for axis in stored.axes if axis in raw.dims]
-            blocks = sample_blocks(tuple(stored.sizes[axis] for axis in dims), 10**9)
+            blocks = checks.sample_blocks(tuple(stored.sizes[axis] for axis in dims), 10**9)
             places = [dict(zip(dims, w, strict=True)) for w in blocks] if total > WHOLE or graph else [None]
             parts += [graph, *(stored.read(place) for place in places)]
     digest = fingerprint(facts, form, content, parts)
@@ -272,7 +259,7 @@ def _once(notes: Sequence[str]) -> tuple[str, ...]:
     return tuple(n for i, n in enumerate(notes) if i in first or not n.startswith(units))
 
 
-def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:
+def _stated_angle(raw: raw_cube.RawCube, angle: float) -> np.ndarray:
     if raw.angle is not None and np.any(raw.angle != angle):
         raise UsageError(f"{raw.path}: states its own angles; leave `angle` out")
     if not 0 <= angle < 90:
@@ -280,7 +267,7 @@ def _stated_angle(raw: RawCube, angle: float) -> np.ndarray:
     return np.array([angle])
 
 
-def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> RawCube:
+def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: raw_cube.RawCube) -> raw_cube.RawCube:
     """The content of a frame for a cube. Raises DataError, or UsageError of a reader.
 
     An array has the axes (bands), (x, bands) or (y, x, bands).
@@ -296,13 +283,13 @@ def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> Raw
             )
         axes = _FRAME_AXES[rank]
         if rank == 3 and values.shape[0] == bands != values.shape[-1]:
-            axes = (WAVELENGTH, "y", "x")
-        dims = tuple(axis for axis in axes if axis != WAVELENGTH)
-        return RawCube(str(path), {"values": Stored(values, axes)}, dims, cube.wavelength)
+            axes = (raw_cube.WAVELENGTH, "y", "x")
+        dims = tuple(axis for axis in axes if axis != raw_cube.WAVELENGTH)
+        return raw_cube.RawCube(str(path), {"values": raw_cube.Stored(values, axes)}, dims, cube.wavelength)
     try:
-        raw = read_raw(path, Asked())
+        raw = read_raw(path, raw_cube.Asked())
     except UsageError:  # it has no wavelengths of its own, or several variables
-        raw = read_raw(path, Asked(cube.wavelength, cube.unit))
+        raw = read_raw(path, raw_cube.Asked(cube.wavelength, cube.unit))
     comparable = raw.unit == cube.unit and raw.wavelength.shape == cube.wavelength.shape
     if comparable and not np.allclose(raw.wavelength, cube.wavelength, 1e-4):
         raise DataError(
@@ -312,7 +299,7 @@ def _raw_frame(frame: str | os.PathLike[str] | np.ndarray, cube: RawCube) -> Raw
     return raw
 
 
-def read_raw(path: Path, asked: Asked) -> RawCube:
+def read_raw(path: Path, asked: raw_cube.Asked) -> raw_cube.RawCube:
     """Read the cube of a file or folder. Raises DataError or UsageError, one sentence."""
     if not path.exists():
         raise DataError(f"{path}: no such file or folder; check its name")

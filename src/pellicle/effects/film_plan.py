@@ -6,19 +6,8 @@ from functools import partial
 
 import jax
 
-from pellicle.effects import averaging, gradient, presence
+from pellicle.effects import averaging, gradient, presence, removal
 from pellicle.effects.differences import Evaluation, Savings, design, measured
-from pellicle.effects.removal import (
-    REMOVABLE,
-    FilmRemoval,
-    Stage,
-    Step,
-    check_tolerance,
-    left_out_row,
-    plans_after,
-    reduced_plan,
-    removal_steps,
-)
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.scene.film import Scene, of_reference
@@ -62,17 +51,17 @@ def plan(scene: Scene, tolerance: float = 0.0, keep: Iterable[str] = ()) -> Plan
 
     **Raises:** ValueError for a negative tolerance and, with a tolerance, for a scene without wavelengths.
     """
-    check_tolerance(tolerance)
+    removal.check_tolerance(tolerance)
     if tolerance == 0:
         return exact(scene)
     if scene.light.wavelength is None:
         raise ValueError("what an effect changes depends on the wavelengths: give the light its wavelengths")
     kept = set(keep)
-    removals = [partial(_removals, effect) for effect in REMOVABLE if effect not in kept]
+    removals = [partial(_removals, effect) for effect in removal.REMOVABLE if effect not in kept]
     averages = [partial(_fewer, effect) for effect in ("coherence", "orders", "angle-spread", "gradient")]
     with jax.enable_x64(True):
         moves = (_by_orders, *removals, *averages)
-        return reduced_plan(full_plan(scene), scene, evaluation(scene), moves, tolerance)
+        return removal.reduced_plan(full_plan(scene), scene, evaluation(scene), moves, tolerance)
 
 
 def full_plan(scene: Scene) -> Plan:
@@ -90,23 +79,23 @@ def evaluation(scene: Scene) -> Evaluation:
 
 def alternatives(effect: str, scene: Scene) -> list[Plan]:
     """Plans of the scene without one effect, otherwise exact; empty where it is absent or must stay."""
-    return plans_after(partial(_removals, effect), full_plan(scene), scene)
+    return removal.plans_after(partial(_removals, effect), full_plan(scene), scene)
 
 
 def savings(scene: Scene, chosen: Plan) -> Savings:
     """Error and time saved by leaving each effect out of the full plan, and the time of `chosen`."""
     with jax.enable_x64(True):
-        cheaper = {effect: alternatives(effect, scene)[:1] for effect in REMOVABLE}
+        cheaper = {effect: alternatives(effect, scene)[:1] for effect in removal.REMOVABLE}
         return measured(full_plan(scene), chosen, cheaper, evaluation(scene))
 
 
-def _by_orders(stage: Stage) -> Iterator[Step]:
+def _by_orders(stage: removal.Stage) -> Iterator[removal.Step]:
     plan = exact(stage.scene)
     if plan.row("orders").count:
-        yield Step(plan, stage.scene, plan.row("coherence"))
+        yield removal.Step(plan, stage.scene, plan.row("coherence"))
 
 
-def _removals(effect: str, stage: Stage) -> Iterator[Step]:
+def _removals(effect: str, stage: removal.Stage) -> Iterator[removal.Step]:
     """Removal of one effect; of opaque layers the uppermost first."""
     scene, light = stage.scene, stage.scene.light
     meaningless = {
@@ -122,23 +111,23 @@ def _removals(effect: str, stage: Stage) -> Iterator[Step]:
         # a graded layer is no half space
         plain = (isinstance(x, Layer) and not isinstance(x.material, Graded) for x in scene.layers)
         opaque = (one and absorbs(x.material) for one, x in zip(plain, scene.layers, strict=True))
-        removals = [FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
+        removals = [removal.FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
     elif stage.plan.on(effect) and not meaningless.get(effect, False):
-        removals = [FilmRemoval(effect)]
+        removals = [removal.FilmRemoval(effect)]
 
     def judge(simpler: Scene) -> Plan:
         return exact(simpler) if stage.plan.on("orders") else full_plan(simpler)
 
-    def row(removal: FilmRemoval) -> Row:
+    def row(one: removal.FilmRemoval) -> Row:
         if effect == "opaque":
-            name = presence.name(scene, removal.depth)
+            name = presence.name(scene, one.depth)
             return Row("opaque", True, f"{name} lets nothing through: what lies beneath is left out")
-        return left_out_row(stage.plan.row(effect))
+        return removal.left_out_row(stage.plan.row(effect))
 
-    return removal_steps(stage, removals, judge, row)
+    return removal.removal_steps(stage, removals, judge, row)
 
 
-def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
+def _fewer(effect: str, stage: removal.Stage) -> Iterator[removal.Step]:
     """Fewer orders, nodes or rays of an average, or slices of a graded layer."""
     row = stage.plan.row(effect)
     for count in sorted({max(row.count // 4, 1), row.count // 2, 3 * row.count // 4}):
@@ -148,4 +137,4 @@ def _fewer(effect: str, stage: Stage) -> Iterator[Step]:
                 around |= 1  # odd: see `lens_rays`
             why = f"{count} suffice of {row.count}: {row.why}"
             cheaper = replace(row, count=count, around=around, why=why)
-            yield Step(stage.plan.with_rows(cheaper), stage.scene, cheaper)
+            yield removal.Step(stage.plan.with_rows(cheaper), stage.scene, cheaper)

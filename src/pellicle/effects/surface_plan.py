@@ -17,18 +17,9 @@ import numpy as np
 from pellicle.brdf.directions import angle_to_half
 from pellicle.brdf.film_colour import node_count
 from pellicle.brdf.sensor_bands import ERROR
+from pellicle.effects import removal
 from pellicle.effects.differences import Evaluation, Savings, design, measured, signals
 from pellicle.effects.presence import precision
-from pellicle.effects.removal import (
-    Stage,
-    Step,
-    check_tolerance,
-    in_single_precision,
-    left_out_row,
-    plans_after,
-    reduced_plan,
-    removal_steps,
-)
 from pellicle.forward_model.plan import SURFACE, Plan, Row
 from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import Free, is_free
@@ -215,14 +206,14 @@ def plan(view: SurfaceView, tolerance: float = 0.0, keep: Iterable[str] = ()) ->
 
     **Raises:** ValueError for a negative tolerance.
     """
-    check_tolerance(tolerance)
+    removal.check_tolerance(tolerance)
     if tolerance == 0:
         return exact(view)
     kept = set(keep)
     moves = [partial(_removal, effect) for effect in REMOVABLE if effect not in kept]
     with jax.enable_x64(True):
         moves += [] if "oblique" in kept else [_by_nodes]
-        return reduced_plan(exact(view), view, evaluation(view), moves, tolerance)
+        return removal.reduced_plan(exact(view), view, evaluation(view), moves, tolerance)
 
 
 def evaluation(view: SurfaceView) -> Evaluation:
@@ -234,7 +225,7 @@ def evaluation(view: SurfaceView) -> Evaluation:
 
 def alternatives(effect: str, view: SurfaceView) -> list[Plan]:
     """Plans of the surface without one effect, otherwise exact; empty where it is absent or must stay."""
-    return plans_after(partial(_removal, effect), exact(view), view)
+    return removal.plans_after(partial(_removal, effect), exact(view), view)
 
 
 def savings(view: SurfaceView, chosen: Plan) -> Savings:
@@ -244,7 +235,7 @@ def savings(view: SurfaceView, chosen: Plan) -> Savings:
         return measured(exact(view), chosen, cheaper, evaluation(view))
 
 
-def _removal(effect: str, stage: Stage) -> Iterator[Step]:
+def _removal(effect: str, stage: removal.Stage) -> Iterator[removal.Step]:
     """Removal of one effect, where it is present and something else remains."""
     numbers = stage.scene.numbers
     present = any(row.effect == effect and row.on for row in stage.plan.rows)
@@ -252,10 +243,12 @@ def _removal(effect: str, stage: Stage) -> Iterator[Step]:
     lost = effect == "coherence" and is_free(numbers.get("thickness"))
     stays = lost or not present or not something_left(effect, stage.scene)
     removals = [] if stays else [SurfaceRemoval(effect)]
-    return removal_steps(stage, removals, exact, lambda _: left_out_row(stage.plan.row(effect)))
+    return removal.removal_steps(
+        stage, removals, exact, lambda _: removal.left_out_row(stage.plan.row(effect))
+    )
 
 
-def _by_nodes(stage: Stage) -> Iterator[Step]:
+def _by_nodes(stage: removal.Stage) -> Iterator[removal.Step]:
     """The colour of the film at more and more angles, while they are fewer than the samples."""
     rows = {row.effect: row for row in stage.plan.rows}
     if "oblique" not in rows or not all(rows[x].on for x in ("oblique", "roughness", "coherence")):
@@ -263,7 +256,7 @@ def _by_nodes(stage: Stage) -> Iterator[Step]:
     for count in (n for n in NODES if 4 * n <= len(stage.scene.i)):
         why = f"{rows['oblique'].why.partition(':')[0]}: the film's colour at {count} angles"
         row = replace(rows["oblique"], count=count, why=why)
-        yield Step(stage.plan.with_rows(row), stage.scene, row)
+        yield removal.Step(stage.plan.with_rows(row), stage.scene, row)
 
 
 def something_left(effect: str, view: SurfaceView) -> bool:
@@ -334,7 +327,7 @@ _REMOVALS: dict[str, Callable[[SurfaceView], SurfaceView]] = {
     "multiple-scattering": lambda view: _drop(view, "multiple_scattering"),
     "coat": lambda view: _drop(view, "coat"),
     "diffuse": lambda view: _drop(view, "diffuse"),
-    "precision": in_single_precision,
+    "precision": removal.in_single_precision,
 }
 
 REMOVABLE = tuple(_REMOVALS)

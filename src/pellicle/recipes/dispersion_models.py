@@ -5,18 +5,10 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import equinox as eqx
 
+from pellicle.dispersion import oscillators
 from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
 from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
-from pellicle.dispersion.oscillators import (
-    AbstractOscillator,
-    CodyLorentz,
-    Drude,
-    Gaussian,
-    Lorentz,
-    Oscillators,
-    TaucLorentz,
-)
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free
@@ -25,7 +17,7 @@ Parameter: TypeAlias = float | Free
 Values: TypeAlias = Mapping[str, "Parameter | Sequence[Parameter]"]
 """Parameters of a model by name; of a spline one or one per knot, and its `knots` (nm)."""
 
-_Built = TypeVar("_Built", bound=AbstractDispersion | AbstractOscillator)
+_Built = TypeVar("_Built", bound=AbstractDispersion | oscillators.AbstractOscillator)
 
 
 class ParameterSpec(NamedTuple):
@@ -168,15 +160,17 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
     return _checked(lambda: _built(name, complete))
 
 
-def build_oscillator(kind: str, values: Values) -> AbstractOscillator:
+def build_oscillator(kind: str, values: Values) -> oscillators.AbstractOscillator:
     """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
     complete = {key: spec.value for key, spec in TERMS[kind].items()} | dict(values)
     return _checked(lambda: KINDS[kind](**complete))
 
 
-def sum_of_oscillators(eps_inf: Parameter, terms: Iterable[AbstractOscillator]) -> AbstractDispersion:
+def sum_of_oscillators(
+    eps_inf: Parameter, terms: Iterable[oscillators.AbstractOscillator]
+) -> AbstractDispersion:
     """Build a sum of oscillators. Raises UsageError for values that it forbids."""
-    return _checked(lambda: Oscillators(eps_inf, tuple(terms)))
+    return _checked(lambda: oscillators.Oscillators(eps_inf, tuple(terms)))
 
 
 def check_dispersion(dispersion: AbstractDispersion, label: str) -> AbstractDispersion:
@@ -219,11 +213,11 @@ KINDS: dict[str, type[Any]] = {
     "sellmeier": Sellmeier,
     "spline": Spline,
     "spline-kk": KramersKronigSpline,
-    "lorentz": Lorentz,
-    "drude": Drude,
-    "gaussian": Gaussian,
-    "tauc-lorentz": TaucLorentz,
-    "cody-lorentz": CodyLorentz,
+    "lorentz": oscillators.Lorentz,
+    "drude": oscillators.Drude,
+    "gaussian": oscillators.Gaussian,
+    "tauc-lorentz": oscillators.TaucLorentz,
+    "cody-lorentz": oscillators.CodyLorentz,
 }
 """The class of each model, and of each oscillator in `TERMS`."""
 
@@ -232,7 +226,7 @@ def _built(name: str, values: Values) -> AbstractDispersion:
     """A model of all its values."""
     given: dict[str, Any] = dict(values)
     if name in TERMS:
-        return Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
+        return oscillators.Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
     if name == "constant":
         require_nonnegative("constant", **given)
         return Constant(given["n"], None if given["k"] == 0 else given["k"])

@@ -22,34 +22,12 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
-from pellicle.recipes.dispersion_models import (
-    MODELS,
-    SPLINES,
-    TERMS,
-    Parameter,
-    build_model,
-    build_oscillator,
-    check_dispersion,
-    fixed_model,
-    free_by_default,
-    free_model,
-    sum_of_oscillators,
-)
-from pellicle.recipes.schema import (
-    BIAXIAL,
-    UNIAXIAL,
-    AnisotropicTable,
-    FreeTable,
-    GradedTable,
-    Medium,
-    MediumTable,
-    MixTable,
-    Number,
-)
+from pellicle.recipes import dispersion_models as models
+from pellicle.recipes import schema
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import Graded
 
-_MEDIUM: TypeAdapter[Any] = TypeAdapter(Medium)
+_MEDIUM: TypeAdapter[Any] = TypeAdapter(schema.Medium)
 _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
 _DECIMAL_COMMA = re.compile(r"\s*\d+,\d+\s*")
 _LIKE_AN_INDEX = 0.9
@@ -86,7 +64,7 @@ def drift(text: str, name: str) -> str | float:
 
 
 def medium(
-    value: Medium, free: Iterable[str] = (), name: str = "`layer`", folder: Path | None = None
+    value: schema.Medium, free: Iterable[str] = (), name: str = "`layer`", folder: Path | None = None
 ) -> AbstractDispersion:
     """Return the dispersion for a word of the command line, or for what a recipe has under the key `name`.
 
@@ -97,13 +75,13 @@ def medium(
 
     Raises UsageError, or DataError for a file that cannot be read.
     """
-    if isinstance(value, AnisotropicTable):
+    if isinstance(value, schema.AnisotropicTable):
         dispersion: AbstractDispersion = _anisotropic(dict(value.model_extra or {}), folder)
-    elif isinstance(value, GradedTable):
+    elif isinstance(value, schema.GradedTable):
         dispersion = _graded(value, dict(value.model_extra or {}), folder)
-    elif isinstance(value, MixTable):
+    elif isinstance(value, schema.MixTable):
         dispersion = _mixture(value.mix, dict(value.model_extra or {}), folder)
-    elif isinstance(value, MediumTable):
+    elif isinstance(value, schema.MediumTable):
         dispersion = _model(value.model, dict(value.model_extra or {}))
     else:
         word = str(value).strip()
@@ -141,11 +119,13 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
             return Constant(index.real, index.imag if index.imag else None)
         raise UsageError(f"{name} must be an index n + ik with n and k finite and not negative, got {text}")
     match = _CALL.fullmatch(text)
-    if match is not None and (model := match[1].lower()) in MODELS:
+    if match is not None and (model := match[1].lower()) in models.MODELS:
         if match[2] is None:
-            return free_model(model)
+            return models.free_model(model)
         label = f"{name}: a parameter of {model}"
-        return fixed_model(model, [parse_number(v, label) for v in match[2].split(",") if v.strip()], name)
+        return models.fixed_model(
+            model, [parse_number(v, label) for v in match[2].split(",") if v.strip()], name
+        )
     try:
         return material(text)
     except UnknownMaterial as error:
@@ -155,13 +135,13 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
             raise UsageError(
                 f"{text!r} is no material; an index has a decimal point: {text.replace(',', '.')}"
             ) from None
-        close = did_you_mean(text.lower(), MODELS, 0.8)
+        close = did_you_mean(text.lower(), models.MODELS, 0.8)
         raise UsageError(f"no material or model {text!r}{close}" if close else str(error)) from None
 
 
 def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     axis = values.pop("axis", [0.0, 0.0])
-    keys = BIAXIAL if values.keys() & {*BIAXIAL} else UNIAXIAL
+    keys = schema.BIAXIAL if values.keys() & {*schema.BIAXIAL} else schema.UNIAXIAL
     _check_keys(values, [*keys, "axis"], "a birefringent material has no")
     missing = [key for key in keys if key not in values]
     if missing:
@@ -174,7 +154,7 @@ def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     return Anisotropic(**{key: _component(key, values[key], folder) for key in keys}, axis=angles)
 
 
-def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
+def _graded(table: schema.GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
     name = table.profile
     _check_word(name, PROFILES, "profile")
     _check_word(table.mix, MIXTURES, "mix")
@@ -195,10 +175,10 @@ def _graded(table: GradedTable, values: dict[str, Any], folder: Path | None) -> 
 def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
     """A model by its name, or a sum of oscillators."""
     if name != "oscillators":
-        _check_word(name, [*MODELS, "oscillators"], "dispersion model")
-        parameter, more = (_parameters, ["knots"]) if name in SPLINES else (_parameter, [])
-        _check_keys(values, [*MODELS[name], *more], f"{name} has no parameter")
-        return build_model(name, {key: parameter(key, value) for key, value in values.items()})
+        _check_word(name, [*models.MODELS, "oscillators"], "dispersion model")
+        parameter, more = (_parameters, ["knots"]) if name in models.SPLINES else (_parameter, [])
+        _check_keys(values, [*models.MODELS[name], *more], f"{name} has no parameter")
+        return models.build_model(name, {key: parameter(key, value) for key, value in values.items()})
     terms = values.pop("terms", None)
     eps_inf = _parameter("eps_inf", values.pop("eps_inf", 1.0))
     _check_keys(values, ("eps_inf", "terms"), "oscillators has no parameter")
@@ -207,12 +187,14 @@ def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
     built = []
     for term in terms:
         if "kind" not in term:
-            raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(TERMS)}")
+            raise UsageError(f"a term of oscillators needs a kind: one of {', '.join(models.TERMS)}")
         kind, numbers = str(term["kind"]), {key: value for key, value in term.items() if key != "kind"}
-        _check_word(kind, TERMS, "oscillator")
-        _check_keys(numbers, [*TERMS[kind]], f"{kind} has no parameter")
-        built.append(build_oscillator(kind, {key: _parameter(key, value) for key, value in numbers.items()}))
-    return sum_of_oscillators(eps_inf, built)
+        _check_word(kind, models.TERMS, "oscillator")
+        _check_keys(numbers, [*models.TERMS[kind]], f"{kind} has no parameter")
+        built.append(
+            models.build_oscillator(kind, {key: _parameter(key, value) for key, value in numbers.items()})
+        )
+    return models.sum_of_oscillators(eps_inf, built)
 
 
 def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
@@ -260,17 +242,17 @@ def _component(key: str, value: Any, folder: Path | None) -> AbstractDispersion:
         ) from None
 
 
-def _parameters(key: str, value: Any) -> Parameter | list[Parameter]:
+def _parameters(key: str, value: Any) -> models.Parameter | list[models.Parameter]:
     """A number of a model, or a list of one for each knot of a spline."""
     if isinstance(value, list):
         return [_parameter(f"{key}{i}", one) for i, one in enumerate(value, start=1)]
     return _parameter(key, value)
 
 
-def _parameter(key: str, value: Any) -> Parameter:
+def _parameter(key: str, value: Any) -> models.Parameter:
     """A model's parameter; without bounds it is fixed."""
     try:
-        table = FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
+        table = schema.FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
     except (ValidationError, TypeError, ValueError):
         raise UsageError(
             f"{key} must be a number or a table of value, lower and upper, got {value!r}"
@@ -278,7 +260,7 @@ def _parameter(key: str, value: Any) -> Parameter:
     return number(table, key)
 
 
-def number(value: Number, name: str, minimum: float | None = None) -> float | Free:
+def number(value: schema.Number, name: str, minimum: float | None = None) -> float | Free:
     """Return a fixed number or a `Free` from what a recipe gives for `name`.
 
     Raises UsageError where it is neither, not finite, or below `minimum`.
@@ -342,10 +324,10 @@ def _free_parameter(
         raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
     at, position = known[name]
     replaced = [leaf for _, leaf in leaves]
-    replaced[position] = Free(*bounds) if bounds else free_by_default(at, replaced[position])
+    replaced[position] = Free(*bounds) if bounds else models.free_by_default(at, replaced[position])
     if replaced[position] is None:
         raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
-    return check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
+    return models.check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
 
 
 def _free_index(
@@ -371,7 +353,7 @@ def _free_index(
     return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 
 
-def _start(number: Parameter) -> float:
+def _start(number: models.Parameter) -> float:
     return number.start if isinstance(number, Free) else float(number)
 
 

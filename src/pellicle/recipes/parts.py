@@ -26,18 +26,9 @@ from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
+from pellicle.recipes import schema
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, fixed_model, free_model
 from pellicle.recipes.media import free_numbers, medium, number, scattering_back
-from pellicle.recipes.schema import (
-    FreeTable,
-    InstrumentTable,
-    LayerTable,
-    Medium,
-    Number,
-    PlateTable,
-    ReferenceTable,
-    SceneTable,
-)
 from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
@@ -206,7 +197,7 @@ _OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interl
 """Uncertainties that stand in [scene]; the others stand in [instrument]."""
 
 
-def optional(value: Number | None, name: str) -> float | Free | None:
+def optional(value: schema.Number | None, name: str) -> float | Free | None:
     """Return a number that may be absent. Raises UsageError as `number` does."""
     return None if value is None else number(value, name, minimum=None if name in _SIGNED else 0.0)
 
@@ -215,7 +206,7 @@ def _part(kind: type, table: BaseModel, **given: Any) -> Any:
     """A part whose fields are the keys of a table, but for those that are `given`."""
     values = {field.name: getattr(table, field.name, None) for field in fields(kind)}
     read = {
-        name: optional(x, name) if isinstance(x, float | FreeTable) else x
+        name: optional(x, name) if isinstance(x, float | schema.FreeTable) else x
         for name, x in values.items()
         if x is not None and name not in given
     }
@@ -233,7 +224,7 @@ def _keys(part: Any, label: str, leave_out: Iterable[str] = ()) -> dict[str, Any
     return keys
 
 
-def layer(table: LayerTable, folder: Path) -> Layer | Interface | Plate:
+def layer(table: schema.LayerTable, folder: Path) -> Layer | Interface | Plate:
     """The layer of a table. Raises UsageError."""
     if table.between is not None:
         return _part(Interface, table, mix=table.between)
@@ -256,9 +247,9 @@ def layer_keys(layer: Layer | Interface | Plate, position: int, folder: Path) ->
     return head | keys
 
 
-def substrate(value: Medium | PlateTable, folder: Path, signal: str) -> Substrate:
+def substrate(value: schema.Medium | schema.PlateTable, folder: Path, signal: str) -> Substrate:
     """The substrate of a table or a medium, for light of a signal. Raises UsageError."""
-    if not isinstance(value, PlateTable):
+    if not isinstance(value, schema.PlateTable):
         return Substrate(medium(value, name="substrate", folder=folder))
     given: dict[str, Any] = {"material": medium(value.material, name="material", folder=folder)}
     if isinstance(value.back, str) and value.back in SCATTERING_BACKS:
@@ -278,7 +269,7 @@ def substrate_keys(substrate: Substrate, folder: Path) -> Any:
     return {"material": material, **keys} if keys else material
 
 
-def reference(table: ReferenceTable, folder: Path) -> Reference:
+def reference(table: schema.ReferenceTable, folder: Path) -> Reference:
     """Return the reference of a recipe, whose reflectance is known."""
     layers = [layer(one, folder) for one in table.layer]
     return Reference(substrate(table.substrate, folder, "R"), layers, table.form)
@@ -293,7 +284,7 @@ def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
     }
 
 
-def instrument(table: InstrumentTable) -> Instrument:
+def instrument(table: schema.InstrumentTable) -> Instrument:
     """The instrument of a table. Raises UsageError."""
     return _part(Instrument, table, scale=table.scale, offset=table.offset)
 
@@ -310,7 +301,7 @@ def instrument_keys(instrument: Instrument) -> dict[str, Any]:
     return keys | _keys(instrument, "instrument", keys)
 
 
-def uncertainty(scene: SceneTable, instrument: InstrumentTable) -> Uncertainty:
+def uncertainty(scene: schema.SceneTable, instrument: schema.InstrumentTable) -> Uncertainty:
     """The usual uncertainties, or none, with those that a recipe gives in their place."""
     stated = {
         field.name: value

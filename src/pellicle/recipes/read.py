@@ -20,17 +20,8 @@ from pellicle.data.cameras import Camera, Sight, band_sensor, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError, did_you_mean
-from pellicle.recipes import parts
+from pellicle.recipes import parts, schema
 from pellicle.recipes.media import medium, number
-from pellicle.recipes.schema import (
-    BACK,
-    FileTable,
-    Number,
-    PlateTable,
-    ReadingTable,
-    RecipeTable,
-    SurfaceRecipeTable,
-)
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
 from pellicle.scene.surface import Surface
@@ -70,8 +61,8 @@ def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:
     data, scene = loaded.get("data"), loaded.get("scene")
     by_signal = isinstance(data, dict) and data.get("signal") == "brdf"
     if by_signal or (isinstance(scene, dict) and "surface" in scene):
-        return SurfaceRecipe(path, _validated(loaded, SurfaceRecipeTable))
-    return FilmRecipe(path, _validated(loaded, RecipeTable))
+        return SurfaceRecipe(path, _validated(loaded, schema.SurfaceRecipeTable))
+    return FilmRecipe(path, _validated(loaded, schema.RecipeTable))
 
 
 def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
@@ -144,7 +135,7 @@ class FilmRecipe:
     """A recipe of a film: its path and its checked tables."""
 
     path: str
-    tables: RecipeTable
+    tables: schema.RecipeTable
 
     @property
     def files(self) -> list[str]:
@@ -227,15 +218,15 @@ def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
     return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
 
 
-_NUMBERS: TypeAdapter[Any] = TypeAdapter(Number | list[float])
+_NUMBERS: TypeAdapter[Any] = TypeAdapter(schema.Number | list[float])
 
 
-def _of_file(tables: RecipeTable, file: FileTable) -> RecipeTable:
+def _of_file(tables: schema.RecipeTable, file: schema.FileTable) -> schema.RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
-    reading = {name: x for name in ReadingTable.model_fields if (x := getattr(file, name)) is not None}
+    reading = {name: x for name in schema.ReadingTable.model_fields if (x := getattr(file, name)) is not None}
     scene, plate = tables.scene, tables.scene.substrate
-    if file.back is False and isinstance(plate, PlateTable):
-        bare = plate.model_copy(update=dict.fromkeys(("back", *BACK)))
+    if file.back is False and isinstance(plate, schema.PlateTable):
+        bare = plate.model_copy(update=dict.fromkeys(("back", *schema.BACK)))
         scene = scene.model_copy(update={"substrate": bare})
     parts = {"data": tables.data.model_copy(update={**reading, "file": [file]}), "scene": scene}
     for name in ("instrument", "camera"):
@@ -250,7 +241,7 @@ class SurfaceRecipe:
     """A recipe of a surface: its path and its checked tables."""
 
     path: str
-    tables: SurfaceRecipeTable
+    tables: schema.SurfaceRecipeTable
 
     @property
     def files(self) -> list[str]:

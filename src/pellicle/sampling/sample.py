@@ -29,19 +29,8 @@ from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.sampling import density
 from pellicle.sampling.chain import Chain, ChainFile, Checks, check, missing
-from pellicle.sampling.density import (
-    LogDensity,
-    Modes,
-    Stretch,
-    Target,
-    fingerprint,
-    log_density,
-    modes,
-    sandwich_stretch,
-    systematics,
-    unchanged,
-)
 from pellicle.sampling.result import Posterior, Prediction, predictions
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
@@ -55,7 +44,12 @@ _GROWTH = 1.25
 
 
 def run(
-    target: Target, modes: Modes, chain: Chain, steps: int, keep: Callable[[Chain], None], progress: Progress
+    target: density.Target,
+    modes: density.Modes,
+    chain: Chain,
+    steps: int,
+    keep: Callable[[Chain], None],
+    progress: Progress,
 ) -> tuple[Chain, Checks]:
     """The chain extended to at most `steps`, and its checks.
 
@@ -83,7 +77,7 @@ def run(
     return chain, checks
 
 
-def _extended(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
+def _extended(target: density.Target, modes: density.Modes, chain: Chain, steps: int) -> Chain:
     import emcee
 
     walkers, size = chain.draws.shape[1:]
@@ -107,7 +101,7 @@ def _extended(target: Target, modes: Modes, chain: Chain, steps: int) -> Chain:
     return chain.extended(more)
 
 
-def moves(modes: Modes) -> list[tuple[Any, float]]:
+def moves(modes: density.Modes) -> list[tuple[Any, float]]:
     """emcee's moves with their shares.
 
     Differential evolution (C. J. F. ter Braak, 2006, Stat. Comput. 16, 239) and its snooker update (ter
@@ -141,14 +135,14 @@ class Subject(NamedTuple):
 
     fit: Fit
     names: tuple[str, ...]
-    log_density: LogDensity
-    modes: Modes
+    log_density: density.LogDensity
+    modes: density.Modes
     values: Callable[[np.ndarray], np.ndarray]
     fingerprint: str
     points: int
     predict: Callable[[np.ndarray, int], tuple[Prediction, ...]]
     assumption: str = ""
-    stretch: Stretch = unchanged
+    stretch: density.Stretch = density.unchanged
 
     def walkers(self, count: int | None, steps: int) -> int:
         """The number of walkers: `count` if it is possible, or four for each parameter and at least 32.
@@ -196,7 +190,7 @@ def sampled(
     file = ChainFile(chain, subject.fingerprint, subject.names)
     with jax.enable_x64(True):
         count = subject.walkers(walkers, steps)
-        target = Target(subject.log_density, (count + 1) // 2)
+        target = density.Target(subject.log_density, (count + 1) // 2)
         grown, checks = run(target, subject.modes, file.begin(count, seed), steps, file.keep, progress)
         try:
             file.write(grown)
@@ -256,7 +250,7 @@ def subject_of(
         kinds = joint.apart(rows, scenes)
         targets = spectra.measurements(kinds.films, kinds.scenes)
         known = [*map(arrays, targets), *_columns(kinds.samples, kinds.surface)]
-        identity = fingerprint(known, kinds.surface.model, residual, tolerance)
+        identity = density.fingerprint(known, kinds.surface.model, residual, tolerance)
         return _subject(fit, ranked, partial(joint.together, kinds, targets), identity)
 
 
@@ -268,7 +262,7 @@ def _of_surface(
     unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
     rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
     compared = fit.layer_test.residual if fit.layer_test else ""
-    identity = fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
+    identity = density.fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
     assumption = "there is a layer" if unsure else ""
     with jax.enable_x64(True):
         return _subject(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
@@ -279,7 +273,7 @@ def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> Sub
     fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
     with jax.enable_x64(True):
         targets = spectra.measurements(measurements, scene)
-        identity = fingerprint([arrays(target) for target in targets], tolerance)
+        identity = density.fingerprint([arrays(target) for target in targets], tolerance)
         known = partial(FilmMeasurements, spectra.listed(measurements), targets)
         return _subject(fit, ranked, known, identity)
 
@@ -306,20 +300,20 @@ def _subject(
     residuals, problem = measurements(ranked).evidence(jacobian), ranked.problem.affine()
     shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
     channels = [view.channels for view in problem.views]
-    effects = systematics(residuals, shares, channels, len(problem.parameters))
-    mixture = modes(ranked, effects)
+    effects = density.systematics(residuals, shares, channels, len(problem.parameters))
+    mixture = density.modes(ranked, effects)
     slope = problem.coordinates.slope(problem.box, mixture.centre[0])
     return Subject(
         fit,
         tuple(p.name for p in problem.parameters),
-        log_density(problem, effects),
+        density.log_density(problem, effects),
         mixture,
         lambda units: problem.values_near(units, ranked.values),
         identity,
         max(view.independent for view in problem.views),
         lambda units, seed: predictions(problem, fit.parts, units, seed),
         assumption,
-        sandwich_stretch(covariance, slope, mixture),
+        density.sandwich_stretch(covariance, slope, mixture),
     )
 
 

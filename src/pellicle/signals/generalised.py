@@ -25,16 +25,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.signals.base import (
-    Arrays,
-    Cell,
-    ChannelGroup,
-    Channels,
-    Offset,
-    Place,
-    Quantity,
-    Residuals,
-)
+from pellicle.signals import base
 from pellicle.signals.limits import check_psi_delta
 from pellicle.signals.psi_delta import CHANNELS, Ratios
 from pellicle.signals.sphere import ROUGH, angle_changes, ncs, scattered, sphere_frame, sphere_sigma
@@ -72,14 +63,14 @@ class Generalised(Ratios):
         return "degrees on the spheres of N, C, S"
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[base.Quantity, ...]:
         each = (("psi", "Ψ", "values", ""), ("delta", "Δ", "delta", "½ sin 2Ψ "))
         result = []
         for i, name in enumerate(self.parts):
             for row, (angle, sign, array, weight) in enumerate(each):
                 shown = f"{sign} {NAMES[name]}"
-                cell = Cell(row, i, shown, f"{weight}{shown}", 0.5)
-                result.append(Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i, cell))
+                cell = base.Cell(row, i, shown, f"{weight}{shown}", 0.5)
+                result.append(base.Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i, cell))
         return tuple(result)
 
     @property
@@ -90,7 +81,7 @@ class Generalised(Ratios):
             tuple(f"Δ of {NAMES[name]} (degrees)" for name in self.parts),
         )
 
-    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+    def check(self, data: base.Arrays, place: base.Place, remedy: str) -> None:
         assert data.delta is not None
         for name, psi, delta in zip(self.parts, data.values.T, data.delta.T, strict=True):
             places = place(f"`{name} values`"), place(f"`{name} delta`")
@@ -130,12 +121,12 @@ class Generalised(Ratios):
         )
         return noisy, clean
 
-    def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:
+    def channels(self, data: base.Arrays, sigma: np.ndarray | None) -> base.Channels:
         frames, spread = self._directions(data)
         outwards = np.broadcast_to([0.0, 0.0, 1.0], spread.shape)
-        return Channels(_in_directions(outwards), _in_directions(spread), block_frame(frames))
+        return base.Channels(_in_directions(outwards), _in_directions(spread), block_frame(frames))
 
-    def _directions(self, data: Arrays) -> tuple[np.ndarray, np.ndarray]:
+    def _directions(self, data: base.Arrays) -> tuple[np.ndarray, np.ndarray]:
         """Directions of each ratio, (points, ratios, 3, 3), and σ of N, C, S in them, (points, ratios, 3)."""
         assert data.delta is not None
         sigma = np.full((*data.values.shape, 3), ROUGH)
@@ -152,15 +143,15 @@ class Generalised(Ratios):
         rows = waves.on_spheres(rows) if depolarises else rows
         return waves.in_frame(frame, rows).reshape(-1)
 
-    def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
+    def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
         ratios = len(self.parts)
-        return tuple(ChannelGroup((2 * i, 2 * i + 1, 2 * ratios + i), 2) for i in range(ratios))
+        return tuple(base.ChannelGroup((2 * i, 2 * i + 1, 2 * ratios + i), 2) for i in range(ratios))
 
     @property
     def outwards(self) -> int:
         return len(self.parts)
 
-    def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
+    def offsets(self, columns: np.ndarray, allowed: Any) -> list[base.Offset]:
         """Offsets of Ψ and of Δ of each ratio."""
         spheres = columns.reshape(*columns.shape[:-1], -1, CHANNELS)
         both = angle_changes(spheres, allowed.psi, allowed.delta)
@@ -170,16 +161,16 @@ class Generalised(Ratios):
                 change = np.zeros(spheres.shape)
                 change[..., i, :] = every[..., i, :]
                 result.append(
-                    Offset(f"offset of {angle} of {name}", size, "deg", change.reshape(columns.shape))
+                    base.Offset(f"offset of {angle} of {name}", size, "deg", change.reshape(columns.shape))
                 )
         return result
 
-    def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
+    def residuals(self, data: base.Arrays, curve: Any, known: bool) -> list[base.Residuals]:
         frames, spread = self._directions(data)
         apart = ncs(curve.data, curve.delta_data) - ncs(curve.model, curve.delta_model)
         rows = np.einsum("prij,prj->pri", frames, apart)
         rows = (rows if data.sigma is None else rows / spread)[..., :2]
-        return [Residuals(rows[:, i], known, 2 * len(rows)) for i in range(len(self.parts))]
+        return [base.Residuals(rows[:, i], known, 2 * len(rows)) for i in range(len(self.parts))]
 
 
 def delta_sigma(

@@ -13,35 +13,16 @@ from typing import Any, ClassVar, final
 import numpy as np
 from jaxtyping import Float
 
-from pellicle.signals.base import (
-    Arrays,
-    ChannelGroup,
-    Channels,
-    Offset,
-    Place,
-    Quantity,
-    Residuals,
-    Signal,
-)
+from pellicle.signals import base, sphere
 from pellicle.signals.limits import check_depolarisation, check_psi_delta
-from pellicle.signals.sphere import (
-    ROUGH,
-    angle_changes,
-    ncs,
-    psi_delta,
-    rms_of_psi,
-    sphere_frame,
-    sphere_sigma,
-    with_third,
-)
 
-DEPOLARISATION = Quantity("depolarisation", "depolarisation", array="depolarisation")
+DEPOLARISATION = base.Quantity("depolarisation", "depolarisation", array="depolarisation")
 CHANNELS = 3
 """N, C and S."""
 
 
 @dataclass(frozen=True)
-class Ratios(Signal):
+class Ratios(base.Signal):
     """Ψ and Δ of one ratio of amplitudes, or of several `parts`, each a point N, C, S of a unit sphere."""
 
     simulated: ClassVar[str] = "Stokes"
@@ -63,12 +44,12 @@ class Ratios(Signal):
     def independent(self) -> int:
         return 2 * super().independent
 
-    def coordinates(self, data: Arrays) -> np.ndarray:
+    def coordinates(self, data: base.Arrays) -> np.ndarray:
         assert data.delta is not None
-        return ncs(data.values, data.delta)[..., : self.measured].reshape(len(data), -1)
+        return sphere.ncs(data.values, data.delta)[..., : self.measured].reshape(len(data), -1)
 
     def averaged(self, coordinates: np.ndarray) -> dict[str, np.ndarray]:
-        values, delta = psi_delta(self.points(coordinates))
+        values, delta = sphere.psi_delta(self.points(coordinates))
         return {"values": values, "delta": delta}
 
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
@@ -82,14 +63,14 @@ class Ratios(Signal):
         return waves.drawn_angles(rows, self.folded)
 
     def rms(self, residual: np.ndarray) -> float:
-        return rms_of_psi(self.points(residual), self.independent * len(residual))
+        return sphere.rms_of_psi(self.points(residual), self.independent * len(residual))
 
     def in_quantities(self, columns: np.ndarray) -> np.ndarray:
-        angles = np.stack(psi_delta(self.points(columns)), axis=-1).reshape(*columns.shape[:-1], -1)
+        angles = np.stack(sphere.psi_delta(self.points(columns)), axis=-1).reshape(*columns.shape[:-1], -1)
         return np.concatenate([angles, columns[..., -1:]], axis=-1) if self.depolarisation else angles
 
     def curves(self, data: np.ndarray, model: np.ndarray, weight: np.ndarray) -> dict[str, np.ndarray]:
-        (psi, delta), (psi_model, delta_model) = (psi_delta(self.points(x)) for x in (data, model))
+        (psi, delta), (psi_model, delta_model) = (sphere.psi_delta(self.points(x)) for x in (data, model))
         along_psi = weight[:, [2 * i for i in range(len(self.parts))] if self.parts else 0]
         result = {"data": psi, "model": psi_model, "delta_data": delta, "delta_model": delta_model}
         return result | {"sigma": np.rad2deg(1 / along_psi) / 2}
@@ -120,11 +101,11 @@ class PsiDelta(Ratios):
         return PsiDelta((), share[0], data.transmission, bool(data.folded), share[1])
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        angles = Quantity("psi", "Ψ", "degrees"), Quantity("delta", "Δ", "degrees", "delta")
+    def quantities(self) -> tuple[base.Quantity, ...]:
+        angles = base.Quantity("psi", "Ψ", "degrees"), base.Quantity("delta", "Δ", "degrees", "delta")
         return (*angles, DEPOLARISATION) if self.depolarisation else angles
 
-    def check(self, data: Arrays, place: Place, remedy: str) -> None:
+    def check(self, data: base.Arrays, place: base.Place, remedy: str) -> None:
         assert data.delta is not None
         places = place("`values`"), place("`delta`")
         check_psi_delta(data.values, data.delta, self.folded, *places, remedy)
@@ -157,31 +138,31 @@ class PsiDelta(Ratios):
     def seen_in(self, scene: Any, depolarises: bool) -> PsiDelta:
         return self if depolarises else replace(self, depolarisation=False)
 
-    def channels(self, data: Arrays, sigma: np.ndarray | None) -> Channels:
+    def channels(self, data: base.Arrays, sigma: np.ndarray | None) -> base.Channels:
         """N, C, S (points, 3), or N and C alone where Δ is folded, and behind them the depolarisation.
 
         Where σ is known, in the frame along Ψ, along Δ and outwards; the depolarisation is before the last.
         """
         assert data.delta is not None
         values, frame = self.coordinates(data), None
-        noise = np.full(len(data), ROUGH)
+        noise = np.full(len(data), sphere.ROUGH)
         if data.sigma is not None:
             of_delta = data.sigma if data.delta_sigma is None else data.delta_sigma
-            noise = sphere_sigma(data.values, data.delta, data.sigma, of_delta, self.folded)
+            noise = sphere.sphere_sigma(data.values, data.delta, data.sigma, of_delta, self.folded)
             if not self.folded:
-                frame = sphere_frame(data.values, data.delta)
+                frame = sphere.sphere_frame(data.values, data.delta)
                 values = np.einsum("pij,pj->pi", frame, values)
         if self.depolarisation and data.depolarisation is not None:
             # the last of what is measured: before the direction outwards
             at = values.shape[1] if frame is None else values.shape[1] - 1
-            own = ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
+            own = sphere.ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
             noise = np.broadcast_to(np.reshape(noise, (len(data), -1)), values.shape)
             values = np.insert(values, at, data.depolarisation, axis=1)
             noise = np.insert(noise, at, own, axis=1)
             if frame is not None:
                 frame = np.insert(np.insert(frame, at, 0.0, axis=1), 3, 0.0, axis=2)
                 frame[:, at, 3] = 1.0
-        return Channels(values, noise, frame)
+        return base.Channels(values, noise, frame)
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
         """N, C, S as measured.
@@ -198,39 +179,39 @@ class PsiDelta(Ratios):
         rows = waves.in_frame(frame, rows)
         return rows[:, : self.measured + self.depolarisation].reshape(-1)
 
-    def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
+    def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
         every = tuple(range(count))
         if not self.depolarisation:
-            return (ChannelGroup(every, 2),)
+            return (base.ChannelGroup(every, 2),)
         own = count - 2 if framed else count - 1
         others = tuple(channel for channel in every if channel != own)
-        return ChannelGroup(others, 2), ChannelGroup((own,), 1, self.depolarisation_known)
+        return base.ChannelGroup(others, 2), base.ChannelGroup((own,), 1, self.depolarisation_known)
 
     @property
     def outwards(self) -> int:
         return 1
 
-    def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
+    def offsets(self, columns: np.ndarray, allowed: Any) -> list[base.Offset]:
         """Offsets of Ψ and Δ, and depolarisation as a rotating analyser takes it: N and C lose a share.
 
         An instrument that measures the depolarisation divides it out; its offset counts instead.
         """
-        sphere = self._sphere(columns)
-        n, c, s = np.moveaxis(sphere, -1, 0)
+        points = self._sphere(columns)
+        n, c, s = np.moveaxis(points, -1, 0)
         share = 1 - allowed.depolarisation
         third = np.where(s < 0, -1, 1) * np.sqrt(np.maximum(1 - (share * n) ** 2 - (share * c) ** 2, 0.0))
         less = np.stack([share * n - n, share * c - c, third - s], axis=-1)
-        of_psi, of_delta = angle_changes(sphere, allowed.psi, allowed.delta)
+        of_psi, of_delta = sphere.angle_changes(points, allowed.psi, allowed.delta)
         result = [
-            Offset("offset of psi", allowed.psi, "deg", self._behind(of_psi)),
-            Offset("offset of delta", allowed.delta, "deg", self._behind(of_delta)),
+            base.Offset("offset of psi", allowed.psi, "deg", self._behind(of_psi)),
+            base.Offset("offset of delta", allowed.delta, "deg", self._behind(of_delta)),
         ]
         if not self.depolarisation:
             less = self._behind(less)
-            return [*result, Offset("depolarisation", allowed.depolarisation, "", less, positive=True)]
+            return [*result, base.Offset("depolarisation", allowed.depolarisation, "", less, positive=True)]
         change = np.zeros(columns.shape)
         change[..., -1] = allowed.depolarisation
-        return [*result, Offset("offset of the depolarisation", allowed.depolarisation, "", change)]
+        return [*result, base.Offset("offset of the depolarisation", allowed.depolarisation, "", change)]
 
     def _behind(self, change: np.ndarray) -> np.ndarray:
         """A change of N, C and S as one of the measured columns; the depolarisation stays."""
@@ -239,7 +220,7 @@ class PsiDelta(Ratios):
 
     def _sphere(self, columns: np.ndarray) -> np.ndarray:
         """N, C, S of columns, whose last is the depolarisation if that is measured."""
-        return with_third(columns[..., :-1] if self.depolarisation else columns)
+        return sphere.with_third(columns[..., :-1] if self.depolarisation else columns)
 
     def along(self, columns: np.ndarray, change: np.ndarray, framed: bool) -> np.ndarray:
         if self.folded or framed:
@@ -255,19 +236,19 @@ class PsiDelta(Ratios):
         share = {"depolarisation_model": model[:, -1]} if self.depolarisation else {}
         return super().curves(data, model, weight) | share
 
-    def residuals(self, data: Arrays, curve: Any, known: bool) -> list[Residuals]:
+    def residuals(self, data: base.Arrays, curve: Any, known: bool) -> list[base.Residuals]:
         """Residuals on the sphere, or those of Ψ and of Δ over their σ, and those of the depolarisation."""
         if data.sigma is None:
-            rows = ncs(curve.data, curve.delta_data) - ncs(curve.model, curve.delta_model)
+            rows = sphere.ncs(curve.data, curve.delta_data) - sphere.ncs(curve.model, curve.delta_model)
         else:
             across = data.sigma if data.delta_sigma is None else data.delta_sigma
             # at the poles, where Δ has no meaning, the error of Ψ leaves some to it
             sine, along = np.sin(2 * np.deg2rad(curve.data)), 2 * np.deg2rad(data.sigma)
             of_delta = sine / np.hypot(sine, along) * curve.delta_residual / across
             rows = np.stack([curve.residual / data.sigma, of_delta], axis=1)
-        result = [Residuals(rows, known, 2 * len(rows))]
+        result = [base.Residuals(rows, known, 2 * len(rows))]
         if curve.depolarisation_data is not None:
             sigma = data.depolarisation_sigma
             share = curve.depolarisation_residual / (1.0 if sigma is None else sigma)
-            result.append(Residuals(share[:, None], sigma is not None, len(share)))
+            result.append(base.Residuals(share[:, None], sigma is not None, len(share)))
         return result

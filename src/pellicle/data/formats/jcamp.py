@@ -136,8 +136,11 @@ def _curves(block: _Block) -> Iterator[Curve]:
             axis = block.text("UNITS", place)
             quantity = block.text("UNITS", other) or block.text("VARNAME", other)
             labels = ("FIRST", "LAST", "", "VARDIM", "FACTOR", "FACTOR")
+        first, last, step = (_number(block, label, place) for label in labels[:3])
         scales = Scales(
-            *(_number(block, label, place) for label in labels[:3]),
+            first,
+            last,
+            step,
             _count(block, labels[3], other),
             _factor(block, labels[4], place),
             _factor(block, labels[5], other),

@@ -14,17 +14,8 @@ from pellicle.data.tabular.columns import recognise_all
 from pellicle.data.tabular.text import Line
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
+from pellicle.materials.formats import optical_constants as optical
 from pellicle.materials.formats import plain_table, refractiveindex_info
-from pellicle.materials.formats.optical_constants import (
-    MaterialFile,
-    MaterialText,
-    cells,
-    constants_of,
-    is_row,
-    material_file,
-    read_rows,
-    read_text,
-)
 
 _SPECTRARAY_AXES = {"wavelength": "nm", "energy": "eV", "photon energy": "eV", "wavenumber": "cm-1"}
 
@@ -40,14 +31,14 @@ _WOOLLAM_EXAMPLE = (
 )
 
 
-def imd(text: MaterialText) -> MaterialFile | None:
+def imd(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read an `.nk` file of IMD and of the CXRO collection: comments that begin with `;`, then Å, n and k.
 
     An `.nk` file of bare numbers, whose unit is unknown, is refused.
     """
     if text.suffix != ".nk" or not text.lines:
         return None
-    if is_row(text.lines[0].text):
+    if optical.is_row(text.lines[0].text):
         raise DataError(
             f"{text.path}: does not state the unit of its first column: put a line above its rows, "
             "`; n,k of ...` for Å as in files of IMD, or `wavelength_nm,n,k`"
@@ -55,11 +46,13 @@ def imd(text: MaterialText) -> MaterialFile | None:
     if not text.lines[0].text.startswith(";"):
         return None
     lines = [line for line in text.lines if not line.text.startswith(";")]
-    rows = read_rows(text.path, lines, ("wavelength", "n", "k"))
-    return material_file(constants_of(rows, "A"), "IMD material file", text.lines[0].text.strip("; "))
+    rows = optical.read_rows(text.path, lines, ("wavelength", "n", "k"))
+    return optical.material_file(
+        optical.constants_of(rows, "A"), "IMD material file", text.lines[0].text.strip("; ")
+    )
 
 
-def spectraray(text: MaterialText) -> MaterialFile | None:
+def spectraray(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read a file of SpectraRay: `Units=`, then rows between "Begin of array" and "End of array".
 
     The rows hold the axis, ε₁ and ε₂. `Units=Wavelength` is in nm and `Units=Energy` in eV, as in the reader
@@ -84,23 +77,23 @@ def spectraray(text: MaterialText) -> MaterialFile | None:
         )
     dielectric = not {"n", "k"} <= set(words)
     lines = text.lines[begin + 1 : begin + plain[begin:].index("end of array")]
-    rows = read_rows(text.path, lines, (axis, "eps1", "eps2") if dielectric else (axis, "n", "k"))
-    return material_file(constants_of(rows, unit, dielectric), "SpectraRay material file")
+    rows = optical.read_rows(text.path, lines, (axis, "eps1", "eps2") if dielectric else (axis, "n", "k"))
+    return optical.material_file(optical.constants_of(rows, unit, dielectric), "SpectraRay material file")
 
 
-def sopra_grid(text: MaterialText) -> MaterialFile | None:
+def sopra_grid(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read an `.nk` file of the SOPRA database, an even grid.
 
     It begins with the number of its unit (1 eV, 2 µm, 3 1/cm, 4 nm), first and last point, and the number of
     intervals; the other lines hold n and k. A file that has not as many rows as that is refused.
     """
-    if text.suffix != ".nk" or not text.lines or not is_row(text.lines[0].text):
+    if text.suffix != ".nk" or not text.lines or not optical.is_row(text.lines[0].text):
         return None
-    head = cells(text.lines[0].text)
+    head = optical.cells(text.lines[0].text)
     if len(head) != 4 or head[0] not in _SOPRA_UNITS or not re.fullmatch(r"\d{1,7}", head[3]):
         return None
     intervals = int(head[3])
-    rows = read_rows(text.path, text.lines[1:], ("n", "k"))
+    rows = optical.read_rows(text.path, text.lines[1:], ("n", "k"))
     if len(rows) != intervals + 1:
         raise DataError(
             f"{text.path}: announces {intervals} intervals, which are {intervals + 1} rows, but has "
@@ -110,10 +103,10 @@ def sopra_grid(text: MaterialText) -> MaterialFile | None:
     if not np.isfinite(ends).all():
         raise DataError(f"{text.path}: line {text.lines[0].number} gives no finite range of its axis")
     axis = np.linspace(*ends, intervals + 1)
-    return material_file(constants_of(rows, _SOPRA_UNITS[head[0]], axis=axis), _SOPRA)
+    return optical.material_file(optical.constants_of(rows, _SOPRA_UNITS[head[0]], axis=axis), _SOPRA)
 
 
-def sopra_records(text: MaterialText) -> MaterialFile | None:
+def sopra_records(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read a `.MAT` file of the SOPRA database: records `DATA1*<row>*<nm>*<n>*<k>*$`.
 
     A file that has not as many records as it announces is refused.
@@ -127,12 +120,12 @@ def sopra_records(text: MaterialText) -> MaterialFile | None:
         raise DataError(
             f"{text.path}: announces {announced} rows but has {len(data)}; it is cut off, so fetch it again"
         )
-    rows = read_rows(text.path, data, ("wavelength", "n", "k"))
+    rows = optical.read_rows(text.path, data, ("wavelength", "n", "k"))
     comments = " ".join(parts[1].strip() for _, parts in records if parts[0] == "COMMENT" and len(parts) > 1)
-    return material_file(constants_of(rows, "nm"), _SOPRA)._replace(comments=comments)
+    return optical.material_file(optical.constants_of(rows, "nm"), _SOPRA)._replace(comments=comments)
 
 
-def woollam(text: MaterialText) -> MaterialFile | None:
+def woollam(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read a file of WVASE or CompleteEASE (`.mat`): title, unit and kind of the columns, then rows.
 
         Silicon
@@ -154,26 +147,28 @@ def woollam(text: MaterialText) -> MaterialFile | None:
             unit, dielectric = stated[0] or unit, dielectric if stated[1] is None else stated[1]
         elif len(words) == 1 and words[0].isascii() and words[0].isdigit():
             count = int(words[0])
-        elif is_row(line.text) or (unit is not None and dielectric is not None):
+        elif optical.is_row(line.text) or (unit is not None and dielectric is not None):
             break
         else:
             title.append(line.text)
         first_row = i + 1
     if text.suffix != ".mat" and (unit is None or dielectric is None):
         return None
-    if unit is None and any(column.role == "wavelength" for column in recognise_all(cells(" ".join(title)))):
+    if unit is None and any(
+        column.role == "wavelength" for column in recognise_all(optical.cells(" ".join(title)))
+    ):
         return None  # a plain table with names of columns
     if unit is None or dielectric is None:
         missing = "the unit of its first column" if unit is None else "whether its columns are NK or E1E2"
         raise DataError(f"{text.path}: does not state {missing} above its rows; {_WOOLLAM_EXAMPLE}")
     names = (_WOOLLAM_AXES.get(unit, "wavelength"), *(("eps1", "eps2") if dielectric else ("n", "k")))
-    rows = read_rows(text.path, text.lines[first_row:], names, optional=0 if dielectric else 1)
+    rows = optical.read_rows(text.path, text.lines[first_row:], names, optional=0 if dielectric else 1)
     if count is not None and count != len(rows):
         raise DataError(
             f"{text.path}: announces {count} rows but has {len(rows)}; it is cut off, so export it again"
         )
     kind = "WVASE or CompleteEASE material file"
-    return material_file(constants_of(rows, unit, dielectric), kind, " ".join(title))
+    return optical.material_file(optical.constants_of(rows, unit, dielectric), kind, " ".join(title))
 
 
 def _unit_and_kind(words: list[str]) -> tuple[str | None, bool | None] | None:
@@ -189,13 +184,13 @@ def _unit_and_kind(words: list[str]) -> tuple[str | None, bool | None] | None:
 SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk", ".mat", ".yml", ".yaml"}
 """Suffixes of files of optical constants: a name with one of them is a path."""
 
-READERS: tuple[Callable[[MaterialText], MaterialFile | None], ...] = (
+READERS: tuple[Callable[[optical.MaterialText], optical.MaterialFile | None], ...] = (
     *(refractiveindex_info.read_yaml, refractiveindex_info.read_table, spectraray),
     *(sopra_records, sopra_grid, imd, woollam),
 )
 
 
-def read_material_file(path: str | Path) -> MaterialFile:
+def read_material_file(path: str | Path) -> optical.MaterialFile:
     """Read n and k, or a dielectric function, from a file.
 
     **Arguments**: `path`, a file of WVASE, CompleteEASE, SpectraRay, SOPRA or IMD, a download of
@@ -205,5 +200,5 @@ def read_material_file(path: str | Path) -> MaterialFile:
 
     **Raises** DataError, one sentence with file, line, column and remedy.
     """
-    text = read_text(path)
+    text = optical.read_text(path)
     return next((file for reader in READERS if (file := reader(text))), None) or plain_table.read(text)

