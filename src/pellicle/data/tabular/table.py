@@ -259,7 +259,8 @@ class Table:
 
     def where(self, row: int, position: int) -> str:
         """Return file, line and column of a cell, for a message."""
-        return f"{self.path}: {self.place(row)}, {self.label(position)}"
+        path = f"{self.path}: " if self.path else ""
+        return f"{path}{self.place(row)}, {self.label(position)}"
 
     def places(self, position: int, rows: np.ndarray | None = None) -> Callable[[int], str]:
         """Return `where` of one column as a function of the row, or of the position in `rows` (N,)."""

@@ -64,11 +64,12 @@ def open_binary(path: str | os.PathLike[str]) -> Iterator[BufferedReader]:
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Put the path of a file in front of errors about its content, which name the line."""
+    """Put the path of a file in front of errors about its content, unless they begin with it."""
     try:
         yield
     except (DataError, UsageError) as error:
-        raise type(error)(f"{path}: {error}") from None
+        text, named = str(error), f"{path}: "
+        raise type(error)(text if text.startswith(named) else named + text) from None
 
 
 def read_bytes(path: str | os.PathLike[str]) -> tuple[bytes, str]:

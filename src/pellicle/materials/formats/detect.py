@@ -1,7 +1,8 @@
 """Detection of the format of a material file by its content, and the files of programs.
 
 The programs are IMD, Sentech's SpectraRay, SOPRA, and Woollam's WVASE and CompleteEASE.
-Each function returns None for a file of another format, and raises DataError for faulty rows.
+Each function returns None for a file of another format, and raises DataError for faulty rows, without the
+name of the file.
 """
 
 import re
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.data.tabular.columns import recognise_all
-from pellicle.data.tabular.text import Line
+from pellicle.data.tabular.text import Line, in_file
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 from pellicle.materials.formats import optical_constants as optical
@@ -40,13 +41,13 @@ def imd(text: optical.MaterialText) -> optical.MaterialFile | None:
         return None
     if optical.is_row(text.lines[0].text):
         raise DataError(
-            f"{text.path}: does not state the unit of its first column: put a line above its rows, "
+            "does not state the unit of its first column: put a line above its rows, "
             "`; n,k of ...` for Å as in files of IMD, or `wavelength_nm,n,k`"
         )
     if not text.lines[0].text.startswith(";"):
         return None
     lines = [line for line in text.lines if not line.text.startswith(";")]
-    rows = optical.read_rows(text.path, lines, ("wavelength", "n", "k"))
+    rows = optical.read_rows(lines, ("wavelength", "n", "k"))
     return optical.material_file(
         optical.constants_of(rows, "A"), "IMD material file", text.lines[0].text.strip("; ")
     )
@@ -64,20 +65,19 @@ def spectraray(text: optical.MaterialText) -> optical.MaterialFile | None:
         return None
     begin = plain.index("begin of array")
     if "end of array" not in plain[begin:]:
-        raise DataError(f"{text.path}: is cut off before its line 'End of array'; export it again")
+        raise DataError("is cut off before its line 'End of array'; export it again")
     stated = next((line.partition("=")[2] for line in plain[:begin] if re.match(r"units\s*=", line)), None)
     if stated is None:
-        raise DataError(f"{text.path}: has no line 'Units=' above its rows, as Units=Wavelength,nm; add it")
+        raise DataError("has no line 'Units=' above its rows, as Units=Wavelength,nm; add it")
     axis, *words = (word.strip() for word in re.split(r"[,;]", stated))
     unit = next((known for word in words if (known := wavelength_unit(word))), _SPECTRARAY_AXES.get(axis))
     if unit is None:
         raise DataError(
-            f"{text.path}: is against {axis!r} of unknown unit; write 'Units=Wavelength,nm' or "
-            "'Units=Energy,eV'"
+            f"is against {axis!r} of unknown unit; write 'Units=Wavelength,nm' or 'Units=Energy,eV'"
         )
     dielectric = not {"n", "k"} <= set(words)
     lines = text.lines[begin + 1 : begin + plain[begin:].index("end of array")]
-    rows = optical.read_rows(text.path, lines, (axis, "eps1", "eps2") if dielectric else (axis, "n", "k"))
+    rows = optical.read_rows(lines, (axis, "eps1", "eps2") if dielectric else (axis, "n", "k"))
     return optical.material_file(optical.constants_of(rows, unit, dielectric), "SpectraRay material file")
 
 
@@ -93,15 +93,15 @@ def sopra_grid(text: optical.MaterialText) -> optical.MaterialFile | None:
     if len(head) != 4 or head[0] not in _SOPRA_UNITS or not re.fullmatch(r"\d{1,7}", head[3]):
         return None
     intervals = int(head[3])
-    rows = optical.read_rows(text.path, text.lines[1:], ("n", "k"))
+    rows = optical.read_rows(text.lines[1:], ("n", "k"))
     if len(rows) != intervals + 1:
         raise DataError(
-            f"{text.path}: announces {intervals} intervals, which are {intervals + 1} rows, but has "
+            f"announces {intervals} intervals, which are {intervals + 1} rows, but has "
             f"{len(rows)}; it is cut off, so fetch it again"
         )
     ends = float(head[1]), float(head[2])
     if not np.isfinite(ends).all():
-        raise DataError(f"{text.path}: line {text.lines[0].number} gives no finite range of its axis")
+        raise DataError(f"line {text.lines[0].number} gives no finite range of its axis")
     axis = np.linspace(*ends, intervals + 1)
     return optical.material_file(optical.constants_of(rows, _SOPRA_UNITS[head[0]], axis=axis), _SOPRA)
 
@@ -117,10 +117,8 @@ def sopra_records(text: optical.MaterialText) -> optical.MaterialFile | None:
     data = [Line(line.number, " ".join(parts[2:5]), "") for line, parts in records if parts[0] == "DATA1"]
     announced = next((parts[1] for _, parts in records if parts[0] == "POINTS" and len(parts) > 1), None)
     if announced is not None and announced.strip() != str(len(data)):
-        raise DataError(
-            f"{text.path}: announces {announced} rows but has {len(data)}; it is cut off, so fetch it again"
-        )
-    rows = optical.read_rows(text.path, data, ("wavelength", "n", "k"))
+        raise DataError(f"announces {announced} rows but has {len(data)}; it is cut off, so fetch it again")
+    rows = optical.read_rows(data, ("wavelength", "n", "k"))
     comments = " ".join(parts[1].strip() for _, parts in records if parts[0] == "COMMENT" and len(parts) > 1)
     return optical.material_file(optical.constants_of(rows, "nm"), _SOPRA)._replace(comments=comments)
 
@@ -160,13 +158,11 @@ def woollam(text: optical.MaterialText) -> optical.MaterialFile | None:
         return None  # a plain table with names of columns
     if unit is None or dielectric is None:
         missing = "the unit of its first column" if unit is None else "whether its columns are NK or E1E2"
-        raise DataError(f"{text.path}: does not state {missing} above its rows; {_WOOLLAM_EXAMPLE}")
+        raise DataError(f"does not state {missing} above its rows; {_WOOLLAM_EXAMPLE}")
     names = (_WOOLLAM_AXES.get(unit, "wavelength"), *(("eps1", "eps2") if dielectric else ("n", "k")))
-    rows = optical.read_rows(text.path, text.lines[first_row:], names, optional=0 if dielectric else 1)
+    rows = optical.read_rows(text.lines[first_row:], names, optional=0 if dielectric else 1)
     if count is not None and count != len(rows):
-        raise DataError(
-            f"{text.path}: announces {count} rows but has {len(rows)}; it is cut off, so export it again"
-        )
+        raise DataError(f"announces {count} rows but has {len(rows)}; it is cut off, so export it again")
     kind = "WVASE or CompleteEASE material file"
     return optical.material_file(optical.constants_of(rows, unit, dielectric), kind, " ".join(title))
 
@@ -201,4 +197,5 @@ def read_material_file(path: str | Path) -> optical.MaterialFile:
     **Raises** DataError, one sentence with file, line, column and remedy.
     """
     text = optical.read_text(path)
-    return next((file for reader in READERS if (file := reader(text))), None) or plain_table.read(text)
+    with in_file(path):
+        return next((file for reader in READERS if (file := reader(text))), None) or plain_table.read(text)

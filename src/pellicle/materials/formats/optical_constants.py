@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -130,37 +130,36 @@ def is_row(text: str) -> bool:
     return len(numbers) >= 2 and all(map(is_number, numbers))
 
 
-def read_rows(path: str, lines: Sequence[Line], names: Sequence[str], optional: int = 0) -> Table:
+def read_rows(lines: Sequence[Line], names: Sequence[str], optional: int = 0) -> Table:
     """Return a table of lines with the columns `names`, of which all rows may lack the last `optional`.
 
     Raises DataError for no rows, and for a row of another length.
     """
     if not lines:
-        raise DataError(f"{path}: ends without a row of {', '.join(names)}; export it again")
+        raise DataError(f"ends without a row of {', '.join(names)}; export it again")
     rows = [(line, cells(line.text)) for line in lines]
     width = len(rows[0][1])
     if not len(names) - optional <= width <= len(names):
         raise DataError(
-            f"{path}: line {lines[0].number} has {width} values where {', '.join(names)} are expected; "
+            f"line {lines[0].number} has {width} values where {', '.join(names)} are expected; "
             "correct that line"
         )
     for line, row in rows:
         if len(row) != width:
             raise DataError(
-                f"{path}: line {line.number} has {len(row)} value{'s' * (len(row) != 1)} where {width} are "
+                f"line {line.number} has {len(row)} value{'s' * (len(row) != 1)} where {width} are "
                 "expected; correct or delete that line"
             )
-    return replace(plain_columns(names[:width], rows, []), path=path)
+    return plain_columns(names[:width], rows, [])
 
 
 class OpticalConstants(NamedTuple):
     """Columns of a file: the axis in `unit`, then n and k or, where `dielectric`, eps1 and eps2.
 
-    `names` are those of the three columns in messages, `where` gives file, line and column of a number by
+    `names` are those of the three columns in messages, `where` gives line and column of a number by
     row and name. `second` is None for a table of n alone.
     """
 
-    path: str
     axis: np.ndarray
     unit: str
     first: np.ndarray
@@ -182,14 +181,13 @@ def constants_of(
     named = "axis" if axis is not None else rows.names[0] if rows.names else "wavelength"
     values = values if axis is None else [axis, *values]
     return OpticalConstants(
-        rows.path,
         values[0],
         unit,
         values[1],
         values[2] if len(values) > 2 else None,
         dielectric,
         (named, first, second),
-        lambda row, name: f"{rows.path}: {rows.place(row)}, column {name!r}",
+        lambda row, name: f"{rows.place(row)}, column {name!r}",
     )
 
 
@@ -243,7 +241,7 @@ def material_file(constants: OpticalConstants, kind: str, title: str = "", assum
 def _check_order(constants: OpticalConstants) -> None:
     steps = np.diff(constants.axis)
     if not steps.size:
-        raise DataError(f"{constants.path}: expected at least two rows, found one; add the others")
+        raise DataError("expected at least two rows, found one; add the others")
     wrong = steps * np.sign(steps[0]) <= 0
     if wrong.any():
         row = int(np.argmax(wrong)) + 1

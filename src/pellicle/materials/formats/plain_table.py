@@ -64,7 +64,7 @@ def read(text: MaterialText) -> MaterialFile:
 
     if axis.unknown_unit:
         raise DataError(
-            f"{text.path}: {label('wavelength')} is in an unknown unit {axis.unknown_unit!r}; "
+            f"{label('wavelength')} is in an unknown unit {axis.unknown_unit!r}; "
             f"convert it to nm and {_REMEDY}"
         )
     assumed = ""
@@ -72,7 +72,7 @@ def read(text: MaterialText) -> MaterialFile:
         low, high = values["wavelength"].min(), values["wavelength"].max()
         if high < SHORTEST_ASSUMED:
             raise DataError(
-                f"{text.path}: {label('wavelength')} runs from {low:g} to {high:g} without a "
+                f"{label('wavelength')} runs from {low:g} to {high:g} without a "
                 f"{'unit' if names else 'header'}, which is no wavelength in nm; make the header {_CHOICES}"
             )
         assumed = f"{text.path} states no unit of its wavelengths: they were read as nm"
@@ -80,14 +80,13 @@ def read(text: MaterialText) -> MaterialFile:
     dielectric = "eps1" in columns
     first, second = ("eps1", "eps2") if dielectric else ("n", "k")
     constants = OpticalConstants(
-        text.path,
         values["wavelength"],
         axis.unit or "nm",
         values[first],
         values.get(second),
         dielectric,
         ("wavelength", first, second),
-        lambda row, what: f"{text.path}: line {table.text.lines[row]}, {label(what)}",
+        lambda row, what: f"line {table.text.lines[row]}, {label(what)}",
     )
     return material_file(constants, "table", assumed=assumed)
 
@@ -98,9 +97,7 @@ def _check_rows(text: MaterialText, table: Table) -> None:
     first = min(rows, default=0)
     strange = next((line for line in text.lines if line.number >= first and line.number not in rows), None)
     if strange is not None:
-        raise DataError(
-            f"{text.path}: line {strange.number} is no row of numbers: delete it, or put # before it"
-        )
+        raise DataError(f"line {strange.number} is no row of numbers: delete it, or put # before it")
 
 
 def _header(text: MaterialText, table: Table) -> Sequence[str] | None:
@@ -140,16 +137,14 @@ def _by_name(text: MaterialText, table: Table, names: Sequence[str]) -> dict[str
     for plain in recognise_all(names):
         what, column = _recognised(plain)
         if what in columns and what in _NAMES:
-            raise DataError(f"{text.path}: two columns are named {what}; rename one, or {_REMEDY}")
+            raise DataError(f"two columns are named {what}; rename one, or {_REMEDY}")
         columns[what] = column
     if "n" in columns and "eps1" in columns:
         columns = {what: column for what, column in columns.items() if not what.startswith("eps")}
     expected = ("wavelength", "eps1", "eps2") if columns.keys() & {"eps1", "eps2"} else ("wavelength", "n")
     for what in expected:
         if what not in columns:
-            raise DataError(
-                f"{text.path}: expected a column named {what}, found {', '.join(names)}; {_REMEDY}"
-            )
+            raise DataError(f"expected a column named {what}, found {', '.join(names)}; {_REMEDY}")
     if "k" in columns and columns["k"].position >= _cells_per_row(text, table):
         del columns["k"]  # named in the header, absent from every row, as refellips writes
     return {what: columns[what] for what in _NAMES if what in columns}
@@ -173,12 +168,10 @@ def _cells_per_row(text: MaterialText, table: Table) -> int:
 def _by_position(text: MaterialText, table: Table) -> dict[str, Column]:
     if text.lines[0].number < table.text.lines[0]:
         raise DataError(
-            f"{text.path}: expected a header right above the rows, found none above line "
+            f"expected a header right above the rows, found none above line "
             f"{table.text.lines[0]}; {_REMEDY}, other lines marked with #"
         )
     width = _cells_per_row(text, table)
     if width not in (2, 3):
-        raise DataError(
-            f"{text.path}: expected 2 or 3 columns where there is no header, found {width}; {_REMEDY}"
-        )
+        raise DataError(f"expected 2 or 3 columns where there is no header, found {width}; {_REMEDY}")
     return {what: Column(i, "", what) for i, what in enumerate(("wavelength", "n", "k")[:width])}

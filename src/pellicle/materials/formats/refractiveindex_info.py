@@ -196,22 +196,18 @@ def read_yaml(text: optical.MaterialText) -> optical.MaterialFile | None:
         citation, comments = plain_text(page.get("REFERENCES")), plain_text(page.get("COMMENTS"))
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1} " if error.problem_mark else ""
-        raise DataError(
-            f"{text.path}: {line}is not YAML ({error.problem}); download the page again"
-        ) from None
-    except DataError as error:
-        raise DataError(f"{text.path}: {error}") from None
+        raise DataError(f"{line}is not YAML ({error.problem}); download the page again") from None
+    except DataError:
+        raise
     except (yaml.YAMLError, KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError):
         raise DataError(
-            f"{text.path}: is not a complete page of refractiveindex.info, which has DATA with a table or a "
+            "is not a complete page of refractiveindex.info, which has DATA with a table or a "
             "formula, and numbers in it; download the full database record again"
         ) from None
     low, high = source.wavelength_range
     nm = np.linspace(low, high, 64)
     if not (0 < low < high < np.inf) or not np.isfinite(source.dispersion(nm)).all():
-        raise DataError(
-            f"{text.path}: gives no finite index over its range of {low:g} to {high:g} nm; download it again"
-        )
+        raise DataError(f"gives no finite index over its range of {low:g} to {high:g} nm; download it again")
     kinds = ", ".join(str(block["type"]) for block in page["DATA"])
     understood = {"format": "refractiveindex.info page", "columns": f"wavelength in um; {kinds}"}
     return source._replace(**understood, citation=citation, comments=comments)
@@ -228,14 +224,13 @@ def read_table(text: optical.MaterialText) -> optical.MaterialFile | None:
     ends = [*(i for i, _ in headers[1:]), len(text.lines)]
     blocks = [(text.lines[i + 1 : end], kind) for (i, kind), end in zip(headers, ends, strict=True)]
     n, *others = (
-        optical.constants_of(optical.read_rows(text.path, lines, ("wl", kind)), "um")
-        for lines, kind in blocks
+        optical.constants_of(optical.read_rows(lines, ("wl", kind)), "um") for lines, kind in blocks
     )
     if n.axis.min() >= LONGEST_UM:
         if not others:
             return None
         raise DataError(
-            f"{text.path}: has the layout of refractiveindex.info, which is in µm, but begins at "
+            f"has the layout of refractiveindex.info, which is in µm, but begins at "
             f"{n.axis.min():g}; write the unit into both headers, as wavelength_nm,n,k in one table"
         )
     without_k = optical.material_file(n, _CSV)
@@ -247,10 +242,7 @@ def read_table(text: optical.MaterialText) -> optical.MaterialFile | None:
     with_k = optical.material_file(k._replace(first=index, second=k.first, names=("wl", "n", "k")), _CSV)
     if both:
         return with_k
-    try:
-        made = optical.combine(optical.table(to_nm(n.axis), n.first), to_nm(k.axis), np.maximum(k.first, 0.0))
-    except DataError as error:
-        raise DataError(f"{text.path}: {error}") from None
+    made = optical.combine(optical.table(to_nm(n.axis), n.first), to_nm(k.axis), np.maximum(k.first, 0.0))
     columns = f"wl in um, n; {len(n.axis)} rows, then wl in um, k; {len(k.axis)} rows"
     return made._replace(format=_CSV, columns=columns)
 
