@@ -1,6 +1,6 @@
-"""Reading of Ψ and Δ from a table: their columns, units and checks.
+"""Reading of ellipsometry from a table: Ψ and Δ, also generalised, and Mueller elements, with their checks.
 
-Both are in degrees, with tan Ψ exp(iΔ) = conj(r_p / r_s) for n + ik: Δ is near 180 for bare silicon
+Ψ and Δ are in degrees, with tan Ψ exp(iΔ) = conj(r_p / r_s) for n + ik: Δ is near 180 for bare silicon
 at small angles, as instruments write it. N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ are equivalent;
 α and β of a rotating analyser, tan Ψ and cos Δ lack only the sign of S, as does a Δ folded into 0 to 180.
 A column of depolarisation, 1 − N² − C² − S², is read with them.
@@ -8,10 +8,8 @@ A column of depolarisation, 1 − N² − C² − S², is read with them.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
@@ -25,11 +23,14 @@ from pellicle.data.tabular.column_selection import (
     select,
     without_header,
 )
-from pellicle.data.tabular.columns import Column, listed
+from pellicle.data.tabular.columns import MUELLER, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
-from pellicle.signals.limits import FOLDED_DELTA, Where, check_depolarisation, check_psi_delta, refuse_first
+from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma
+from pellicle.signals.limits import FOLDED_DELTA, check_depolarisation, check_psi_delta, refuse_first
+from pellicle.signals.mueller import ELEMENTS, HIGHEST, Mueller, check_element, sign_notes
+from pellicle.signals.sphere import Angles, from_alpha_beta, from_ncs, from_tan_cos
 
 SIGNAL = "psi-delta"
 PSI_DELTA, NCS = ("psi", "delta"), ("N", "C", "S")
@@ -38,12 +39,6 @@ FORMS = (PSI_DELTA, NCS, ALPHA_BETA, TAN_COS)
 """The columns of each form; where a file has several, the first is read."""
 FOLDED_FORMS = (ALPHA_BETA, TAN_COS)
 """Forms that contain cos Δ only."""
-POLARISED = (0.5, 1.05)
-"""Accepted degrees of polarisation of N, C, S: below, noise dominates; above, the columns are not N, C, S."""
-HIGHEST_COSINE = 1.05
-"""Noise takes cos Δ this far beyond 1; further, the column is not cos Δ."""
-_ROUNDED = 3e-3
-"""1 − N² − C² − S² below this is rounding: of three decimals in each it reaches 0.0017."""
 _METAL_N, _METAL_K = 13, 80
 """Largest n and k of common metals up to 12 µm (gold), in tables that look like psi and delta."""
 _EXAMPLE = '`columns=["wavelength", "angle", "psi", "delta"]`'
@@ -51,16 +46,9 @@ _SOME = "the standard deviation of only one of psi and delta; add the other, or 
 _SHARES = ("depolarisation", "sigma_depolarisation")
 
 
-class Angles(NamedTuple):
-    """Ψ and Δ in degrees, a sentence on the conversion, and the depolarisation, where it is known."""
-
-    psi: Float[np.ndarray, " points"]
-    delta: Float[np.ndarray, " points"]
-    note: str | None = None
-    depolarisation: Float[np.ndarray, " points"] | None = None
-
-
-def ellipsometry_columns(table: Table, columns: Sequence[Column] | None) -> Selection:
+def ellipsometry_columns(
+    table: Table, columns: Sequence[Column] | None, _: Sequence[str] | None = None
+) -> Selection:
     """Choose the columns of Ψ and Δ, in any form. Raises DataError or UsageError."""
     if columns is None and table.width == 3:
         named = (Column(1, "", "psi"), Column(2, "", "delta"))
@@ -183,76 +171,15 @@ def _converted(rows: Rows, chosen: Selection, form: tuple[str, ...], analyser: f
     if form == PSI_DELTA:
         return Angles(*read)
     if form == NCS:
-        return _from_ncs(read, places[0])
+        return from_ncs(read, places[0], REMEDY)
     if form == TAN_COS:
-        return _from_tan_cos(read, places)
+        return from_tan_cos(read, places, REMEDY)
     angles = np.full(read[0].size, analyser, dtype=float)
     for column in chosen.others:
         if column.role == "analyser":
             angles, reason = rows.columns["analyser"], f"is not between 0 and 90 degrees; {REMEDY}"
             refuse_first(angles, (angles <= 0) | (angles >= 90), rows.places(column), reason)
-    return _from_alpha_beta(read, angles, places[0])
-
-
-def _from_ncs(columns: Float[np.ndarray, "3 points"], place: Where) -> Angles:
-    """Convert N = cos 2Ψ, C = sin 2Ψ cos Δ, S = sin 2Ψ sin Δ, each times the degree of polarisation.
-
-    Raises DataError for an impossible degree of polarisation.
-    """
-    polarised = np.sqrt(np.sum(columns**2, axis=0))
-    wrong = (polarised < POLARISED[0]) | (polarised > POLARISED[1])
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{place(row)}: N, C and S make a degree of polarisation of "
-            f"{polarised[row]:.3g}, where about 1 is possible; {REMEDY}"
-        )
-    psi = np.rad2deg(0.5 * np.arctan2(np.hypot(columns[1], columns[2]), columns[0]))
-    delta, share = np.rad2deg(np.arctan2(columns[2], columns[1])), 1 - polarised**2
-    note = "N, C, S converted to psi and delta"
-    if np.max(np.abs(share)) < _ROUNDED:
-        return Angles(psi, delta, note)
-    return Angles(psi, delta, f"{note}, and 1 - N² - C² - S² read as the depolarisation", share)
-
-
-def _from_alpha_beta(
-    alpha_beta: Float[np.ndarray, "2 points"], analyser: Float[np.ndarray, " points"], place: Where
-) -> Angles:
-    """Convert α, β of a rotating analyser; Δ is in 0 to 180, since only cos Δ is measured.
-
-    `analyser` is the angle of the fixed polariser from the plane of incidence. tan Ψ = tan A
-    √((1 + α)/(1 − α)) and cos Δ = β/√(1 − α²), the inverse of `optics.ellipsometry.alpha_beta`. Where
-    noise takes β beyond √(1 − α²), Δ is 0 or 180. Raises DataError for a contrast above 1.
-    """
-    alpha, beta = alpha_beta
-    contrast = np.hypot(alpha, beta)
-    wrong = (contrast > POLARISED[1]) | (np.abs(alpha) > 1)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{place(row)}: alpha {alpha[row]:g} and beta {beta[row]:g} make a contrast of "
-            f"{contrast[row]:.3g}, where at most 1 is possible; {REMEDY}"
-        )
-    psi = np.rad2deg(np.arctan2(np.tan(np.deg2rad(analyser)) * np.sqrt(1 + alpha), np.sqrt(1 - alpha)))
-    delta = np.rad2deg(np.arctan2(np.sqrt(np.maximum(1 - contrast**2, 0.0)), beta))
-    over = int(np.sum(contrast > 1))
-    limited = f"; delta is 0 or 180 at {over} points whose contrast is above 1" if over else ""
-    return Angles(psi, delta, f"alpha and beta converted to psi and delta{limited}")
-
-
-def _from_tan_cos(tan_cos: Float[np.ndarray, "2 points"], places: Sequence[Where]) -> Angles:
-    """Convert tan Ψ and cos Δ; Δ is in 0 to 180. Where noise takes cos Δ beyond 1, Δ is 0 or 180.
-
-    Raises DataError for a tangent below 0, or a cosine beyond ±1.05.
-    """
-    tangent, cosine = tan_cos
-    refuse_first(tangent, tangent < 0, places[0], f"is no tan(psi), below zero; {REMEDY}")
-    reason = f"is no cos(delta), beyond 1; {REMEDY}, or name the columns psi_deg and delta_deg"
-    refuse_first(cosine, np.abs(cosine) > HIGHEST_COSINE, places[1], reason)
-    over = int(np.sum(np.abs(cosine) > 1))
-    limited = f"; delta is 0 or 180 at {over} points whose cosine is above 1" if over else ""
-    delta = np.rad2deg(np.arccos(np.clip(cosine, -1, 1)))
-    return Angles(np.rad2deg(np.arctan(tangent)), delta, f"tan(psi) and cos(delta) converted{limited}")
+    return from_alpha_beta(read, angles, places[0], REMEDY)
 
 
 def _check(rows: Rows, chosen: Selection, form: tuple[str, ...], folded: bool) -> None:
@@ -284,3 +211,158 @@ def _check(rows: Rows, chosen: Selection, form: tuple[str, ...], folded: bool) -
         remedy = REMEDY if share.unit == "percent" else percent
         check_depolarisation(rows.columns["depolarisation"], rows.places(share), remedy)
         rows.check_errors({"depolarisation_sigma": error} if error else {})
+
+
+_ELEMENTS = '`columns=["wavelength", "angle", "m12", "m33", "m34"]`'
+_RATIOS = '`columns=["wavelength", "angle", "psi_ane", "delta_ane", "psi_aps", "delta_aps"]`'
+_SOME_OF = "standard deviations of some of the {} only ({{}}); add the others, or skip these"
+_NORMALISED = 1e-3
+"""Deviation of m11 from 1 by rounding."""
+
+
+def mueller_columns(
+    table: Table, columns: Sequence[Column] | None, elements: Sequence[str] | None = None
+) -> Selection:
+    """Choose the columns of elements, all or those named. Raises DataError or UsageError."""
+    if columns is None:
+        raise without_header(table, _ELEMENTS)
+    present = {role: column for role in MUELLER if (column := only(table, columns, role))}
+    if elements is not None:
+        Mueller(tuple(elements))
+        if absent := [name for name in elements if name not in present]:
+            have = ", ".join(name for name in ELEMENTS if name in present) or "no elements"
+            raise UsageError(f"{table.path}: has no column {', '.join(absent)}; it has {have}")
+    values = [present[x] for x in ELEMENTS if x in present and (elements is None or x in elements)]
+    if not values:
+        raise DataError(
+            f"{table.path}: no element of a Mueller matrix (m12 to m44) is among {listed(columns)}; name the "
+            f"columns in order, as in {_ELEMENTS}"
+        )
+    for column in values:
+        if column.unknown_unit or column.unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in "
+                f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
+            )
+    errors = error_columns(table, columns, values, _SOME_OF.format("elements"))
+    one = any(column.role == "sigma" for column in errors)
+    meaning = "the standard deviation of each" if one else "their standard deviations"
+    notes, m11 = [f"{listed(errors)} read as {meaning}"] if errors else [], present.get("m11")
+    signal, noun = Mueller.word, Mueller.noun
+    return select(table, columns, signal, values, noun, _ELEMENTS, errors=errors, others=[m11], notes=notes)
+
+
+def generalised_columns(
+    table: Table, columns: Sequence[Column] | None, ratios: Sequence[str] | None = None
+) -> Selection:
+    """Choose the columns of the ratios, all or those named. Raises DataError or UsageError."""
+    if columns is None:
+        raise without_header(table, _RATIOS)
+    if ratios is not None:
+        Generalised(tuple(ratios))
+    pairs: dict[str, tuple[Column, Column]] = {}
+    for name in RATIOS:
+        psi, delta = (only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
+        if psi and delta:
+            pairs[name] = psi, delta
+        elif psi or delta:
+            raise DataError(
+                f"{table.path}: has {listed([c for c in (psi, delta) if c])} alone, and each ratio needs psi"
+                " and delta; add the other, or skip it with _ in `columns`"
+            )
+    if absent := [name for name in ratios or () if name not in pairs]:
+        raise UsageError(
+            f"{table.path}: has no ratio {', '.join(absent)}; it has {', '.join(pairs) or 'none'}"
+        )
+    if not pairs:
+        raise DataError(
+            f"{table.path}: no generalised psi and delta (psi_ane and delta_ane, or of aps or asp) are among "
+            f"{listed(columns)}; name the columns in order, as in {_RATIOS}"
+        )
+    values = [column for name, pair in pairs.items() if ratios is None or name in ratios for column in pair]
+    for column in values:
+        if column.unknown_unit:
+            raise DataError(
+                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
+                "delta in degrees"
+            )
+    errors = error_columns(table, columns, values, _SOME_OF.format("columns"))
+    notes = [f"{listed(errors)} read as their standard deviations"] if errors else []
+    signal, noun = Generalised.word, Generalised.noun
+    return select(table, columns, signal, values, noun, _RATIOS, errors=errors, notes=notes)
+
+
+def read_anisotropic(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
+    """Read the chosen elements or ratios. Raises DataError or UsageError."""
+    rows = Rows.read(table, chosen, asked.wavelength_unit).cut(asked.range)
+    notes = [NOISE_REPLACES] if chosen.errors and asked.noise is not None else []
+    if asked.noise is None:
+        rows.check_errors({column.role: column for column in chosen.errors})
+    read = _mueller if chosen.signal == Mueller.word else _generalised
+    return read(rows, chosen, asked.noise, notes)
+
+
+def _mueller(rows: Rows, chosen: Selection, noise: float | None, notes: list[str]) -> Spectrum:
+    """Elements over m11, checked, without those that were not measured."""
+    elements = tuple(column.role for column in chosen.values)
+    values, sigma = rows.stacked(elements), None
+    if noise is not None:
+        sigma = np.full(values.shape, float(noise))
+    elif chosen.errors:
+        sigma = np.broadcast_to(rows.stacked([column.role for column in chosen.errors]), values.shape)
+    for m11 in chosen.others:
+        values, sigma, note = _normalised(rows, m11, values, sigma)
+        notes += [note] if note else []
+    for i, column in enumerate(chosen.values):
+        error = None if sigma is None else sigma[:, i]
+        check_element(values[:, i], error, elements[i], rows.places(column), REMEDY)
+    constant = np.all((values == values[0]) & np.isin(values, (-1.0, 0.0, 1.0)), axis=0)
+    if constant.any() and len(values) > 1:  # programs write exactly 0 or 1 for what was not measured
+        left_out = ", ".join(np.array(elements)[constant])
+        if constant.all():
+            raise DataError(f"{rows.table.path}: {left_out} are constant: nothing was measured")
+        notes.append(f"left out as not measured, exactly 0 or 1 at every point: {left_out}")
+        elements = tuple(np.array(elements)[~constant].tolist())
+        values, sigma = values[:, ~constant], None if sigma is None else sigma[:, ~constant]
+    notes += sign_notes(elements, values)
+    return rows.spectrum(notes, {"values": values, "sigma": sigma}, signal=chosen.signal, elements=elements)
+
+
+def _normalised(
+    rows: Rows, column: Column, values: np.ndarray, sigma: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Elements and σ over m11, with a sentence; as they are where m11 is 1, or an intensity beside them."""
+    m11 = rows.columns[column.role]
+    if np.all(np.abs(m11 - 1) < _NORMALISED):
+        return values, sigma, ""
+    refuse_first(m11, m11 <= 0, rows.places(column), f"is no m11, which is above zero; {REMEDY}")
+    divided = values / m11[:, None]
+    if np.max(np.abs(values)) <= HIGHEST and np.max(np.abs(divided)) > HIGHEST:
+        return values, sigma, "m11 is an intensity beside normalised elements: ignored"
+    return divided, None if sigma is None else sigma / m11[:, None], "elements divided by m11"
+
+
+def _generalised(rows: Rows, chosen: Selection, noise: float | None, notes: list[str]) -> Spectrum:
+    """Ψ and Δ of each ratio. One σ for all, of a column or the noise, is that of Ψ, and Δ has that of
+    `generalised.delta_sigma`."""
+    roles, errors = ([column.role for column in columns] for columns in (chosen.values, chosen.errors))
+    ratios = tuple(role.removeprefix("psi_") for role in roles[::2])
+    psi, delta = rows.stacked(roles[::2]), rows.stacked(roles[1::2])
+    for i, name in enumerate(ratios):
+        at_psi, at_delta = (rows.places(column) for column in chosen.values[2 * i : 2 * i + 2])
+        check_psi_delta(psi[:, i], delta[:, i], False, at_psi, at_delta, f"{REMEDY} ({name})")
+    of_psi = of_delta = None
+    if noise is None and len(errors) > 1:
+        of_psi, of_delta = rows.stacked(errors[::2]), rows.stacked(errors[1::2])
+    elif noise is not None or errors:
+        one = rows.stacked(errors) if noise is None else float(noise)
+        of_psi = np.broadcast_to(one, psi.shape)
+        of_delta = delta_sigma(psi, of_psi)
+    arrays = {"values": psi, "sigma": of_psi, "delta": delta % 360.0, "delta_sigma": of_delta}
+    return rows.spectrum(notes, arrays, signal=chosen.signal, ratios=ratios)
+
+
+COLUMNS = {SIGNAL: ellipsometry_columns, Mueller.word: mueller_columns, Generalised.word: generalised_columns}
+"""Choice of the columns of each signal of ellipsometry, by its word."""
+READERS = {SIGNAL: read_ellipsometry, Mueller.word: read_anisotropic, Generalised.word: read_anisotropic}
+"""Readers of these; other signals are powers."""

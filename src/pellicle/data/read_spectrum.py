@@ -1,7 +1,7 @@
 """Reading of spectra: what a file has to choose from, the choice, and the spectra themselves."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from logging import INFO, getLogger
 from typing import Any, NamedTuple
@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.data.formats.detect import read_tables
-from pellicle.data.read_anisotropic import generalised_columns, mueller_columns, read_anisotropic
-from pellicle.data.read_ellipsometry import FORMS, PSI_DELTA, SIGNAL, ellipsometry_columns, read_ellipsometry
+from pellicle.data.read_ellipsometry import COLUMNS, FORMS, PSI_DELTA, READERS, SIGNAL
 from pellicle.data.read_power import power_columns, read_power
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import Reading
@@ -26,13 +25,6 @@ log = getLogger(__name__)
 
 ALL = "all"
 _MOST_LISTED = 40
-_OF_ANISOTROPIC = {Mueller.word: mueller_columns, Generalised.word: generalised_columns}
-"""Signals of anisotropic samples, which yield to psi and delta where none is asked for."""
-_READERS: dict[str, Callable[[Table, Selection, Reading], Spectrum]] = {
-    SIGNAL: read_ellipsometry,
-    **dict.fromkeys(_OF_ANISOTROPIC, read_anisotropic),
-}
-"""Readers of ellipsometry; other signals are powers."""
 
 
 class Candidate(NamedTuple):
@@ -124,7 +116,7 @@ def _read(path: str | os.PathLike[str], asked: Reading, *, together: bool) -> li
     given = [name for name, given in (*stated, ("transmission", asked.transmission)) if given]
     if given and all(one.signal != SIGNAL for one in candidates):
         raise UsageError(f"{path}: `{given[0]}` is for ellipsometry, and the file has none; leave it out")
-    if all(one.signal in _READERS for one in candidates):
+    if all(one.signal in READERS for one in candidates):
         kind = KINDS[candidates[0].signal]
         if asked.signal_unit is not None:
             unit = "psi and delta are in degrees" if kind.degrees else f"{kind.noun} have no unit"
@@ -138,7 +130,7 @@ def _read(path: str | os.PathLike[str], asked: Reading, *, together: bool) -> li
 def _spectrum(one: Candidate, asked: Reading, several: bool) -> Spectrum:
     """Read one of the spectra of a file; `several` keeps its name."""
     declared = one.table.declared
-    spectrum = _READERS.get(one.signal, read_power)(one.table, one.columns, asked)
+    spectrum = READERS.get(one.signal, read_power)(one.table, one.columns, asked)
     if declared.angle is not None and spectrum.angle is None:
         notes = (*spectrum.notes, f"angle of incidence {declared.angle:g} degrees, as the file declares")
         spectrum = replace(spectrum, angle=np.full(len(spectrum), declared.angle), notes=notes)
@@ -164,9 +156,7 @@ def _candidates(table: Table, asked: Reading) -> list[Candidate]:
     spectra = []
     word, wanted = _ellipsometric(named, asked)
     if word is not None:
-        select = _OF_ANISOTROPIC.get(word)
-        chosen = select(table, named, asked.elements) if select else ellipsometry_columns(table, named)
-        spectra.append(Candidate(table, chosen, table.name or word))
+        spectra.append(Candidate(table, COLUMNS[word](table, named, asked.elements), table.name or word))
         if wanted or not any(column.role in SIGNALS for column in named or ()):
             return spectra
     powers = power_columns(table, asked.columns, asked.signal, asked.polarisation)
@@ -181,7 +171,7 @@ def _candidates(table: Table, asked: Reading) -> list[Candidate]:
 def _ellipsometric(named: Sequence[Column] | None, asked: Reading) -> tuple[str | None, bool]:
     """The signal of ellipsometry that a table has, None without one, and whether it was asked for."""
     if asked.signal is not None:
-        return (asked.signal, True) if asked.signal in _READERS else (None, False)
+        return (asked.signal, True) if asked.signal in READERS else (None, False)
     if asked.elements is not None:
         ratios = not set(asked.elements).isdisjoint(Generalised.every)
         return (Generalised.word if ratios else Mueller.word), True
@@ -211,7 +201,7 @@ def file_candidates(tables: Sequence[Table], asked: Reading) -> list[Candidate]:
     if not spectra:
         raise refusals[0]
     if asked.signal is None and asked.elements is None and any(one.signal == SIGNAL for one in spectra):
-        return [one for one in spectra if one.signal not in _OF_ANISOTROPIC]
+        return [one for one in spectra if one.signal == SIGNAL or one.signal not in READERS]
     return spectra
 
 
@@ -234,7 +224,7 @@ def chosen(spectra: Sequence[Candidate], spectrum: str | None, *, together: bool
     if len(spectra) == 1:
         return list(spectra)
     signals = {one.signal for one in spectra}
-    kinds = [one.signal for one in spectra if one.signal in _READERS]
+    kinds = [one.signal for one in spectra if one.signal in READERS]
     if len(kinds) == 1:
         if together:
             return list(spectra)
