@@ -9,8 +9,8 @@ import pytest
 from pellicle.accuracy import colour_methods
 from pellicle.accuracy.case import random_draws
 from pellicle.accuracy.colour_methods import COLOUR_METHODS
-from pellicle.accuracy.registry import Comparison, Result
-from pellicle.accuracy.surface import BRDF_METHODS, DRAWS, SurfaceCost, films_of
+from pellicle.accuracy.registry import Comparison, Cost, Result
+from pellicle.accuracy.surface import BRDF_METHODS, DRAWS, films_of
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.rendering.renderer_methods import RENDERER_METHODS
@@ -124,14 +124,14 @@ def test_record_and_report_say_the_same():
     )
     seen = Comparison("colour", "steps of 1 nm", 0.5, "ΔE2000", 40, 64, results=[one])
     values = Comparison("brdf", "float64", 1e-3, "relative", 40, 64, results=[other])
-    record = to_json(SurfaceCost(seen, values), "steel.toml")
+    record = to_json(Cost(colours=seen, values=values), "steel.toml")
     assert record["schema"] == "pellicle.cost/1"
     assert (record["unit"], record["recommended"]) == ("ΔE2000", "nodes-6-500")
     assert [method["kind"] for method in record["rungs"]] == ["colour", "brdf"]
     assert record["brdf"]["recommended"] == "float64"
-    report = text(SurfaceCost(seen, values), "steel.toml")
+    report = text(Cost(colours=seen, values=values), "steel.toml")
     assert "nodes-6-500 is the fastest within an error of 0.5 in ΔE2000" in report
     assert "float64 is the fastest within a relative error of 0.001" in report
     assert "100" in report  # ns
-    alone = to_json(SurfaceCost(None, values, "no film"), "paint.toml")
+    alone = to_json(Cost(values=values, no_colours="no film"), "paint.toml")
     assert (alone["unit"], alone["no_colours"]) == ("relative", "no film")

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.registry import Comparison, Result
-from pellicle.accuracy.surface import SurfaceCost
+from pellicle.accuracy.registry import Comparison, Cost, Result
 from pellicle.fitting.comparison import compare
 from pellicle.reporting.fit_text import report as fit_report
 from pellicle.sampling.chain import Checks
@@ -113,8 +111,8 @@ def test_a_cost_reports_draws_and_saves_itself(tmp_path):
         Result("one order", "higher orders", 5e-4, 1e-6, 0.1, {"flops": 1e3}, True),
         Result("float64", "", 0.0, 2e-6, 0.2, {"flops": 2e3}, True),
     ]
-    film = Cost(methods, None, "nothing is free to fit")
-    surface = SurfaceCost(None, methods, "the surface has no film")
+    film = Cost(methods, no_solvers="nothing is free to fit")
+    surface = Cost(values=methods, no_colours="the surface has no film")
     for cost, words in ((film, "No fits: nothing is free"), (surface, "No colours: the surface has no film")):
         text = cost.report()
         assert text.startswith("scene: ")

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.accuracy.case import Program, check_tolerance, compiled_function
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.registry import Comparison, Method, measure
+from pellicle.accuracy.registry import Comparison, Cost, Method, measure
 from pellicle.brdf import film_colour
 from pellicle.colour import FilmColourTable, delta_e2000, integration_bands, lab, sensor
 from pellicle.colour.bands import Bands
@@ -243,7 +242,7 @@ def colour_cost(
     with jax.enable_x64(True):
         films = films_of_scene(scene, angles)
         compared = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress, methods)
-    return Cost(compared, None, "solvers are compared on spectra: leave the space out")
+    return Cost(compared, no_solvers="solvers are compared on spectra: leave the space out")
 
 
 def films_of_scene(scene: Scene, angle: np.ndarray) -> Films:

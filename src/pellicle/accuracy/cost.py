@@ -5,7 +5,6 @@ import importlib.util
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,14 +12,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pellicle.accuracy.case import case, check_tolerance
 from pellicle.accuracy.film_methods import compare_methods
 from pellicle.accuracy.registry import (
     Comparison,
+    Cost,
     DataSet,
     Method,
-    OnData,
     data_sets,
     deviance,
     deviance_and_slope,
@@ -31,7 +31,6 @@ from pellicle.accuracy.registry import (
 from pellicle.fitting.conclusion import linearised, neighbourhood
 from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import solve
-from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Form
 from pellicle.fitting.profile_likelihood import interval
 from pellicle.fitting.progress import Progress, quiet
@@ -39,6 +38,7 @@ from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.status import RIVAL
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves
+from pellicle.simulation.spectra import default_wavelengths
 
 NOMINAL = 0.95
 _WIDE = 1.959964
@@ -79,16 +79,15 @@ def compare_intervals(
     time_limit: float = math.inf,
 ) -> Comparison:
     """Compute intervals for every data set by every method; see `measure_on_data`."""
-    comparison = Comparison("interval", requested=len(data))
 
-    def problem(one: DataSet) -> RankedMinima:
-        return rank(one.problem, search(one.problem, quiet)).counted
+    def prepare(one: DataSet) -> tuple[RankedMinima, Callable[[Interval], tuple[np.ndarray, np.ndarray]]]:
+        def score(ends: Interval) -> tuple[np.ndarray, np.ndarray]:
+            """Which true values the intervals contain, and how wide they are."""
+            lower, upper = ends
+            inside = (lower <= one.truth) & (one.truth <= upper)
+            return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
 
-    def score(one: DataSet, ends: Interval) -> tuple[np.ndarray, np.ndarray]:
-        """Which true values the intervals contain, and how wide they are."""
-        lower, upper = ends
-        inside = (lower <= one.truth) & (one.truth <= upper)
-        return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)
+        return rank(one.problem, search(one.problem, quiet)).counted, score
 
     def summary(scores: list[tuple[np.ndarray, np.ndarray]]) -> tuple[float, dict[str, Any]]:
         inside, widths = (np.concatenate(x) for x in zip(*scores, strict=True))
@@ -96,8 +95,8 @@ def compare_intervals(
         details = {"coverage": coverage, "doubt": doubt, "width": float(np.median(widths))}
         return abs(coverage - NOMINAL), details
 
-    how = OnData("intervals", problem, partial(partial, score), summary)
-    return measure_on_data(comparison, methods, data, how, progress, time_limit)
+    comparison = Comparison("interval", requested=len(data))
+    return measure_on_data(comparison, methods, data, prepare, summary, progress, time_limit)
 
 
 STEPS = 100
@@ -208,51 +207,32 @@ def compare_solvers(
     time_limit: float = np.inf,
 ) -> Comparison:
     """Fit every data set with every solver in turn; see `measure_on_data`."""
-    comparison = Comparison("inverse", noise=noise, requested=len(data))
 
-    def score(one: DataSet, least: float, unit: np.ndarray) -> tuple[float, bool]:
-        """The largest error of any parameter, and whether the solver missed the minimum."""
-        inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
-        return float(np.max(np.abs(inside - one.truth))), bool(_deviance(one, inside) > least + RIVAL)
+    def prepare(one: DataSet) -> tuple[DataSet, Callable[[np.ndarray], tuple[float, bool]]]:
+        least = _deviance(one, from_truth(one))
+
+        def score(unit: np.ndarray) -> tuple[float, bool]:
+            """The largest error of any parameter, and whether the solver missed the minimum."""
+            inside = np.clip(np.nan_to_num(unit, nan=0.5), 0.0, 1.0)
+            return float(np.max(np.abs(inside - one.truth))), bool(_deviance(one, inside) > least + RIVAL)
+
+        return one, score
 
     def summary(scores: list[tuple[float, bool]]) -> tuple[float, dict[str, Any]]:
         errors, failures = zip(*scores, strict=True)
         return float(np.mean(errors)), {"median_error": float(np.median(errors)), "failures": sum(failures)}
 
-    def scored(one: DataSet) -> Callable[[np.ndarray], tuple[float, bool]]:
-        return partial(score, one, _deviance(one, from_truth(one)))
-
-    how = OnData("data sets", lambda one: one, scored, summary)
-    return measure_on_data(comparison, solvers, data, how, progress, time_limit)
+    comparison = Comparison("inverse", noise=noise, requested=len(data))
+    return measure_on_data(comparison, solvers, data, prepare, summary, progress, time_limit)
 
 
 TOLERANCE, TOLERANCE_IN_DEGREES = 1e-3, 0.1
 """Default tolerance: a fraction, or degrees on the sphere of N, C, S."""
 
 
-@dataclass
-class Cost(PlotMixin):
-    """Accuracy against time for one film.
-
-    `methods` compares simulations, `solvers` fits and `intervals` their errors. `solvers` is None where
-    nothing was fitted, and `no_solvers` says why.
-    """
-
-    methods: Comparison
-    solvers: Comparison | None
-    no_solvers: str = ""
-    intervals: Comparison | None = None
-
-    @property
-    def interrupted(self) -> bool:
-        """True where Ctrl-C ended the measurement."""
-        parts = (self.methods, self.solvers, self.intervals)
-        return any(part is not None and part.interrupted for part in parts)
-
-
 def cost(
     scene: Scene,
-    wavelength: np.ndarray,
+    wavelength: ArrayLike | None = None,
     *,
     reference: str = "float64",
     tolerance: float | None = None,
@@ -264,32 +244,34 @@ def cost(
 ) -> Cost:
     """Measure every method of computing the signal of a scene at `wavelength` (nm), and of fitting it.
 
-    `reference` is "float64" or "mpmath". `tolerance` is in the unit of the signal: a fraction, or degrees on
-    the sphere of N, C and S; its default is the `noise`, or else 0.001 (0.1 degrees). `datasets` spectra are
-    simulated with that noise, or else noise equal to the tolerance, and fitted by every solver. `time_limit`
-    (s) ends these fits, and then their intervals, after as many data sets as it allows.
+    By default the wavelengths are those of the scene's light, or as in `pellicle.simulate`. `reference` is
+    "float64" or "mpmath". `tolerance` is in the unit of the signal: a fraction, or degrees on the sphere of
+    N, C and S; its default is the `noise`, or else 0.001 (0.1 degrees). `datasets` spectra are simulated with
+    that noise, or else noise equal to the tolerance, and fitted by every solver. `time_limit` (s) ends these
+    fits, and then their intervals, after as many data sets as it allows.
 
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
     scene, and for a scene whose signal is 0 everywhere.
     """
+    if wavelength is None:
+        wavelength = scene.light.wavelength
+    nm = default_wavelengths(scene) if wavelength is None else np.asarray(wavelength, dtype=float)
     default = TOLERANCE_IN_DEGREES if scene.light.kind.degrees else TOLERANCE
     tolerance = (default if noise is None else noise) if tolerance is None else tolerance
     check_tolerance(tolerance)
     with jax.enable_x64(True):
-        one = case(scene, wavelength, tolerance)
+        one = case(scene, nm, tolerance)
         methods = compare_methods(one, reference, progress)
         if methods.interrupted:
-            return Cost(methods, None, "interrupted before")
+            return Cost(methods, no_solvers="interrupted before")
         if datasets == 0:
-            return Cost(methods, None, "no data sets were requested")
+            return Cost(methods, no_solvers="no data sets were requested")
         if not free_leaves(scene):
-            return Cost(methods, None, "nothing is free to fit")
+            return Cost(methods, no_solvers="nothing is free to fit")
         noise = tolerance if noise is None else noise
         with_instrument = eqx.tree_at(lambda s: s.instrument, one.scene, scene.instrument)
         data = data_sets(one, with_instrument, noise, datasets)
         solvers = compare_solvers(data, noise, progress, time_limit=time_limit)
         if solvers.interrupted:
             return Cost(methods, solvers)
-        return Cost(
-            methods, solvers, intervals=compare_intervals(data, progress, interval_methods, time_limit)
-        )
+        return Cost(methods, solvers, compare_intervals(data, progress, interval_methods, time_limit))

@@ -24,6 +24,7 @@ import numpy as np
 from pellicle.accuracy.case import Case, Program, Variant, compiled
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Measured
+from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Form, Problem
 from pellicle.fitting.progress import Progress
 from pellicle.scene.film import Scene, with_wavelength
@@ -150,6 +151,35 @@ class Comparison:
         return self
 
 
+@dataclass
+class Cost(PlotMixin):
+    """Accuracy against time for a film or a surface, a comparison for each kind of method.
+
+    Of a film, `methods` compares simulations (or integrations of its colours), `solvers` fits, and
+    `intervals` their errors; `no_solvers` says why nothing was fitted. Of a surface, `colours` compares
+    colours of its film, or `no_colours` says why it has none, and `values` its BRDF.
+    """
+
+    methods: Comparison | None = None
+    solvers: Comparison | None = None
+    intervals: Comparison | None = None
+    colours: Comparison | None = None
+    values: Comparison | None = None
+    no_solvers: str = ""
+    no_colours: str = ""
+
+    @property
+    def parts(self) -> list[Comparison]:
+        """The comparisons that there are, in the order of their tables."""
+        every = (self.methods, self.solvers, self.intervals, self.colours, self.values)
+        return [part for part in every if part is not None]
+
+    @property
+    def interrupted(self) -> bool:
+        """True where Ctrl-C ended the measurement."""
+        return any(part.interrupted for part in self.parts)
+
+
 def mark_pareto(results: Sequence[Result]) -> None:
     """Mark the results that no other one beats in error or time without being worse in the other."""
     figures = np.array([(result.error, result.seconds) for result in results]).reshape(-1, 2)
@@ -211,35 +241,26 @@ def measure(
     )
 
 
-class OnData(NamedTuple):
-    """Measurement of methods of one kind on simulated data sets.
-
-    `problem` is what a method is applied to, whose computation is not timed. `score` returns the score of an
-    answer on a data set. `summary` turns all scores of a method into its error and details.
-    """
-
-    stage: str
-    problem: Callable[[DataSet], Any]
-    score: Callable[[DataSet], Callable[[Any], Any]]
-    summary: Callable[[list[Any]], tuple[float, dict[str, Any]]]
-
-
 def measure_on_data(
     comparison: Comparison,
     methods: Sequence[Method],
     data: Sequence[DataSet],
-    how: OnData,
+    prepare: Callable[[DataSet], tuple[Any, Callable[[Any], Any]]],
+    summary: Callable[[list[Any]], tuple[float, dict[str, Any]]],
     progress: Progress,
     time_limit: float = math.inf,
 ) -> Comparison:
     """Fill a comparison of solvers or intervals with the result of every method that is installed.
 
-    No data set begins later than `time_limit` seconds after the methods are compiled. Ctrl-C ends this and
-    keeps the results so far.
+    `prepare` returns what methods are applied to for a data set, whose computation is not timed, and the
+    function that scores an answer. `summary` turns all scores of a method into its error and details. No data
+    set begins later than `time_limit` seconds after the methods are compiled. Ctrl-C ends this and keeps the
+    results so far.
     """
     runs: list[_Run] = []
+    stage = "intervals" if comparison.kind == "interval" else "data sets"
     try:
-        first = how.problem(data[0])
+        first, _ = prepare(data[0])
         for done, method in enumerate(methods):
             progress(f"compile {method.name}", done, len(methods))
             if method.missing:
@@ -252,8 +273,8 @@ def measure_on_data(
         for done, one in enumerate(data):
             if done and time.perf_counter() - began_all > time_limit:
                 break
-            progress(how.stage, done, len(data))
-            problem, score = how.problem(one), how.score(one)
+            progress(stage, done, len(data))
+            problem, score = prepare(one)
             for run in runs:
                 began = time.perf_counter()
                 answer = run.method.apply(problem)
@@ -264,7 +285,7 @@ def measure_on_data(
     results = []
     for run in runs:
         if run.scores:
-            error, details = how.summary(run.scores)
+            error, details = summary(run.scores)
             compiling = run.compile_seconds - statistics.median(run.times)
             results.append(run.result(error, compiling, details | {"datasets": len(run.times)}))
     return comparison.finish(results)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,12 +11,11 @@ import numpy as np
 
 from pellicle.accuracy.case import Program, check_tolerance, compiled_function, random_draws
 from pellicle.accuracy.colour_methods import COLOUR_METHODS, COLOUR_TOLERANCE, DRAWS, Films, compare_colours
-from pellicle.accuracy.registry import Comparison, Method, measure
+from pellicle.accuracy.registry import Comparison, Cost, Method, measure
 from pellicle.brdf.directions import angle_to_half
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.effects import surface_plan
 from pellicle.effects.surface_plan import FLOOR, SurfaceRemoval, exact
-from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
@@ -27,30 +26,13 @@ VALUE_TOLERANCE = 1e-3
 """Default tolerance: relative error of a BRDF."""
 
 
-@dataclass
-class SurfaceCost(PlotMixin):
-    """Accuracy against time for one surface.
-
-    `colours` is None where the surface has no film with a colour of its own, and `no_colours` says why.
-    """
-
-    colours: Comparison | None
-    values: Comparison
-    no_colours: str = ""
-
-    @property
-    def interrupted(self) -> bool:
-        """True where Ctrl-C ended the measurement."""
-        return self.values.interrupted or (self.colours is not None and self.colours.interrupted)
-
-
 def cost(
     view: SurfaceView,
     *,
     tolerance: float | None = None,
     colours: Sequence[Method] = COLOUR_METHODS,
     progress: Progress = quiet,
-) -> SurfaceCost:
+) -> Cost:
     """Measure every method of computing the colours of a surface, and its BRDF.
 
     `colours` are the methods of computing a colour. `tolerance` is in mean ΔE2000; where the surface has no
@@ -63,9 +45,10 @@ def cost(
         draws = random_draws(view, DRAWS)
         films = films_of(view, draws)
         if isinstance(films, str):
-            return SurfaceCost(None, _values(view, draws, tolerance or VALUE_TOLERANCE, progress), films)
+            values = _values(view, draws, tolerance or VALUE_TOLERANCE, progress)
+            return Cost(values=values, no_colours=films)
         compared = compare_colours(films, tolerance or COLOUR_TOLERANCE, progress, colours)
-        return SurfaceCost(compared, _values(view, draws, VALUE_TOLERANCE, progress))
+        return Cost(colours=compared, values=_values(view, draws, VALUE_TOLERANCE, progress))
 
 
 FILM = ("thickness", "n", "k", "base_n", "base_k", "ambient_n")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.data.brdf_samples import BrdfSamples
@@ -16,11 +15,9 @@ from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, SurfaceView, check_scene, refuse, surface_view
 from pellicle.simulation.brdf import Directions, default_directions
-from pellicle.simulation.spectra import default_wavelengths
 
 if TYPE_CHECKING:
-    from pellicle.accuracy.cost import Cost
-    from pellicle.accuracy.surface import SurfaceCost
+    from pellicle.accuracy.registry import Cost
 
 
 def plan(
@@ -61,28 +58,6 @@ def plan(
     return film_plan(scene, tolerance, keep)
 
 
-@overload
-def cost(
-    scene: Scene,
-    wavelength: ArrayLike | None = None,
-    *,
-    reference: str = "float64",
-    tolerance: float | None = None,
-    noise: float | None = None,
-    datasets: int = 20,
-    time_limit: float = 120.0,
-    space: str | None = None,
-    angle: ArrayLike | None = None,
-    progress: Progress = quiet,
-) -> Cost: ...
-@overload
-def cost(
-    scene: Surface,
-    *,
-    directions: Directions | BrdfSamples | None = None,
-    tolerance: float | None = None,
-    progress: Progress = quiet,
-) -> SurfaceCost: ...
 def cost(
     scene: Scene | Surface,
     wavelength: ArrayLike | None = None,
@@ -96,69 +71,65 @@ def cost(
     space: str | None = None,
     angle: ArrayLike | None = None,
     progress: Progress = quiet,
-) -> Cost | SurfaceCost:
+) -> Cost:
     """Measure error and time of every method of simulating `scene`, and of fitting it.
 
     **Arguments:**
 
-    - `scene`: `Scene` or `Surface`.
-    - `wavelength`: nm, shape (wavelengths,). Of a `Scene` only; by default those of its light, or as in
-      `pellicle.simulate`.
-    - `directions`: pairs of directions to light and eye. Of a `Surface` only; see `pellicle.simulate`.
-    - `reference`: what errors are measured against: "float64", or "mpmath" with 50 digits (`Scene` only).
+    - `scene`: `Scene` or `Surface`. Of a `Surface` only: `directions`, pairs of directions to light and eye,
+      as
+      in `pellicle.simulate`. Of a `Scene` only: all others but `tolerance` and `progress`.
+    - `wavelength`: nm, shape (wavelengths,); by default those of its light, or as in `pellicle.simulate`.
+    - `reference`: what errors are measured against: "float64", or "mpmath" with 50 digits.
     - `tolerance`: the error that is small enough. R and T: a fraction, 0.001 by default. Ψ and Δ: degrees on
       the sphere of N, C and S, 0.1 by default. BRDF: mean ΔE2000 of its film's colour, 0.5 by default, or
       relative to its value where it has no such film.
     - `noise`: standard deviation of the spectra that are fitted, as in `pellicle.simulate`; by default the
-      tolerance. A noise without a tolerance is the tolerance too. (`Scene` only)
-    - `datasets`: number of simulated spectra that every solver fits; 0 leaves the solvers out.
-      (`Scene` only)
-    - `time_limit`: seconds after which no further data set is fitted, and then none's intervals are computed.
-      Compilation is not counted. (`Scene` only)
+      tolerance. A noise without a tolerance is the tolerance too.
+    - `datasets`: number of simulated spectra that every solver fits; 0 leaves the solvers out. `time_limit`:
+      seconds after which no further one is fitted, and then none's intervals are computed, without
+      compilation.
     - `space`: a colour space such as "srgb", for the methods of integrating the colours of a film at `angle`
       of incidence in degrees, (angles,): mean ΔE2000 of the observer 1931 under D65, 0.5 by default.
-      (`Scene` only)
     - `progress`: called with the name of a stage, the number of steps done and their total.
 
-    **Returns:** `Cost` or `SurfaceCost`: for each method its error, its time, and whether another one is
-    both faster and more accurate.
+    **Returns:** `Cost`: for each method its error, its time, and whether another one is both faster and more
+    accurate.
 
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
-    scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without
-    colour-science.
+    scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without colour-science.
     """
-    from pellicle.accuracy.colour_methods import COLOUR_METHODS, colour_cost
-    from pellicle.accuracy.cost import INTERVAL_METHODS
-    from pellicle.accuracy.cost import cost as film_cost  # solvers, a fifth of the time of importing this
-    from pellicle.accuracy.surface import cost as surface_cost
+    shared = {"tolerance": tolerance, "progress": progress}
+    of_spectra = {"reference": reference, "noise": noise, "datasets": datasets, "time_limit": time_limit}
+    return _measured(scene, wavelength, directions, (space, angle), of_spectra, shared)
+
+
+def _measured(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None,
+    directions: Directions | BrdfSamples | None,
+    colours: tuple[str | None, ArrayLike | None],
+    of_spectra: dict[str, Any],
+    shared: dict[str, Any],
+) -> Cost:
+    """Cost of the colours or values of a surface, or of the colours or spectra of a film."""
+    from pellicle.accuracy import colour_methods, cost, surface  # cost: a fifth of the time of importing this
     from pellicle.rendering.renderer_methods import RENDERER_METHODS
     from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS
 
     check_scene(scene)
-    colours = (*COLOUR_METHODS, *RENDERER_METHODS)
+    (space, angle), noise = colours, of_spectra["noise"]
+    methods = (*colour_methods.COLOUR_METHODS, *RENDERER_METHODS)
     if isinstance(scene, Surface):
         refuse("a Surface", wavelength=wavelength, noise=noise, space=space, angle=angle)
-        view = _viewed(scene, directions)
-        return surface_cost(view, tolerance=tolerance, colours=colours, progress=progress)
+        return surface.cost(_viewed(scene, directions), colours=methods, **shared)
     refuse("a Scene", directions=directions)
     if space is not None:
         refuse("colours", wavelength=wavelength, noise=noise)
-        return colour_cost(scene, angle, tolerance=tolerance, methods=colours, progress=progress)
+        return colour_methods.colour_cost(scene, angle, methods=methods, **shared)
     refuse("spectra, whose angle is that of the scene's light", angle=angle)
-    if wavelength is None:
-        stated = scene.light.wavelength
-        wavelength = default_wavelengths(scene) if stated is None else stated
-    return film_cost(
-        scene,
-        np.asarray(wavelength, dtype=float),
-        reference=reference,
-        tolerance=tolerance,
-        noise=noise,
-        datasets=datasets,
-        time_limit=time_limit,
-        interval_methods=(*INTERVAL_METHODS, *SAMPLED_INTERVALS),
-        progress=progress,
-    )
+    intervals = (*cost.INTERVAL_METHODS, *SAMPLED_INTERVALS)
+    return cost.cost(scene, wavelength, interval_methods=intervals, **of_spectra, **shared)
 
 
 def _viewed(surface: Surface, directions: Directions | BrdfSamples | None) -> SurfaceView:

@@ -57,20 +57,7 @@ def simulate(
     noise: float | str | Sequence[float | str] = 0.0,
     seed: int = 0,
 ) -> BrdfSamples: ...
-def simulate(
-    scene: Scene | Surface,
-    wavelength: ArrayLike | None = None,
-    *,
-    directions: Directions | BrdfSamples | None = None,
-    noise: float | str | Sequence[float | str] = 0.0,
-    seed: int = 0,
-    depolarisation_noise: float | None = None,
-    elements: Sequence[str] | None = None,
-    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
-    space: str | None = None,
-    angle: ArrayLike | None = None,
-    gamma: float = 1.0,
-) -> Spectrum | BrdfSamples | Colours:
+def simulate(scene: Scene | Surface, wavelength: ArrayLike | None = None, **options: Any) -> Any:
     """Simulate a measurement of `scene`: spectrum or colours of a film, or samples of a surface's BRDF.
 
     **Arguments:**
@@ -112,6 +99,24 @@ def simulate(
     ```
     """
     check_scene(scene)
+    return _simulated(scene, wavelength, **options)
+
+
+def _simulated(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None,
+    *,
+    directions: Directions | BrdfSamples | None = None,
+    noise: float | str | Sequence[float | str] = 0.0,
+    seed: int = 0,
+    depolarisation_noise: float | None = None,
+    elements: Sequence[str] | None = None,
+    sensor: tuple[np.ndarray, np.ndarray] | Colours | None = None,
+    space: str | None = None,
+    angle: ArrayLike | None = None,
+    gamma: float = 1.0,
+) -> Spectrum | BrdfSamples | Colours:
+    """Simulate what the arguments ask for; they are those of `simulate`."""
     if isinstance(noise, float | int) and not noise >= 0:
         raise UsageError(f"`noise` must not be negative, got {noise:g}")
     of_spectra: dict[str, Any] = {"depolarisation_noise": depolarisation_noise, "elements": elements}
@@ -123,13 +128,11 @@ def simulate(
         raise UsageError(f"`noise` of a Scene must be one number, a standard deviation, not {noise!r}")
     if sensor is not None or space is not None:
         refuse("colours", wavelength=wavelength, **of_spectra)
-        camera = None
+        how: dict[str, Any] = {"gamma": gamma, "noise": noise, "seed": seed}
         if isinstance(sensor, Colours):
-            space, gamma, camera = sensor.space, sensor.gamma, sensor.camera
+            space, how["gamma"], how["camera"] = sensor.space, sensor.gamma, sensor.camera
             sensor, angle = sensor.sensor, sensor.angle if angle is None else angle
-        return simulate_colours(
-            scene, sensor, space or "srgb", angle, gamma=gamma, camera=camera, noise=noise, seed=seed
-        )[0]
+        return simulate_colours(scene, sensor, space or "srgb", angle, **how)[0]
     refuse("a spectrum, whose angle is that of the scene's light", angle=angle)
     return simulate_spectrum(scene, wavelength, noise=noise, seed=seed, **of_spectra)
 

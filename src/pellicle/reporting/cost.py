@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.registry import Comparison
-from pellicle.accuracy.surface import SurfaceCost
+from pellicle.accuracy.registry import Comparison, Cost
 from pellicle.reporting import matplotlib_figure
 from pellicle.reporting.drawable import Line, Panel, Section, Style
 from pellicle.reporting.json_record import taken, versions, write_result
@@ -26,27 +24,16 @@ _Columns = Mapping[str, Callable[[Any], str]]
 """The cell of each column, by its head."""
 
 
-def text(cost: Cost | SurfaceCost, name: str = "scene") -> str:
+def text(cost: Cost, name: str = "scene") -> str:
     """Format each table with the recommended row, and the reason for what was left out."""
-    parts = _parts(cost)
-    blocks = [_table(part, name) for part in parts]
-    if isinstance(cost, SurfaceCost):
-        blocks += [f"No colours: {cost.no_colours}.\n"] if cost.no_colours else []
-    elif cost.solvers is None:
-        blocks.append(f"No fits: {cost.no_solvers}.\n")
-    if not cost.interrupted and any(_done(part) < part.requested for part in parts):
+    blocks = [_table(part, name) for part in cost.parts]
+    absent = (("colours", cost.no_colours), ("fits", cost.no_solvers))
+    blocks += [f"No {what}: {why}.\n" for what, why in absent if why]
+    if cost.interrupted:
+        blocks.append("Interrupted: these are the measurements until then.\n")
+    elif any(_done(part) < part.requested for part in cost.parts):
         blocks.append("The time limit ended the data sets early: --time-limit 600 allows ten minutes.\n")
-    blocks += ["Interrupted: these are the measurements until then.\n"] if cost.interrupted else []
     return "\n".join(blocks)
-
-
-def _parts(cost: Cost | SurfaceCost) -> list[Comparison]:
-    """Comparisons of methods, solvers and intervals of a film, of colours and of values of a surface."""
-    if isinstance(cost, Cost):
-        parts = (cost.methods, cost.solvers, cost.intervals)
-    else:
-        parts = (cost.colours, cost.values)
-    return [part for part in parts if part is not None]
 
 
 def error_label(methods: Comparison, size: str = "") -> str:
@@ -66,19 +53,22 @@ def time_unit(methods: Comparison) -> tuple[str, float]:
 
 
 def _table(part: Comparison, name: str) -> str:
-    """A title, aligned columns (a mark and two names flush left), and notes."""
-    if part.kind == "inverse":
-        title, columns, notes = _solvers(part)
-    elif part.kind == "interval":
-        title, columns, notes = _intervals(part)
-    else:
-        title, columns, notes = _methods(part, name)
+    """A title, aligned columns (a mark and two names flush left), notes, and a paragraph for each reason why
+    methods were left out."""
+    on_data = part.kind in ("inverse", "interval")
+    title, columns, notes = _on_data(part) if on_data else _methods(part, name)
     rows = [("", *columns)]
     for result in part.results:
         mark = ("→" if result.name == part.recommended else " ") + ("*" if result.pareto else " ")
         rows.append((mark, *(cell(result) for cell in columns.values())))
+    reasons: dict[str, list[str]] = {}
+    for method, why in part.left_out.items():
+        reasons.setdefault(why, []).append(method)
     lines = [*textwrap.wrap(title, COLUMNS), "", *aligned(rows, left=3), "", *notes]
-    return "\n".join([*lines, *_omitted(part.left_out)]) + "\n"
+    for why, names in reasons.items():
+        omitted = f"left out: {', '.join(names)}: {why}"
+        lines += textwrap.wrap(omitted, COLUMNS, subsequent_indent="    ")
+    return "\n".join(lines) + "\n"
 
 
 def _methods(methods: Comparison, name: str) -> tuple[str, _Columns, list[str]]:
@@ -99,18 +89,15 @@ def _methods(methods: Comparison, name: str) -> tuple[str, _Columns, list[str]]:
     advice = f"{methods.recommended} is the fastest within {within}"
     if not methods.within:
         advice = f"no method is within {within}; {methods.recommended} comes nearest"
-    title = f"{name}: {_compared(methods)} against {methods.reference}"
-    return title, columns, ["* no other method is both faster and as accurate", f"→ {advice}"]
-
-
-def _compared(methods: Comparison) -> str:
-    if methods.sample != "spectrum":
-        each = f"{methods.wavelengths} {'angles' if methods.sample == 'colour' else 'pairs of directions'}"
-        which = "mean" if methods.sample == "colour" else "largest"
-        return f"{methods.draws} draws between the bounds along {each}, the {which} error"
-    several = "s" * (methods.wavelengths > 1)
+    several, colours = "s" * (methods.wavelengths > 1), methods.sample == "colour"
     draws = "draws between the bounds" if methods.draws > 1 else "spectrum"
-    return f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
+    about = f"{methods.wavelengths} wavelength{several}, the largest error of {methods.draws} {draws}"
+    if methods.sample != "spectrum":
+        each = f"{methods.wavelengths} {'angles' if colours else 'pairs of directions'}"
+        which = "mean" if colours else "largest"
+        about = f"{methods.draws} draws between the bounds along {each}, the {which} error"
+    title = f"{name}: {about} against {methods.reference}"
+    return title, columns, ["* no other method is both faster and as accurate", f"→ {advice}"]
 
 
 def _done(comparison: Comparison) -> int:
@@ -118,54 +105,42 @@ def _done(comparison: Comparison) -> int:
     return max((result.details.get("datasets", 0) for result in comparison.results), default=0)
 
 
-def _counted(comparison: Comparison) -> str:
-    """Number of data sets, and of how many where the time limit or Ctrl-C ended them."""
-    done, requested = _done(comparison), comparison.requested
-    return f"{done}" if done == requested else f"{done} (of {requested})"
-
-
-def _solvers(solvers: Comparison) -> tuple[str, _Columns, list[str]]:
-    title = (
-        f"Fits of {_counted(solvers)} simulated spectra with noise {solvers.noise:g}, their true values"
-        " anywhere between the bounds; errors as a share of the bounds"
-    )
+def _on_data(part: Comparison) -> tuple[str, _Columns, list[str]]:
+    """Title, columns and advice of solvers or intervals, with the number of their data sets, and of how many
+    where the time limit or Ctrl-C ended them."""
+    done = _done(part)
+    count = f"{done}" if done == part.requested else f"{done} (of {part.requested})"
+    if part.kind == "inverse":
+        name, unit, best = "solver", "ms/fit", "of those that failed least"
+        title = (
+            f"Fits of {count} simulated spectra with noise {part.noise:g}, their true values"
+            " anywhere between the bounds; errors as a share of the bounds"
+        )
+        errors: _Columns = {
+            "failed": lambda one: f"{one.details['failures']}/{one.details['datasets']}",
+            "mean error": lambda one: f"{one.error:.1e}",
+            "median": lambda one: f"{one.details['median_error']:.1e}",
+        }
+    else:
+        name, unit, best = "interval", "ms", "whose coverage is 95 % within two standard deviations"
+        title = (
+            f"95 % intervals of {count} of these data sets: share that contains the true value,"
+            " width as a share of the bounds, and time after the fit"
+        )
+        errors = {
+            "coverage": lambda one: (
+                f"{100 * one.details['coverage']:.0f} ± {100 * one.details['doubt']:.0f} %"
+            ),
+            "width": lambda one: f"{one.details['width']:.1e}",
+        }
     columns: _Columns = {
-        "solver": lambda solver: solver.name,
-        "leaves out": lambda solver: solver.leaves_out,
-        "failed": lambda solver: f"{solver.details['failures']}/{solver.details['datasets']}",
-        "mean error": lambda solver: f"{solver.error:.1e}",
-        "median": lambda solver: f"{solver.details['median_error']:.1e}",
-        "ms/fit": lambda solver: f"{solver.seconds * 1e3:.1f}",
-        "compile s": lambda solver: f"{solver.compile_seconds:.1f}",
+        name: lambda one: one.name,
+        "leaves out": lambda one: one.leaves_out,
+        **errors,
+        unit: lambda one: f"{one.seconds * 1e3:.1f}",
+        "compile s": lambda one: f"{one.compile_seconds:.1f}",
     }
-    advice = f"→ {solvers.recommended} is the fastest of those that failed least"
-    return title, columns, [advice] if solvers.results else []
-
-
-def _intervals(intervals: Comparison) -> tuple[str, _Columns, list[str]]:
-    title = (
-        f"95 % intervals of {_counted(intervals)} of these data sets: share that contains the true value,"
-        " width as a share of the bounds, and time after the fit"
-    )
-    columns: _Columns = {
-        "interval": lambda way: way.name,
-        "leaves out": lambda way: way.leaves_out,
-        "coverage": lambda way: f"{100 * way.details['coverage']:.0f} ± {100 * way.details['doubt']:.0f} %",
-        "width": lambda way: f"{way.details['width']:.1e}",
-        "ms": lambda way: f"{way.seconds * 1e3:.1f}",
-        "compile s": lambda way: f"{way.compile_seconds:.1f}",
-    }
-    best = f"→ {intervals.recommended} is the fastest whose coverage is 95 % within two standard deviations"
-    return title, columns, [best] if intervals.results else []
-
-
-def _omitted(left_out: Mapping[str, str]) -> list[str]:
-    """One paragraph for each reason."""
-    reasons: dict[str, list[str]] = {}
-    for name, why in left_out.items():
-        reasons.setdefault(why, []).append(name)
-    texts = [f"left out: {', '.join(names)}: {why}" for why, names in reasons.items()]
-    return [line for item in texts for line in textwrap.wrap(item, COLUMNS, subsequent_indent="    ")]
+    return title, columns, [f"→ {part.recommended} is the fastest {best}"] if part.results else []
 
 
 _SUMMARY = ("reference", "tolerance", "unit", "recommended", "within")
@@ -175,7 +150,7 @@ _CSV_COLUMNS = (
 )
 
 
-def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
+def to_json(cost: Cost, recipe: str) -> dict[str, Any]:
     """Convert to dictionaries: all methods in one list, `rungs`, each with its `kind`.
 
     Kinds of a film are "forward", "inverse" (a solver) and "interval" (its error is the distance of its
@@ -183,20 +158,19 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
     error). `recommended` names a forward method, or one for colours; `within` says whether it meets the
     tolerance. `brdf` has the same keys for a surface's values. Infinite errors are None.
     """
-    parts = _parts(cost)
+    parts, of_film = cost.parts, cost.values is None
     record = {
         "schema": "pellicle.cost/1",
         "recipe": recipe,
-        **taken(parts[0], *_SUMMARY, *(["wavelengths"] if isinstance(cost, Cost) else ()), "draws"),
+        **taken(parts[0], *_SUMMARY, *(["wavelengths"] if of_film else ()), "draws"),
         "rungs": [{"kind": part.kind, **result.record()} for part in parts for result in part.results],
     }
     left_out = {name: why for part in parts for name, why in part.left_out.items()}
-    if isinstance(cost, Cost):
-        solvers, intervals = cost.solvers, cost.intervals
+    if of_film:
         record |= {
-            "recommended_solver": None if solvers is None else solvers.recommended,
-            "recommended_interval": None if intervals is None else intervals.recommended,
-            "noise": None if solvers is None else solvers.noise,
+            "recommended_solver": getattr(cost.solvers, "recommended", None),
+            "recommended_interval": getattr(cost.intervals, "recommended", None),
+            "noise": getattr(cost.solvers, "noise", None),
             "left_out": left_out,
             "no_fits": cost.no_solvers or None,
         }
@@ -206,7 +180,7 @@ def to_json(cost: Cost | SurfaceCost, recipe: str) -> dict[str, Any]:
     return record | {"interrupted": cost.interrupted, "versions": versions()}
 
 
-def write_cost(folder: str | os.PathLike[str], cost: Cost | SurfaceCost, recipe: str = "scene") -> Path:
+def write_cost(folder: str | os.PathLike[str], cost: Cost, recipe: str = "scene") -> Path:
     """Write result.json, report.txt, cost.csv and cost.png into a folder, each complete or not at all.
 
     Columns of the table that a kind of method lacks are empty. Returns the folder. Raises UsageError where it
@@ -227,9 +201,9 @@ FLOOR = 1e-17
 """Height at which an error of zero is drawn."""
 
 
-def draw(cost: Cost | SurfaceCost, name: str = "scene") -> Figure:
+def draw(cost: Cost, name: str = "scene") -> Figure:
     """Draw error against time: of a film's methods and solvers, or of a surface's colours and values."""
-    parts = [part for part in _parts(cost) if part.kind != "interval" and part.results]
+    parts = [part for part in cost.parts if part.kind != "interval" and part.results]
     return matplotlib_figure.draw([_section(part) for part in parts], name)
 
 

@@ -9,8 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from pellicle.accuracy.cost import Cost
-from pellicle.accuracy.surface import SurfaceCost
+from pellicle.accuracy.registry import Cost
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
 
     from pellicle.mapping.map_result import Map
 
-AnyCost = Cost | SurfaceCost
-
 
 class _Ways(NamedTuple):
     """Functions that report, draw and write a result; None where it has no figure or no files."""
@@ -56,7 +53,6 @@ _WAYS: dict[type, _Ways] = {
     Repeats: _Ways(repeats.report, None, repeats.write_repeats),
     Plan: _Ways(plans.report),
     Cost: _Ways(cost.text, cost.draw, cost.write_cost),
-    SurfaceCost: _Ways(cost.text, cost.draw, cost.write_cost),
     ThicknessMap: _Ways(photograph_map.report, photograph_map.draw, photograph_map.write_map),
 }
 
@@ -78,7 +74,7 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
     return way
 
 
-def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map | ThicknessMap) -> str:
+def report(result: Fit | Posterior | Comparison | Repeats | Plan | Cost | Map | ThicknessMap) -> str:
     """Format a result as plain text.
 
     **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.plan`, `pl.cost`
@@ -98,7 +94,7 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | AnyCost | Map
     return _way(result, "report", "report; fits, posteriors and plans")(result)
 
 
-def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
+def plot(result: Fit | Posterior | Cost | Map | ThicknessMap) -> Figure:
     """Draw a result.
 
     **Arguments:** `result` of `pl.fit` (data, fit, residuals; of films also misfit against thickness, n and
@@ -113,7 +109,7 @@ def plot(result: Fit | Posterior | AnyCost | Map | ThicknessMap) -> Figure:
 
 
 def save(
-    result: Fit | Posterior | Comparison | Repeats | AnyCost | Map | ThicknessMap,
+    result: Fit | Posterior | Comparison | Repeats | Cost | Map | ThicknessMap,
     folder: str | os.PathLike[str],
 ) -> Path:
     """Write a result into a folder, as the command line does: report, JSON record, tables and figures.
@@ -129,7 +125,7 @@ def save(
     return _way(result, "write", "files; fits, posteriors and costs")(folder, result)
 
 
-def html(result: Fit | Posterior | Comparison | Repeats | AnyCost | Map) -> str:
+def html(result: Fit | Posterior | Comparison | Repeats | Cost | Map) -> str:
     """Format a result for a notebook: verdict, a table of free parameters, and the report to unfold."""
     match result:
         case Fit():
