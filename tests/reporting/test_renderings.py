@@ -6,7 +6,7 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.reporting import renderings
-from pellicle.reporting.renderings import balls, bubbles, display, exposure
+from pellicle.reporting.renderings import display, exposure, objects
 from pellicle.simulation.environment import Rendering
 
 PNG = b"\x89PNG"
@@ -30,13 +30,13 @@ def test_the_background_shows_through_what_the_sphere_leaves():
 
 def test_figures_are_written(tmp_path, monkeypatch):
     film = pl.Scene(pl.Layer(1.33, 100.0), 1.0)
-    balls(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", (50.0, 100.0), size=9)
-    bubbles(film, tmp_path / "bubbles.png", (300.0, 100.0), size=9)
+    objects(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", "balls", (50.0, 100.0), size=9)
+    objects(film, tmp_path / "bubbles.png", "bubble", (300.0, 100.0), size=9)
     assert all((tmp_path / name).read_bytes().startswith(PNG) for name in ("balls.png", "bubbles.png"))
     monkeypatch.setattr(renderings, "bubble", lambda *_: pytest.fail("drawn before it is refused"))
     with pytest.raises(UsageError, match="exists"):
-        bubbles(film, tmp_path / "bubbles.png", (300.0,), size=9)
+        objects(film, tmp_path / "bubbles.png", "bubble", (300.0,), size=9)
     with pytest.raises(UsageError, match="there is no folder"):
-        bubbles(film, tmp_path / "nowhere" / "bubbles.png", (300.0,), size=9)
+        objects(film, tmp_path / "nowhere" / "bubbles.png", "bubble", (300.0,), size=9)
     with pytest.raises(UsageError, match=r"\.png"):
-        balls(film, tmp_path / "balls.jpg", (300.0,), size=9)
+        objects(film, tmp_path / "balls.jpg", "balls", (300.0,), size=9)

@@ -133,12 +133,11 @@ def _objects(
                 f"{method.name}: ΔE2000 {method.delta_e.mean():.2g} in the mean,"
                 f" {method.delta_e.max():.2g} at most, {method.seconds * 1e9:.0f} ns a colour"
             )
-    elif view == "bubble":
-        thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
-        renderings.bubbles(scene, out, thicknesses, layer, title, **eye)
     else:
         thicknesses = [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)]
-        renderings.balls(scene, out, thicknesses, layer, title, **eye)
+        if view == "bubble":
+            thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
+        renderings.objects(scene, out, view, thicknesses, layer, title, **eye)
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
     return 0
 

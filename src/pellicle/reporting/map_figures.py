@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,19 +15,20 @@ from pellicle.mapping.map_result import Map
 from pellicle.mapping.pixels.results import CODES, NO_DATA
 from pellicle.reporting.map_panels import (
     COLOURS,
+    DARK,
+    HATCHES,
+    PALE,
     VALUES,
     Sheet,
     colour_bar,
-    errors_panel,
-    hatched,
+    decided_panel,
     histogram_panel,
     limits,
     paint,
-    ratio,
     read,
     status_panel,
+    to_scale,
     unusable,
-    values_panel,
 )
 from pellicle.reporting.map_summary import (
     MapSummary,
@@ -82,8 +83,8 @@ def _draw(sheet: Sheet, variable: str, first: bool = False) -> Figure:
         return _line(sheet, variable)
     figure, panels, _ = _page(sheet, *((2, 2) if first else (1, 3)))
     values, errors, *statuses, histogram = panels.flat
-    values_panel(sheet, values, variable)
-    errors_panel(sheet, errors, variable)
+    decided_panel(sheet, values, variable)
+    decided_panel(sheet, errors, variable, errors=True)
     for panel in statuses:
         status_panel(sheet, panel, sheet.codes(0), legend=True)
     histogram_panel(sheet, histogram, variable)
@@ -96,13 +97,8 @@ def draw_rival(sheet: Sheet) -> Figure:
 
     from pellicle.fitting.status import RIVAL
 
-    figure, ((panel,),), _ = _page(
-        sheet,
-        1,
-        1,
-        hatching=False,
-        remark=f"White: no other answer. Below the line on the scale, Δχ² {RIVAL:g}, an answer is ambiguous.",
-    )
+    remark = f"White: no other answer. Below the line on the scale, Δχ² {RIVAL:g}, an answer is ambiguous."
+    figure, ((panel,),), _ = _page(sheet, 1, 1, hatching=False, remark=remark)
     values = read(sheet, "rival_delta_chi2", 0, sheet.codes(0) != CODES[NO_DATA])
     known = values[np.isfinite(values) & (values > 0)]
     low, high = np.percentile(known, [1, 99]) if known.size else (RIVAL, RIVAL)
@@ -129,8 +125,9 @@ def _page(
     Panels have the shape of the map, so that their scales are equal without empty space; there are `between`
     inches right of all but the last one. `remark` is added to the title.
     """
-    height = min(PANEL * ratio(sheet.axes), tallest)
-    across = float(np.clip(height / ratio(sheet.axes), 1.0, PANEL))
+    ratio = to_scale(sheet.axes) or 0.6
+    height = min(PANEL * ratio, tallest)
+    across = float(np.clip(height / ratio, 1.0, PANEL))
     height = max(height, LEAST)
     width = (_LEFT + across) * columns + between * (columns - 1) + _RIGHT
     width = max(width, 7.5 if wide else 5.5)
@@ -162,8 +159,11 @@ def _page(
 
 def _list_hatching(figure: Figure, words: list[str], columns: int) -> None:
     """Explain the hatching at the bottom of a page."""
+    from matplotlib.patches import Patch
+
+    style: Any = {"facecolor": f"{PALE}", "edgecolor": f"{DARK}", "linewidth": 0}
     figure.legend(
-        handles=hatched(words),
+        handles=[Patch(hatch=HATCHES[word], label=word, **style) for word in words if word in HATCHES],
         title="numbers that should not be used:",
         title_fontsize="small",
         fontsize="small",
@@ -187,12 +187,9 @@ def _title(sheet: Sheet, columns: int, remark: str) -> str:
             f"A point is a block of {sheet.side} x {sheet.side} pixels: the mean of those that can be used,"
             " the most frequent status."
         )
-    lines.append(remark)
-    lines = [re.sub(r" (?==|%|[a-z]*m\b)|(?<==) ", "\u00a0", line) for line in lines]  # numbers stay whole
-    text = "\n".join(
-        part for line in lines if line for part in textwrap.wrap(line, columns, break_on_hyphens=False)
-    )
-    return plain(text)
+    numbers = re.compile(r" (?==|%|[a-z]*m\b)|(?<==) ")  # which stay whole
+    lines = [numbers.sub("\u00a0", line) for line in (*lines, remark)]
+    return plain("\n".join(x for line in lines for x in textwrap.wrap(line, columns, break_on_hyphens=False)))
 
 
 def _series(sheet: Sheet, variable: str) -> Figure:
@@ -229,26 +226,17 @@ def _against_series(sheet: Sheet, panel: Axes, variable: str) -> None:
     mean, low, high = np.full((3, axis.values.size), np.nan)
     mean[some] = np.nanmean(values[some], axis=1)
     low[some], high[some] = np.nanpercentile(values[some], [5, 95], axis=1)
-    panel.fill_between(
-        axis.values, low, high, color=BLUE, alpha=0.25, linewidth=0, label="5 to 95 % of the pixels"
-    )
-    panel.plot(axis.values, mean, ".-", color=BLUE, markersize=4, label="mean")
+    band: dict[str, Any] = {"color": BLUE, "alpha": 0.25, "linewidth": 0, "label": "5 to 95 % of the pixels"}
+    handles = [panel.fill_between(axis.values, low, high, **band)]
+    handles += panel.plot(axis.values, mean, ".-", color=BLUE, markersize=4, label="mean")
     panel.set(xlabel=axis.label, ylabel=sheet.label(variable))
-    panel.spines[["top"]].set_visible(False)
-    beside = panel.twinx()
-    beside.plot(
-        axis.values,
-        100 * used.sum(axis=1) / np.maximum((codes != CODES[NO_DATA]).sum(axis=1), 1),
-        color=ORANGE,
-        linewidth=1.0,
-        label="pixels that can be used (right)",
-    )
+    beside, about = panel.twinx(), "pixels that can be used (right)"
+    share = 100 * used.sum(axis=1) / np.maximum((codes != CODES[NO_DATA]).sum(axis=1), 1)
+    handles += beside.plot(axis.values, share, color=ORANGE, linewidth=1.0, label=about)
     beside.set(ylabel="share (%)", ylim=(0, 105))
-    beside.spines[["top"]].set_visible(False)
-    handles, labels = (
-        a + b for a, b in zip(*(own.get_legend_handles_labels() for own in (panel, beside)), strict=True)
-    )
-    panel.legend(handles, labels, ncols=3, fontsize="small", **ABOVE)
+    for own in (panel, beside):
+        own.spines[["top"]].set_visible(False)
+    panel.legend(handles=handles, ncols=3, fontsize="small", **ABOVE)
 
 
 def _line(sheet: Sheet, variable: str) -> Figure:
@@ -258,16 +246,9 @@ def _line(sheet: Sheet, variable: str) -> Figure:
     values = np.asarray(sheet.frame(variable, 0), dtype=float)
     stderr = np.asarray(sheet.frame(f"{variable}_stderr", 0), dtype=float)
     used = is_decided(codes)
-    panel.errorbar(
-        x[used],
-        values[used],
-        np.where(np.isfinite(stderr[used]), stderr[used], 0.0),
-        fmt=".",
-        color=BLUE,
-        markersize=marker_size(x.size),
-        elinewidth=0.8,
-        label="value and standard error",
-    )
+    errors = np.where(np.isfinite(stderr[used]), stderr[used], 0.0)
+    style: dict[str, Any] = {"fmt": ".", "color": BLUE, "markersize": marker_size(x.size), "elinewidth": 0.8}
+    panel.errorbar(x[used], values[used], errors, label="value and standard error", **style)
     if used.any():  # bad values must not set the limits
         panel.set_ylim(panel.get_ylim())
     for word in unusable(codes):

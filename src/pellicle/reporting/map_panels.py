@@ -5,7 +5,6 @@ Pixels of a large map are drawn in blocks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,11 +15,10 @@ from pellicle.reporting.drawable import labelled
 from pellicle.reporting.map_places import MapAxes
 from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of
 from pellicle.reporting.map_text import share
-from pellicle.reporting.matplotlib_figure import BLACK, BLUE, GREY, plain
+from pellicle.reporting.matplotlib_figure import ABOVE, BLACK, BLUE, GREY, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.patches import Patch
     from xarray import DataArray, Dataset
 
 VALUES, ERRORS = "viridis", "cividis"
@@ -93,12 +91,7 @@ class Sheet:
         return of + labelled(name, unit_of(self.data, variable))
 
 
-def ratio(axes: MapAxes) -> float:
-    """Height of an image divided by its width: at equal scales, or 0.6 where these would not be readable."""
-    return _to_scale(axes) or 0.6
-
-
-def _to_scale(axes: MapAxes) -> float | None:
+def to_scale(axes: MapAxes) -> float | None:
     """Ratio of height to width at equal scales, None for different units and for very flat images."""
     if axes.y is None or axes.y.unit != axes.x.unit:
         return None
@@ -126,20 +119,12 @@ def overlay(codes: np.ndarray) -> np.ndarray:
     return image
 
 
-def hatched(words: Sequence[str]) -> list[Patch]:
-    """Entries of a legend for the hatching of these statuses."""
-    from matplotlib.patches import Patch
-
-    style: Any = {"facecolor": f"{PALE}", "edgecolor": f"{DARK}", "linewidth": 0}
-    return [Patch(hatch=HATCHES[word], label=word, **style) for word in words if word in HATCHES]
-
-
 def label_axes(panel: Axes, axes: MapAxes) -> None:
     """Name the axes of an image, with equal scales where both have one unit."""
     panel.set_xlabel(plain(axes.x.label))
     assert axes.y is not None
     panel.set_ylabel(plain(axes.y.label))
-    if _to_scale(axes):
+    if to_scale(axes):
         panel.set_aspect("equal", anchor="NW")
     if axes.kind == "image":
         panel.set_xlim(*sorted(axes.x.edges()[[0, -1]]))
@@ -166,29 +151,19 @@ def read(sheet: Sheet, variable: str, frame: int, used: np.ndarray) -> np.ndarra
     return np.where(used, np.asarray(array, dtype=float), np.nan)
 
 
-def values_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
-    """Draw the decided values of a variable, with their colour bar."""
-    codes = sheet.codes(0)
-    values = read(sheet, variable, 0, is_decided(codes))
-    low, high, extend = limits(values)
-    drawn = paint(sheet, panel, values, codes, VALUES, vmin=low, vmax=high)
-    colour_bar(panel, drawn, sheet.label(variable), extend)
-
-
-def errors_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
-    """Draw the standard errors of a variable, on a logarithmic scale where they differ much."""
+def decided_panel(sheet: Sheet, panel: Axes, variable: str, errors: bool = False) -> None:
+    """Draw the decided values of a variable with their colour bar, or their standard `errors`, these on a
+    logarithmic scale where they differ much."""
     from matplotlib.colors import LogNorm
 
     codes = sheet.codes(0)
-    values = read(sheet, f"{variable}_stderr", 0, is_decided(codes))
+    values = read(sheet, f"{variable}_stderr" if errors else variable, 0, is_decided(codes))
     low, high, extend = limits(values)
-    known = values[values > 0]
-    style: dict[str, Any] = {"vmin": low, "vmax": high}
-    if known.size and np.percentile(known, 98) > WIDE * np.percentile(known, 2):
-        low, high = np.percentile(known, [1, 99])
-        style, extend = {"norm": LogNorm(low, high)}, "both"
-    drawn = paint(sheet, panel, values, codes, ERRORS, **style)
-    colour_bar(panel, drawn, sheet.label(variable, "standard error of "), extend)
+    known, style = values[values > 0], {"vmin": low, "vmax": high}
+    if errors and known.size and np.percentile(known, 98) > WIDE * np.percentile(known, 2):
+        style, extend = {"norm": LogNorm(*np.percentile(known, [1, 99]))}, "both"
+    drawn = paint(sheet, panel, values, codes, ERRORS if errors else VALUES, **style)
+    colour_bar(panel, drawn, sheet.label(variable, "standard error of " * errors), extend)
 
 
 def paint(
@@ -196,41 +171,27 @@ def paint(
 ) -> Any:
     """Draw values in colours and hatch what should not be used; return what a colour bar needs."""
     axes = sheet.axes
-    if axes.kind == "sites":
-        drawn = _circles(sheet, panel, values, codes, cmap, style)
-    else:
-        assert axes.y is not None
-        (left, *_, right), (top, *_, bottom) = axes.x.edges().tolist(), axes.y.edges().tolist()
-        place: dict[str, Any] = {
-            "extent": (left, right, bottom, top),  # the first row is drawn first
-            "aspect": "auto",
-            "interpolation": "nearest",
-            "origin": "upper",
-        }
-        drawn = panel.imshow(evenly(values, axes, sheet.side), cmap=cmap, **place, **style)
-        if codes is not None:
-            reduced = block_codes(codes, sheet.side)
-            layer = overlay(evenly(reduced, axes, sheet.side))
-            panel.imshow(layer, **{**place, "interpolation": "antialiased"})
-    label_axes(panel, axes)
-    return drawn
-
-
-def _circles(
-    sheet: Sheet, panel: Axes, values: np.ndarray, codes: np.ndarray | None, cmap: Any, style: dict[str, Any]
-) -> Any:
-    """Filled circles at the sites, nothing between them."""
-    assert sheet.axes.y is not None
-    x, y = sheet.axes.x.values, sheet.axes.y.values
-    area = SPOT * float(np.clip(60 / x.size, 0.05, 1.5))
-    known = np.isfinite(values)
-    if codes is not None:
-        for word in unusable(codes):
+    assert axes.y is not None
+    if axes.kind == "sites":  # filled circles, nothing between them
+        x, y, known = axes.x.values, axes.y.values, np.isfinite(values)
+        area = SPOT * float(np.clip(60 / x.size, 0.05, 1.5))
+        for word in unusable(codes) if codes is not None else ():
             own = codes == CODES[word]
             panel.scatter(x[own], y[own], area, facecolor="0.88", edgecolor="0.55", hatch=2 * HATCHES[word])
-    edge: dict[str, Any] = {"edgecolor": GREY, "linewidth": 0.3}
-    panel.margins(0.08)
-    return panel.scatter(x[known], y[known], area, c=values[known], cmap=cmap, **edge, **style)
+        panel.margins(0.08)
+        style |= {"cmap": cmap, "edgecolor": GREY, "linewidth": 0.3}
+        drawn = panel.scatter(x[known], y[known], area, c=values[known], **style)
+    else:
+        (left, *_, right), (top, *_, bottom) = axes.x.edges().tolist(), axes.y.edges().tolist()
+        extent = (left, right, bottom, top)  # the first row is drawn first
+        place: dict[str, Any] = {"extent": extent, "aspect": "auto", "origin": "upper"}
+        shown = evenly(values, axes, sheet.side)
+        drawn = panel.imshow(shown, cmap=cmap, interpolation="nearest", **place, **style)
+        if codes is not None:
+            layer = overlay(evenly(block_codes(codes, sheet.side), axes, sheet.side))
+            panel.imshow(layer, interpolation="antialiased", **place)
+    label_axes(panel, axes)
+    return drawn
 
 
 def colour_bar(panel: Axes, drawn: Any, label: str, extend: str) -> Any:
@@ -284,11 +245,8 @@ def histogram_panel(sheet: Sheet, panel: Axes, variable: str) -> None:
     q05, middle, q95 = np.percentile(values, [5, 50, 95])
     panel.axvline(middle, color=BLACK, linewidth=1.2, label="median")
     panel.axvspan(q05, q95, color=GREY, alpha=0.18, linewidth=0, zorder=0, label="5 to 95 %")
-    panel.legend(
-        frameon=False, fontsize="small", loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.1
-    )
-    outside = int(np.sum((values < low) | (values > high)))
-    if outside:
+    panel.legend(fontsize="small", **ABOVE | {"ncols": 2, "borderaxespad": 0.1})
+    if np.any((values < low) | (values > high)):
         panel.set_xlabel(f"{sheet.label(variable)}\n(the outermost bars contain all beyond them)")
 
 
@@ -300,18 +258,9 @@ SLAB = 2**22
 
 def block_codes(codes: np.ndarray, side: int) -> np.ndarray:
     """Most frequent status of each block of an image."""
-    if side == 1:
-        return codes
-    commonest, most = None, None
-    for code in np.unique(codes):
-        count = _sums((codes == code).astype(np.int32), side)
-        if commonest is None or most is None:
-            commonest, most = np.full(count.shape, code, codes.dtype), count
-            continue
-        commonest[count > most] = code
-        most = np.maximum(most, count)
-    assert commonest is not None
-    return commonest
+    known = np.unique(codes)
+    counts = [_sums((codes == code).astype(np.int32), side) for code in known]
+    return known[np.argmax(counts, axis=0)]
 
 
 def block_means(array: Any, used: np.ndarray, side: int) -> np.ndarray:

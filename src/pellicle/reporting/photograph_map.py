@@ -48,7 +48,7 @@ def to_json(made: ThicknessMap) -> dict[str, Any]:
     """Convert to a dictionary: a summary, and for a strip the most probable thickness at each position."""
     names, counts = np.unique(made.found.status, return_counts=True)
     best = made.found.thickness[..., 0]
-    record: dict[str, Any] = {
+    record = {
         "schema": SCHEMA,
         "data": {"path": made.path, "sha256": made.sha256, "signal": made.space, "points": best.size},
         "strip" if made.position is not None else "region": made.where,
@@ -82,11 +82,6 @@ def to_csv(made: ThicknessMap) -> str:
     return csv_rows(_HEADER, rows)
 
 
-def draw(made: ThicknessMap, name: str = "") -> Figure:
-    """Draw a strip with every admissible thickness, or a map with its probability."""
-    return _strip(made, name) if made.position is not None else _region(made, name)
-
-
 def write_map(folder: str | os.PathLike[str], made: ThicknessMap) -> Path:
     """Write result.json, report.txt, map.png, and strip.csv or arrays (.npy, nm), each complete or not.
 
@@ -104,46 +99,31 @@ def write_map(folder: str | os.PathLike[str], made: ThicknessMap) -> Path:
     return target
 
 
-def _strip(made: ThicknessMap, name: str) -> Figure:
-    figure = new_figure(7.0, 4.6)
+def draw(made: ThicknessMap, name: str = "") -> Figure:
+    """Draw a strip with every admissible thickness, or a map with its probability."""
+    if made.position is None:
+        return _region(made, name)
+    figure, position, films = new_figure(7.0, 4.6), made.position, made.found
     shown, axes = figure.subplots(2, 1, sharex=True, height_ratios=[1, 4])
-    position = made.position
-    assert position is not None
     extent = (position[0] - 0.5, position[-1] + 0.5, 1.5, -0.5)
-    shown.imshow(
-        np.clip(np.stack([made.colours, made.fitted]), 0, 1),
-        aspect="auto",
-        interpolation="nearest",
-        extent=extent,
-    )
+    patches = np.clip(np.stack([made.colours, made.fitted]), 0, 1)
+    shown.imshow(patches, aspect="auto", interpolation="nearest", extent=extent)
     shown.set_yticks([0, 1], ["data", "fit"])
     shown.tick_params(length=0)
     shown.set_title(plain(name))
-    films = made.found
-    for order in range(films.thickness.shape[1] - 1, -1, -1):
-        probability = np.nan_to_num(films.probability[:, order])
-        seen = probability >= LEAST
+    for order in reversed(range(films.thickness.shape[1])):
+        seen = np.nan_to_num(films.probability[:, order]) >= LEAST
         if not seen.any():
             continue
-        colour, label = (
-            (BLUE, "most probable") if order == 0 else (GREY, "other orders" if order == 1 else None)
-        )
-        axes.errorbar(
-            position[seen],
-            films.thickness[seen, order],
-            films.stderr[seen, order],
-            fmt=".",
-            color=colour,
-            alpha=1.0 if order == 0 else 0.5,
-            markersize=3,
-            elinewidth=0.6,
-            label=label,
-        )
-    misfit = films.status == "misfit"
-    if misfit.any():
-        axes.plot(
-            position[misfit], films.thickness[misfit, 0], "x", color=ORANGE, markersize=4, label="misfit"
-        )
+        style: dict[str, Any] = {"color": GREY, "alpha": 0.5, "label": "other orders" if order == 1 else None}
+        if order == 0:
+            style = {"color": BLUE, "label": "most probable"}
+        errors = films.stderr[seen, order]
+        style |= {"fmt": ".", "markersize": 3, "elinewidth": 0.6}
+        axes.errorbar(position[seen], films.thickness[seen, order], errors, **style)
+    if (misfit := films.status == "misfit").any():
+        marked = position[misfit], films.thickness[misfit, 0]
+        axes.plot(*marked, "x", color=ORANGE, markersize=4, label="misfit")
     axes.set(xlabel="position along the strip (pixels)", ylabel="thickness (nm)")
     axes.legend(frameon=False, fontsize="small")
     return figure
@@ -156,12 +136,11 @@ def _region(made: ThicknessMap, name: str) -> Figure:
     panels[0].imshow(np.clip(made.colours, 0, 1), interpolation="nearest")
     panels[0].set_title(plain(name))
     parts = (
-        ("thickness (nm)", made.found.thickness, "viridis"),
-        ("probability", made.found.probability, "cividis"),
+        ("thickness (nm)", made.found.thickness, {"cmap": "viridis"}),
+        ("probability", made.found.probability, {"cmap": "cividis", "vmin": 0, "vmax": 1}),
     )
-    for axes, (label, values, colours) in zip(panels[1:], parts, strict=True):
-        limits = {"vmin": 0, "vmax": 1} if label == "probability" else {}
-        image = axes.imshow(values[..., 0], cmap=colours, interpolation="nearest", **limits)
+    for axes, (label, values, style) in zip(panels[1:], parts, strict=True):
+        image = axes.imshow(values[..., 0], interpolation="nearest", **style)
         axes.set_title(label)
         figure.colorbar(image, ax=axes, shrink=0.8)
     for axes in panels:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -23,7 +22,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 from pellicle.simulation.environment import EYE, Environment, Rendering, Sphere, light_tent, one_lamp, studio
 from pellicle.simulation.environment import sphere as sphere_pixels
-from pellicle.simulation.film_sphere import ball, bubble, stack
+from pellicle.simulation.film_sphere import Stack, ball, bubble, stack
 from pellicle.simulation.surface_sphere import in_plane, render
 
 if TYPE_CHECKING:
@@ -120,8 +119,8 @@ def _draw_lobe(axes: Axes, angle: float, values: np.ndarray, surface: Surface) -
     if surface.sensor is None:
         names = [f"{nm:g} nm" for nm in surface.bands.wavelength]
     colours = _CHANNELS if count == 3 else [f"C{k}" for k in range(count)]
-    for channel, (colour, label) in enumerate(zip(colours, names, strict=True)):
-        axes.plot(np.deg2rad(LEAVING), values[:, channel], color=colour, linewidth=1.2, label=label)
+    for lobe, colour, label in zip(values.T, colours, names, strict=True):
+        axes.plot(np.deg2rad(LEAVING), lobe, color=colour, linewidth=1.2, label=label)
     axes.axvline(np.deg2rad(-angle), color="#777777", linestyle=":", linewidth=1.0)
     axes.set(theta_zero_location="N", theta_direction=-1, thetamin=-90, thetamax=90)
     axes.set_xticks(np.deg2rad([-90, -45, 0, 45, 90]))
@@ -129,14 +128,14 @@ def _draw_lobe(axes: Axes, angle: float, values: np.ndarray, surface: Surface) -
     axes.yaxis.set_major_locator(MaxNLocator(2))
     axes.set_title(f"light at {angle:g}°, BRDF in 1/sr", fontsize="x-small")
     if angle == INCIDENCES[-1]:
-        axes.legend(
-            fontsize="xx-small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, 0.1), ncols=3
-        )
+        below: Any = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.1), "ncols": 3}
+        axes.legend(fontsize="xx-small", frameon=False, **below)
 
 
-def balls(
+def objects(
     scene: Scene,
     path: str | os.PathLike[str],
+    view: str,
     thickness: Sequence[float],
     layer: str | None = None,
     title: str = "",
@@ -145,71 +144,55 @@ def balls(
     observer: str = "1931",
     size: int = SMALL,
 ) -> None:
-    """Draw balls of the substrate under films of several thicknesses (nm) into `path`.
+    """Draw balls of the substrate under films of several thicknesses (nm), or stages of a bubble that drains,
+    by the thickness of the film at its top, into `path`.
 
     A ball that does not absorb is shown in reflection, seen through, and as both together; others in
-    reflection. `layer`, `illuminant` and `observer` are those of `interference_colours`.
-
-    **Raises:** UsageError as `stack` does, for another file type, and where the file exists.
-    """
-    target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
-    surroundings = studio()
-    renderings = [ball(films, nm, surroundings, size) for nm in thickness]
-    factor = exposure(*(each.whole for each in renderings), percentile=LAMP_PERCENTILE)
-    behind = _background(surroundings, factor)
-    rows = {"in reflection": [display(each.reflected, factor, DARK) for each in renderings]}
-    through = [each.transmitted for each in renderings if each.transmitted is not None]
-    if through:
-        rows["seen through"] = [display(each, factor, behind) for each in through]
-        rows["together"] = [display(each.whole, factor, behind) for each in renderings]
-    names = [f"{nm:g} nm" for nm in thickness]
-    _save_grid(target, rows, names, title, f"{illuminant}, studio; exposure × {factor:g}")
-
-
-def bubbles(
-    scene: Scene,
-    path: str | os.PathLike[str],
-    thickness: Sequence[float],
-    layer: str | None = None,
-    title: str = "",
-    *,
-    illuminant: str = "D65",
-    observer: str = "1931",
-    size: int = SMALL,
-) -> None:
-    """Draw stages of a bubble that drains, by the thickness of the film at its top (nm), into `path`.
+    reflection. `view` is "balls" or "bubble"; `layer`, `illuminant` and `observer` are those of
+    `interference_colours`.
 
     **Raises:** UsageError as `stack` and `bubble` do, for another file type, and where the file exists.
     """
     target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
-    tent = light_tent()
-    renderings = [bubble(films, top, tent, size) for top in thickness]
-    factor = exposure(*renderings)
-    rows = {"": [display(each, factor, _background(tent, factor)) for each in renderings]}
-    names = [f"{float(f'{top:.3g}'):g} nm at the top" for top in thickness]
-    _save_grid(target, rows, names, title, f"{illuminant}, light tent; exposure × {factor:g}")
-
-
-def _background(surroundings: Environment, factor: float) -> float:
-    """sRGB value of what lies behind the sphere: all lines of sight are parallel, so it is one grey."""
-    return float(encode(np.full(3, factor * surroundings.radiance(-EYE)))[0])
-
-
-def _save_grid(
-    path: Path, rows: dict[str, list[np.ndarray]], names: list[str], title: str, note: str
-) -> None:
-    """Write rows of renderings under the names of the columns."""
-    count = len(names)
-    figure = new_figure(0.3 + 1.9 * count, 0.6 + 1.95 * len(rows))
-    panels = figure.subplots(len(rows), count, squeeze=False)
+    rows, factor = (_balls if view == "balls" else _stages)(films, thickness, size)
+    names = [f"{nm:g} nm" if view == "balls" else f"{float(f'{nm:.3g}'):g} nm at the top" for nm in thickness]
+    figure = new_figure(0.3 + 1.9 * len(names), 0.6 + 1.95 * len(rows))
+    panels = figure.subplots(len(rows), len(names), squeeze=False)
     for row, (word, images) in zip(panels, rows.items(), strict=True):
         for axes, image in zip(row, images, strict=True):
             _show(axes, image)
         row[0].set_ylabel(word, fontsize="small")
     for axes, name in zip(panels[0], names, strict=True):
         axes.set_title(name, fontsize="small")
-    _describe(figure, title, note)
-    save_figure(figure, path, dpi=DPI)
+    place = "studio" if view == "balls" else "light tent"
+    _describe(figure, title, f"{illuminant}, {place}; exposure × {factor:g}")
+    save_figure(figure, target, dpi=DPI)
+
+
+def _balls(films: Stack, thickness: Sequence[float], size: int) -> tuple[dict[str, list[np.ndarray]], float]:
+    """Rows of balls in a studio by their names, and their exposure."""
+    place = studio()
+    balls = [ball(films, nm, place, size) for nm in thickness]
+    factor = exposure(*(each.whole for each in balls), percentile=LAMP_PERCENTILE)
+    rows = {"in reflection": [display(each.reflected, factor, DARK) for each in balls]}
+    through = [each.transmitted for each in balls if each.transmitted is not None]
+    if through:
+        rows["seen through"] = [display(each, factor, _behind(place, factor)) for each in through]
+        rows["together"] = [display(each.whole, factor, _behind(place, factor)) for each in balls]
+    return rows, factor
+
+
+def _stages(films: Stack, thickness: Sequence[float], size: int) -> tuple[dict[str, list[np.ndarray]], float]:
+    """The row of stages of a bubble in a light tent, and their exposure."""
+    place = light_tent()
+    stages = [bubble(films, top, place, size) for top in thickness]
+    factor = exposure(*stages)
+    return {"": [display(each, factor, _behind(place, factor)) for each in stages]}, factor
+
+
+def _behind(surroundings: Environment, factor: float) -> float:
+    """sRGB value of what lies behind the sphere: all lines of sight are parallel, so it is one grey."""
+    return float(encode(np.full(3, factor * surroundings.radiance(-EYE)))[0])
 
 
 def _describe(figure: Figure, title: str, note: str) -> None:
@@ -284,19 +267,15 @@ def _draw_method(
 ) -> None:
     """The ball by one method, its time, and below it the ΔE2000 of each pixel."""
     linear = np.asarray(linear_srgb(colours.xyz, sensor(*OBSERVER).white))
-    ball_of_film = display(pixels.rendering(_over(pixels, linear)), factor, DARK)
-    above.imshow(ball_of_film, interpolation="antialiased")
-    seconds = colours.seconds
+    shown = display(pixels.rendering(_over(pixels, linear)), factor, DARK)
+    above.imshow(shown, interpolation="antialiased")
+    seconds, delta_e = colours.seconds, colours.delta_e
     time = f"{seconds * 1e9:.0f} ns" if seconds < 1e-6 else f"{seconds * 1e6:.1f} µs"
     above.set_title(f"{colours.name}\n{time} a colour", fontsize="small")
     error = np.full(pixels.mask.shape, np.nan)
-    of_pixels = _over(pixels, colours.delta_e[..., None])[:, 0]
-    error[pixels.mask] = np.where(pixels.share > 0.5, of_pixels, np.nan)
+    error[pixels.mask] = np.where(pixels.share > 0.5, _over(pixels, delta_e[..., None])[:, 0], np.nan)
     below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
-    mean, largest = (
-        f"{size:.2g}" if size >= 1e-3 else "below 0.001"
-        for size in (np.mean(colours.delta_e), np.max(colours.delta_e))
-    )
+    mean, largest = (f"{x:.2g}" if x >= 1e-3 else "below 0.001" for x in (delta_e.mean(), delta_e.max()))
     words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
     below.set_title(words, fontsize="small")
 
