@@ -17,10 +17,9 @@ from pellicle.mapping.pixels.results import CODES
 from pellicle.recipes.read import read_recipe
 from pellicle.reporting.comparison import comparison_page
 from pellicle.reporting.json_record import failure, to_json
-from pellicle.reporting.map_files import map_page
+from pellicle.reporting.map_figures import map_page
 from pellicle.reporting.map_summary import summarise
-from pellicle.reporting.page.batch_page import batch_page
-from pellicle.reporting.page.fit_page import fit_page
+from pellicle.reporting.page.fit_pages import batch_page, fit_page
 from pellicle.reporting.page.repetition import repetition
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free

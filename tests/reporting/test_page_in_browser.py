@@ -11,7 +11,7 @@ import pytest
 from pellicle.fitting.result import Profile
 from pellicle.reporting.folders import write_fit, write_index
 from pellicle.reporting.json_record import failure, to_json
-from pellicle.reporting.page.fit_page import fit_page
+from pellicle.reporting.page.fit_pages import fit_page
 from tests.browser import pages, wait_for
 
 IMAGE = b"\x89PNG\r\n"

@@ -134,7 +134,7 @@ def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any
 def _write(folder: Path, made: Map) -> None:
     from pellicle.files import replacing
     from pellicle.mapping.growth import TIME
-    from pellicle.reporting.map_files import write_cube_map
+    from pellicle.reporting.map_figures import write_cube_map
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
     write_cube_map(folder, made)

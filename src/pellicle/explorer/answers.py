@@ -2,12 +2,10 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache
-from io import BytesIO
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from PIL import Image
 
 from pellicle.colour import lab, sensor
 from pellicle.colour.spaces import srgb_matrix
@@ -18,7 +16,9 @@ from pellicle.fitting.curves import Curve as FittedCurve
 from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
 from pellicle.reporting import fit_text
-from pellicle.reporting.renderings import display, encode, exposure
+from pellicle.reporting.json_record import taken
+from pellicle.reporting.plotly_figure import numbers
+from pellicle.reporting.renderings import display, encode, exposure, png
 from pellicle.signals.base import Quantity
 from pellicle.simulation.environment import Sphere, sphere, studio
 
@@ -28,22 +28,11 @@ BACKGROUND = 0.06
 """sRGB value around the ball."""
 
 
-class _Lookup(NamedTuple):
-    """Pixels of a ball, the rows of the table of colours around each, and the radiance that each mirrors."""
-
-    pixels: Sphere
-    row: np.ndarray
-    share: np.ndarray
-    seen: np.ndarray
-
-
 @cache
-def _lookup(size: int) -> _Lookup:
+def _lit(size: int) -> tuple[Sphere, np.ndarray]:
+    """Pixels of a ball, and the radiance (pixels, 1) that each mirrors."""
     pixels = sphere(size)
-    position = np.clip(pixels.cosine * COSINES - 1, 0.0, COSINES - 1.0)
-    row = np.minimum(position.astype(int), COSINES - 2)
-    seen = studio().radiance(pixels.mirrored())[:, None]
-    return _Lookup(pixels, row, (position - row)[:, None], seen)
+    return pixels, studio().radiance(pixels.mirrored())[:, None]
 
 
 def to_linear_srgb(xyz: np.ndarray) -> np.ndarray:
@@ -53,19 +42,10 @@ def to_linear_srgb(xyz: np.ndarray) -> np.ndarray:
 
 def ball_rendering(xyz: np.ndarray, size: int) -> bytes:
     """Draw a ball that reflects the XYZ (`COSINES`, 3) of a film as a PNG of `size` × `size` pixels."""
-    table, lookup = to_linear_srgb(xyz), _lookup(size)
-    colour = (1 - lookup.share) * table[lookup.row] + lookup.share * table[lookup.row + 1]
-    rendering = lookup.pixels.rendering(colour * lookup.seen)
+    pixels, seen = _lit(size)
+    colour = pixels.interpolated(np.arange(1, COSINES + 1) / COSINES, to_linear_srgb(xyz))
+    rendering = pixels.rendering(colour * seen)
     return png(display(rendering, exposure(rendering, percentile=WHITE_PERCENTILE), BACKGROUND))
-
-
-def png(image: np.ndarray) -> bytes:
-    """Encode sRGB values (rows, columns, 3), 0 to 1, as a PNG."""
-    buffer = BytesIO()
-    Image.fromarray(np.rint(255 * np.clip(image, 0.0, 1.0)).astype(np.uint8)).save(
-        buffer, "PNG", compress_level=1
-    )
-    return buffer.getvalue()
 
 
 _ORDINATES = {"Ψ": "Ψ (°)", "Δ": "Δ (°)", "R": "R (fraction)", "T": "T (fraction)"}
@@ -90,14 +70,11 @@ def plan_to_json(plan: Plan) -> list[dict[str, Any]]:
 
 def curve_to_json(curve: Curve) -> dict[str, Any]:
     """Convert a curve; 7 digits are more than a plot shows, None is a point without a value."""
-    y = [float(f"{v:.7g}") if isfinite(v) else None for v in np.asarray(curve.y, float).tolist()]
     return {
-        "label": curve.label,
-        "signal": curve.signal,
-        "setting": curve.setting,
+        **taken(curve, "label", "signal", "setting"),
         "ordinate": _ORDINATES.get(curve.signal),
-        "x": [float(f"{v:.7g}") for v in np.asarray(curve.x, float).tolist()],
-        "y": y,
+        "x": numbers(curve.x, 7),
+        "y": numbers(curve.y, 7),
     }
 
 
@@ -110,10 +87,7 @@ def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str
         }
         for own in xyz.reshape(-1, 3)
     ]
-    words = [
-        ", ".join(f"{n} {x:.1f}" for n, x in zip(("L*", "a*", "b*"), own["lab"], strict=True))
-        for own in colours
-    ]
+    words = ["L* {:.1f}, a* {:.1f}, b* {:.1f}".format(*own["lab"]) for own in colours]
     text = f"{colours[0]['hex']}: {light} under D65: {words[0]}"
     if len(colours) > 1:
         rows = zip(angles.tolist(), colours, words, strict=True)
@@ -147,14 +121,11 @@ def data_curves(spectra: Sequence[Spectrum], against_angle: bool = False) -> lis
     Of more than `MOST` angles some are left out. With `against_angle` there is one curve against the angle,
     and spectra at several wavelengths have none.
     """
-    every = measured_angles(spectra)
-    return [
-        curve
-        for spectrum in spectra
-        for curve in _curves(
-            spectrum, {q.symbol: q.measured(spectrum) for q in _drawn(spectrum)}, every, against_angle
-        )
-    ]
+    every, curves = measured_angles(spectra), []
+    for spectrum in spectra:
+        columns = {q.symbol: q.measured(spectrum) for q in _drawn(spectrum)}
+        curves += _curves(spectrum, columns, every, against_angle)
+    return curves
 
 
 def fitted_curves(fit: Fit, against_angle: bool = False) -> list[Curve]:

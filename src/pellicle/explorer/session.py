@@ -30,9 +30,8 @@ from pellicle.explorer.answers import (
 )
 from pellicle.explorer.background import NOW, SOON, Compiler, FitRun
 from pellicle.explorer.controls import fitted_names, scene_with, with_value
-from pellicle.explorer.film_view import FilmView
 from pellicle.explorer.programs import ANGLE, asked_angles, measured_angles
-from pellicle.explorer.surface_view import SurfaceExplorerView
+from pellicle.explorer.views import FilmView, SurfaceExplorerView
 from pellicle.recipes.python_text import python_program
 from pellicle.recipes.write import recipe_text
 from pellicle.scene.film import Scene

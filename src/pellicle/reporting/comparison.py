@@ -14,7 +14,7 @@ from pellicle.reporting.folders import PAGE, REPORT, folder_per_file, write_fit
 from pellicle.reporting.json_record import taken, versions, write_result
 from pellicle.reporting.json_record import to_json as fit_to_json
 from pellicle.reporting.page.document import page
-from pellicle.reporting.page.fit_page import MOST_FIGURES, TONES
+from pellicle.reporting.page.fit_pages import MOST_FIGURES, TONES
 from pellicle.reporting.plain_text import INDENT, block, table, wrapped
 
 SCHEMA = "pellicle.compare/1"

@@ -1,7 +1,7 @@
 """Drawable description of a result: panels of lines and bands, and tables, with their units.
 
-`data_panels.py` and `fit_panels.py` build it from results; `matplotlib_figure.py`,
-`plotly_figure.py` and `plain_text.py` render it.
+`data_panels.py` and `figures.py` build it from results; `matplotlib_figure.py`, `plotly_figure.py` and
+`plain_text.py` render it.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def write_fit(
     from pellicle.reporting.figures import draw_fit
     from pellicle.reporting.fit_tables import fit_csv, nk_csvs, profile_csv
     from pellicle.reporting.fit_text import report
-    from pellicle.reporting.page.fit_page import fit_page
+    from pellicle.reporting.page.fit_pages import fit_page
     from pellicle.reporting.page.repetition import repetition
 
     record = to_json(fit, posterior)
@@ -173,7 +173,7 @@ def write_index(
     `records` are JSON records of fits and failures, as many as there are `folders` or fewer; `repeats` is
     their scatter where they are repeated measurements. Raises as `write_summary` does.
     """
-    from pellicle.reporting.page.batch_page import batch_page
+    from pellicle.reporting.page.fit_pages import batch_page
 
     target = new_folder(folder)
     places = [None if own is None else Path(own) / PAGE for own in folders[: len(records)]]

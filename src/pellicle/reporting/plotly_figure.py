@@ -92,9 +92,9 @@ def thinning(count: int) -> int:
     return -(-count // MOST_POINTS) or 1
 
 
-def numbers(values: Iterable[Any]) -> list[float | None]:
-    """Numbers of six digits, None for those that are absent or not finite."""
-    return [None if x is None or not np.isfinite(x) else float(f"{x:.6g}") for x in values]
+def numbers(values: Iterable[Any], digits: int = 6) -> list[float | None]:
+    """Numbers of so many digits, None for those that are absent or not finite."""
+    return [None if x is None or not np.isfinite(x) else float(f"{x:.{digits}g}") for x in values]
 
 
 def _numbered(word: str, number: int) -> str:

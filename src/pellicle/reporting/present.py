@@ -63,11 +63,10 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
     # the module of a cube's map needs an optional package: no import, no such object
     module = sys.modules.get("pellicle.mapping.map_result")
     if module is not None and isinstance(result, module.Map):
-        from pellicle.reporting import map_figures, map_files, map_text
+        from pellicle.reporting import map_figures as maps
+        from pellicle.reporting.map_text import cube_report
 
-        ways = _Ways(
-            map_text.cube_report, lambda made: next(map_figures.figures(made))[1], map_files.write_cube_map
-        )
+        ways = _Ways(cube_report, lambda made: next(maps.figures(made))[1], maps.write_cube_map)
     way = None if ways is None else getattr(ways, name)
     if way is None:
         raise TypeError(f"a {type(result).__name__} has no {wanted} have")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import jax
@@ -59,6 +60,15 @@ def display(rendering: Rendering, factor: float | None = None, background: float
 def encode(linear: np.ndarray) -> np.ndarray:
     """Convert linear sRGB (..., 3) to display values, colours outside as `into_srgb` says."""
     return np.asarray(_srgb(into_srgb(linear)))
+
+
+def png(image: np.ndarray) -> bytes:
+    """Encode sRGB values (rows, columns, 3), 0 to 1, as a PNG."""
+    from PIL import Image  # a requirement of Matplotlib
+
+    buffer, pixels = BytesIO(), np.rint(255 * np.clip(image, 0.0, 1.0)).astype(np.uint8)
+    Image.fromarray(pixels).save(buffer, "PNG", compress_level=1)
+    return buffer.getvalue()
 
 
 INCIDENCES = (15.0, 45.0, 70.0)

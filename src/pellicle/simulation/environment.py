@@ -162,6 +162,10 @@ class Sphere(NamedTuple):
         flat = self.normal * [1.0, 1.0, 0.0]
         return flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-12)
 
+    def interpolated(self, cosine: np.ndarray, table: np.ndarray) -> np.ndarray:
+        """Colours (pixels, 3) from a table (cosines, 3) over rising cosines of the angle of incidence."""
+        return np.stack([np.interp(self.cosine, cosine, channel) for channel in table.T], axis=-1)
+
     def rendering(self, linear: np.ndarray) -> Rendering:
         """Make a rendering of the linear sRGB (pixels, 3) of each pixel."""
         image, coverage = np.zeros((*self.mask.shape, 3)), np.zeros(self.mask.shape)

@@ -153,8 +153,7 @@ def ball(films: Stack, thickness: float, environment: Environment, size: int) ->
     light = spectra(films, thickness, cosine)
 
     def colour(spectrum: np.ndarray) -> np.ndarray:
-        table = linear_srgb(films, spectrum)
-        return np.stack([np.interp(pixels.cosine, cosine, channel) for channel in table.T], axis=-1)
+        return pixels.interpolated(cosine, linear_srgb(films, spectrum))
 
     seen = environment.radiance(pixels.mirrored())[:, None]
     reflected = pixels.rendering(colour(light.reflected) * seen)

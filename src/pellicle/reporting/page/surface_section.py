@@ -1,6 +1,5 @@
 """Section of a surface in the page of a fit: lobes of its BRDF, and a sphere under one lamp."""
 
-from io import BytesIO
 from typing import Any, NamedTuple
 
 import jax
@@ -16,14 +15,13 @@ from pellicle.reporting.drawable import CHANNELS, Line, Panel, Section, Table
 from pellicle.reporting.figures import rival_label
 from pellicle.reporting.page.document import picture
 from pellicle.reporting.plotly_figure import figure
-from pellicle.reporting.renderings import display
+from pellicle.reporting.renderings import INCIDENCES, display, png
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 from pellicle.simulation.environment import EYE, sphere
 
-_INCIDENCES = (15.0, 45.0, 70.0)
 _LEAVING = np.linspace(-88.0, 88.0, 177)
-"""Angles (degrees) of the light and to the eye."""
+"""Angles (degrees) to the eye."""
 _SIZE, _LAMP = 200, 35.0
 """Pixels across the sphere; angle (degrees) of the lamp from the line of sight, at the upper right."""
 
@@ -43,7 +41,7 @@ def _views(name: str, numbers: Any, normals: Any) -> Views:
     """
     brdf = model(name)
     o = direction(jnp.abs(_LEAVING), jnp.where(_LEAVING >= 0, 180.0, 0.0))
-    i = jnp.stack([jnp.broadcast_to(direction(angle, 0.0), o.shape) for angle in _INCIDENCES])
+    i = jnp.stack([jnp.broadcast_to(direction(angle, 0.0), o.shape) for angle in INCIDENCES])
     axes = frame(
         jnp.rad2deg(jnp.arccos(normals[:, 2])), jnp.rad2deg(jnp.arctan2(normals[:, 1], normals[:, 0]))
     )
@@ -65,7 +63,7 @@ def surface_section(fit: Fit) -> dict[str, Any]:
         lobes, pixels = _seen(best)
         of_rivals = [_seen(own).lobes for own in rivals]
     columns = {"angle to the eye (degrees)": _LEAVING}
-    for angle, values in zip(_INCIDENCES, lobes, strict=True):
+    for angle, values in zip(INCIDENCES, lobes, strict=True):
         columns |= {f"{n}, light at {angle:g}°": x for n, x in zip(names, values.T, strict=True)}
     caption = (
         "BRDF of the fitted surface in the plane of incidence, for light at 15, 45 and 70 degrees. Positive"
@@ -83,7 +81,7 @@ def surface_section(fit: Fit) -> dict[str, Any]:
 def _panels(lobes: np.ndarray, names: list[str]) -> list[Panel]:
     """A panel for each angle of the light, of `lobes` (incidences, angles, channels)."""
     panels = []
-    for angle, values in zip(_INCIDENCES, lobes, strict=True):
+    for angle, values in zip(INCIDENCES, lobes, strict=True):
         lines = [
             Line(_LEAVING, own, name, CHANNELS[c % len(CHANNELS)], model=True)
             for c, (name, own) in enumerate(zip(names, values.T, strict=True))
@@ -95,19 +93,14 @@ def _panels(lobes: np.ndarray, names: list[str]) -> list[Panel]:
 def _seen(surface: Scene | Surface) -> Views:
     assert isinstance(surface, Surface)
     numbers = {key: np.asarray(value, dtype=float) for key, value in surface.start_numbers().items()}
-    views = _views(surface.model, numbers, sphere(_SIZE).normal)
-    return Views(*map(np.asarray, views))
+    return _views(surface.model, numbers, sphere(_SIZE).normal)
 
 
 def _sphere(radiance: np.ndarray) -> dict[str, str]:
     """PNG of the sphere: its three channels as red, green and blue, others as the grey of their mean."""
-    from matplotlib.image import imsave
-
     rgb = radiance if radiance.shape[1] == 3 else np.repeat(radiance.mean(axis=1, keepdims=True), 3, axis=1)
-    file = BytesIO()
-    imsave(file, np.clip(display(sphere(_SIZE).rendering(rgb)), 0.0, 1.0), format="png")
     about = (
         f"Sphere of the fitted surface under one lamp, {_LAMP:g} degrees from the line of sight, its channels"
         " shown as red, green and blue."
     )
-    return picture(file.getvalue(), about)
+    return picture(png(display(sphere(_SIZE).rendering(rgb))), about)
