@@ -12,7 +12,7 @@ from io import StringIO
 from json import loads
 from logging import INFO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from pellicle.cli.flags import SamplerFlags
 from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
@@ -66,7 +66,7 @@ class Batch:
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
-        from pellicle.reporting.folders import folder_per_file, write_index
+        from pellicle.reporting.folders import SUMMARY, folder_per_file, write_index, write_summary
 
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
@@ -80,12 +80,14 @@ class Batch:
         worst = GOOD
         try:
             for code in self._codes(groups, folders):
-                worst = max(worst, code, self._summary(len(groups)))
+                worst = max(worst, code)
+                if self.out is not None and len(groups) > 1:
+                    write = partial(write_summary, Path(self.out) / SUMMARY, self.records)
+                    last = len(self.records) == len(groups)  # an error is stated once
+                    worst = max(worst, written(write, failed="" if last else None))
         except KeyboardInterrupt:
-            say(
-                f"interrupted after {len(self.records)} of {len(groups)} files; finished results are kept"
-                f"{again}"
-            )
+            done = f"{len(self.records)} of {len(groups)} files"
+            say(f"interrupted after {done}; finished results are kept{again}")
             worst = INTERRUPTED
         except BrokenExecutor:
             say(
@@ -102,15 +104,6 @@ class Batch:
         if self.out is not None and len(groups) > 1 and self.records:
             worst = max(worst, written(partial(write_index, self.out, self.records, folders, compared)))
         return worst
-
-    def _summary(self, files: int) -> int:
-        """Write the table of all results so far, and return BAD_DATA where it cannot be written."""
-        from pellicle.reporting.folders import SUMMARY, write_summary
-
-        if self.out is None or files == 1:
-            return GOOD
-        write = partial(write_summary, Path(self.out) / SUMMARY, self.records)
-        return written(write, failed="" if len(self.records) == files else None)  # stated once
 
     def _compare(self) -> Repeats | None:
         """Compare the scatter of repeated measurements with their errors, print and write the result.
@@ -151,15 +144,15 @@ class Batch:
         with Progress(f"{len(tasks)} files") as progress:
             progress("fit", 0, len(tasks))
             results = in_order(_captured, zip(batches, folders, strict=True), self.jobs)
-            for done, result in enumerate(results, 1):
+            for done, (code, one, out, err) in enumerate(results, 1):
                 progress.clear()
                 with suppress(BrokenPipeError):
-                    print(result.err, end="", file=sys.stderr, flush=True)
-                show(result.out, self.out is not None, end="")
-                self.records.append(result.record)
-                self.fits += result.fits
-                self.kept += result.kept
-                yield result.code
+                    print(err, end="", file=sys.stderr, flush=True)
+                show(out, self.out is not None, end="")
+                self.records += one.records
+                self.fits += one.fits
+                self.kept += one.kept
+                yield code
                 progress("fit", done, len(tasks))
 
     def _fit(self, files: list[Input], folder: Path | None, position: str = "") -> int:
@@ -224,25 +217,16 @@ class Batch:
         return posterior.fit, posterior
 
 
-class _Captured(NamedTuple):
-    """A finished fit of a worker process: exit code, record, and its text on both streams; `fits` has the
-    fit itself where it is compared with others."""
+def _captured(task: tuple[Batch, Path | None]) -> tuple[int, Batch, str, str]:
+    """Fit the one group of a batch, and write its folder, in a worker process.
 
-    code: int
-    record: dict[str, Any]
-    fits: list[Fit]
-    kept: int
-    out: str
-    err: str
-
-
-def _captured(task: tuple[Batch, Path | None]) -> _Captured:
-    """Fit the one group of a batch, and write its folder."""
+    Returns the exit code, the batch with its results, and its text on both streams.
+    """
     batch, folder = task
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err), log_to_stderr() if batch.verbose else nullcontext():
         code = batch._fit(batch.inputs.files, folder)
-    return _Captured(code, batch.records[0], batch.fits, batch.kept, out.getvalue(), err.getvalue())
+    return code, replace(batch, inputs=Inputs([], False)), out.getvalue(), err.getvalue()
 
 
 def measurement(

@@ -18,45 +18,50 @@ if TYPE_CHECKING:
     from pellicle.recipes.read import SurfaceRecipe
     from pellicle.scene.film import Scene
 
-View = Literal["chart", "balls", "bubble", "methods"]
 COUNT = 5
 """Thicknesses of a row of objects."""
 
 
 @dataclass(frozen=True)
-class SphereFlags(Flags):
-    """Flags of the sphere of a surface."""
+class ChartFlags(Flags):
+    """Flags of what is drawn of a film, and of the sphere of a surface."""
 
+    layer: str | None = None
+    """Layer whose thickness varies (the one with a free thickness)."""
+    thickness: str | None = None
+    """LO:HI in nm (the recipe's bounds)."""
+    angle: str = "0:80"
+    """LO:HI in degrees."""
+    illuminant: str = "D65"
+    """E, A, D50, D55, D65 or D75."""
+    observer: str = "1931"
+    """1931 (2 degrees) or 1964 (10 degrees)."""
+    invert: str | None = None
+    """CSV file to write: every thickness of each colour at the lowest angle, with ΔE."""
+    view: Annotated[
+        Literal["chart", "balls", "bubble", "methods"],
+        Parameter(
+            help="Films: chart of thickness and angle; balls of the substrate under five thicknesses, in"
+            " reflection and seen through; bubble that drains, by its thickness at the top; or methods of"
+            " computing the colour, side by side with ΔE2000 and time."
+        ),
+    ] = "chart"
     light: float = 35.0
     """Surfaces: angle between the main lamp and the line of sight in degrees."""
     environment: Literal["studio", "lamp"] = "studio"
     """Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."""
+
+    @property
+    def eye(self) -> dict[str, Any]:
+        """Observer and illuminant."""
+        return {"observer": self.observer, "illuminant": self.illuminant}
 
 
 def chart(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
     out: Annotated[str, Parameter(help="Image to write (PNG, PDF, SVG); no file is overwritten.")],
-    layer: Annotated[
-        str | None, Parameter(help="Layer whose thickness varies (the one with a free thickness).")
-    ] = None,
-    thickness: Annotated[str | None, Parameter(help="LO:HI in nm (the recipe's bounds).")] = None,
-    angle: Annotated[str, Parameter(help="LO:HI in degrees.")] = "0:80",
-    illuminant: Annotated[str, Parameter(help="E, A, D50, D55, D65 or D75.")] = "D65",
-    observer: Annotated[str, Parameter(help="1931 (2 degrees) or 1964 (10 degrees).")] = "1931",
-    invert: Annotated[
-        str | None,
-        Parameter(help="CSV file to write: every thickness of each colour at the lowest angle, with ΔE."),
-    ] = None,
-    view: Annotated[
-        View,
-        Parameter(
-            help="Films: chart of thickness and angle; balls of the substrate under five thicknesses, in"
-            " reflection and seen through; bubble that drains, by its thickness at the top; or methods of"
-            " computing the colour, side by side with ΔE2000 and time."
-        ),
-    ] = "chart",
-    sphere: Annotated[SphereFlags, Parameter(name="*")] = SphereFlags(),
+    how: Annotated[ChartFlags, Parameter(name="*")] = ChartFlags(),
 ) -> int:
     """Draw the interference colours of a recipe's film, objects under it, or a sphere of a recipe's surface.
 
@@ -69,60 +74,42 @@ def chart(
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
-        return _surface(described, out, sphere, layer is thickness is invert is None and view == "chart")
+        return _surface(described, out, how)
     scene = described.scene()
-    angles = _range("--angle", angle, 90.0)
-    nm = _bounds(scene, layer) if thickness is None else _range("--thickness", thickness, inf)
-    eye: dict[str, Any] = {"observer": observer, "illuminant": illuminant}
-    if view != "chart":
-        if invert is not None:
-            raise UsageError("--invert belongs to a chart: leave out --view")
-        return _objects(scene, view, out, nm, layer, Path(recipe).stem, eye)
-    _chart(scene, Path(recipe), out, (nm, angles), invert, {"layer": layer, **eye})
-    return 0
-
-
-def _chart(
-    scene: Scene,
-    recipe: Path,
-    out: str,
-    ranges: tuple[tuple[float, float], tuple[float, float]],
-    invert: str | None,
-    how: dict[str, Any],
-) -> None:
-    """Draw the colours over ranges of thickness and angle, and write their inverse into the file `invert`."""
+    angles = _range("--angle", how.angle, 90.0)
+    nm = _bounds(scene, how.layer) if how.thickness is None else _range("--thickness", how.thickness, inf)
+    if how.view != "chart":
+        return _objects(scene, Path(recipe).stem, out, nm, how)
     start()
     from pellicle.reporting import colour_figures
 
-    inverse, (nm, angles) = None, ranges
-    if invert is not None:
-        inverse = colour_figures.invert_chart(scene, invert, nm, angles[0], **how, source=recipe.name)
-    outside = colour_figures.chart(scene, out, nm, angles, **how, title=recipe.stem, inverse=inverse)
+    inverse, options = None, {"layer": how.layer, **how.eye}
+    if how.invert is not None:
+        about = options | {"source": Path(recipe).name}
+        inverse = colour_figures.invert_chart(scene, how.invert, nm, angles[0], **about)
+    options |= {"title": Path(recipe).stem, "inverse": inverse}
+    outside = colour_figures.chart(scene, out, nm, angles, **options)
     say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
     if outside > 0.005:
         say(f"{100 * outside:.0f} % of the colours are outside sRGB and are shown by the nearest ones")
     if inverse is not None:
-        ambiguous = 100 * inverse.ambiguous
         say(
-            f"{invert}: thicknesses of {len(inverse.source)} colours at {angles[0]:g} degrees;"
-            f" {ambiguous:.0f} % of the colours have more than one"
+            f"{how.invert}: thicknesses of {len(inverse.source)} colours at {angles[0]:g} degrees;"
+            f" {100 * inverse.ambiguous:.0f} % of the colours have more than one"
         )
+    return 0
 
 
-def _objects(
-    scene: Scene,
-    view: View,
-    out: str,
-    nm: tuple[float, float],
-    layer: str | None,
-    title: str,
-    eye: dict[str, Any],
-) -> int:
+def _objects(scene: Scene, title: str, out: str, nm: tuple[float, float], how: ChartFlags) -> int:
+    """Draw balls, a bubble or methods, with thicknesses in a range (nm)."""
     import numpy as np
 
+    view, layer = how.view, how.layer
+    if how.invert is not None:
+        raise UsageError("--invert belongs to a chart: leave out --view")
     if view == "bubble" and nm[0] <= 0:
         raise UsageError("--thickness of a bubble must be above 0 at its top: give --thickness LO:HI")
-    if view == "methods" and (layer is not None or eye != {"observer": "1931", "illuminant": "D65"}):
+    if view == "methods" and (layer is not None or how.eye != ChartFlags().eye):
         raise UsageError("methods are compared on one layer under D65: leave out the other flags")
     start()
     from pellicle.reporting import renderings
@@ -137,13 +124,13 @@ def _objects(
         thicknesses = [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)]
         if view == "bubble":
             thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
-        renderings.objects(scene, out, view, thicknesses, layer, title, **eye)
+        renderings.objects(scene, out, view, thicknesses, layer, title, **how.eye)
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
     return 0
 
 
-def _surface(recipe: SurfaceRecipe, out: str, flags: SphereFlags, none_of_films: bool) -> int:
-    if not none_of_films:
+def _surface(recipe: SurfaceRecipe, out: str, flags: ChartFlags) -> int:
+    if not (flags.layer is flags.thickness is flags.invert is None and flags.view == "chart"):
         raise UsageError(
             "--layer, --thickness, --invert and --view are for films; a surface has its own thickness"
         )

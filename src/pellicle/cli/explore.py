@@ -18,13 +18,11 @@ from pellicle.errors import DataError, UsageError
 if TYPE_CHECKING:
     from pellicle.explorer.session import Session
 
-DEFAULT_LAYER, DEFAULT_SUBSTRATE, DEFAULT_THICKNESS = "SiO2", "Si", "0:1000"
+DEFAULTS = {"layer": "SiO2", "substrate": "Si", "thickness": "0:1000"}
 """Film that is shown without a recipe and without flags."""
-_OF_SCENE = ("signal", "angle", "polarisation")
-"""Options that the light of a scene has."""
 
 
-@flags_of(FileOptions, *_OF_SCENE)
+@flags_of(FileOptions, "signal", "angle", "polarisation")
 class LightFlags(OptionFlags[FileOptions]):
     """Flags of the light of a film without data."""
 
@@ -86,9 +84,8 @@ def _of_recipe(path: str) -> Session:
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
         return Session(recipe.scene(), Path(path).parent, title=title)
-    first = recipe.first
+    first, spectra = recipe.first, []
     scene, data = first.scene(), first.tables.data
-    spectra = []
     if recipe.files and data.signal not in SPACES:
         try:
             spectra = read(recipe.files[0], FileOptions(**first.reading), scene)
@@ -105,12 +102,7 @@ def _of_flags(flags: SceneFlags, reading: FileOptions) -> Session:
 
     from pellicle.explorer.session import Session
 
-    film: Any = replace(
-        flags,
-        layer=flags.layer or DEFAULT_LAYER,
-        substrate=flags.substrate or DEFAULT_SUBSTRATE,
-        thickness=flags.thickness or DEFAULT_THICKNESS,
-    )
+    film: Any = replace(flags, **{name: getattr(flags, name) or x for name, x in DEFAULTS.items()})
     scene = film.scene(reading)
     if flags.thickness is None:
         say("thickness: 0 to 1000 nm, since no --thickness was given")

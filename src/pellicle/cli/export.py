@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from json import loads
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -82,27 +82,21 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
     from pellicle.rendering.export import with_values
 
     values = {name: each["value"] for name, each in record["parameters"].items()}
+    source = record.get("scene") or {}
     try:
-        return with_values(_scene_of(film, record.get("scene"), recipe), values)
+        if recipe is None and "flags" in source:
+            known = {field.name for field in fields(SceneFlags)}
+            flags = {name: value for name, value in source["flags"].items() if name in known}
+            return with_values(SceneFlags(**flags).scene(FileOptions()), values)
+        recipe = recipe or source.get("recipe")
+        if recipe is None:
+            raise UsageError(f"{film}: names no scene that was fitted: give its recipe as --recipe")
+        if not Path(recipe).exists():
+            raise UsageError(
+                f"{film}: its recipe {recipe} is not there: run from the folder of the fit, or give --recipe"
+            )
+        return with_values(read_recipe(recipe).scene(), values)
     except UsageError:
         raise
     except DataError as error:
         raise DataError(f"{film}: {error}; give its recipe as --recipe") from None
-
-
-def _scene_of(path: str, source: dict[str, Any] | None, recipe: str | None) -> Scene | Surface:
-    from pellicle.recipes.read import read_recipe
-
-    source = source or {}
-    if recipe is None and "flags" in source:
-        known = {field.name for field in fields(SceneFlags)}
-        flags = {name: value for name, value in source["flags"].items() if name in known}
-        return SceneFlags(**flags).scene(FileOptions())
-    recipe = recipe or source.get("recipe")
-    if recipe is None:
-        raise UsageError(f"{path}: names no scene that was fitted: give its recipe as --recipe")
-    if not Path(recipe).exists():
-        raise UsageError(
-            f"{path}: its recipe {recipe} is not there: run from the folder of the fit, or give --recipe"
-        )
-    return read_recipe(recipe).scene()

@@ -33,6 +33,7 @@ Kind = TypeVar("Kind", bound="OptionFlags")
 
 def flag(group: Group, help: str | None = None, **how: Any) -> Parameter:
     """A flag with a value; without `help`, the text below the field of a class is its help."""
+    # help=None would hide that text
     return Parameter(group=group, **how) if help is None else Parameter(group=group, help=help, **how)
 
 
@@ -95,13 +96,8 @@ def _flag_type(hint: Any, option: Option) -> Any:
     """Type of a flag: text where the option parses it, else the first type of the option."""
     group = COLOURS if option.kinds == (OF_COLOURS,) else READING
     kind = str if option.parse is not None else get_args(hint)[0]
-    parameter = Parameter(
-        group=group,
-        help=option.help,
-        metavar=option.metavar or None,
-        negative=None if option.negative else "",
-    )
-    return Annotated[kind | None, parameter]
+    negative = None if option.negative else ""
+    return Annotated[kind | None, flag(group, option.help, metavar=option.metavar or None, negative=negative)]
 
 
 @flags_of(CameraOptions)
@@ -326,12 +322,12 @@ class CubeFlags(CubeOnlyFlags):
         if isinstance(self.range, str):
             options["range"] = parse_range(self.range, "`range`")
         if isinstance(self.white_reflectance, str):
-            angle, polarisation = options.get("angle", 0.0), options.get("polarisation", "unpolarised")
-            options["white_reflectance"] = _reflectance(self.white_reflectance, angle, polarisation)
+            light = {name: options[name] for name in ("angle", "polarisation") if name in options}
+            options["white_reflectance"] = _reflectance(self.white_reflectance, light)
         return options
 
 
-def _reflectance(white: str, angle: float, polarisation: str) -> Any:
+def _reflectance(white: str, light: dict[str, Any]) -> Any:
     """The reflectance of a white reference: a number, the path of a CSV, or a function of the wavelength."""
     import numpy as np
 
@@ -345,5 +341,4 @@ def _reflectance(white: str, angle: float, polarisation: str) -> Any:
     from pellicle.simulation.functions import reflectance
 
     material = medium(white, name="`white_reflectance`")
-    light: dict[str, Any] = {"angle": angle, "polarisation": polarisation}
     return lambda nm: np.asarray(reflectance(nm, 0.0, 1.0, material, **light))

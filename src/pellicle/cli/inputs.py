@@ -170,8 +170,8 @@ def _sweeps(file: Input) -> list[Input]:
 
 def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
     [one] = read_file()
-    note = f"sweep {number + 1} of {len(one.sweeps)}"
-    return [replace(one.sweeps[number], notes=(*one.sweeps[number].notes, note))]
+    note, sweep = f"sweep {number + 1} of {len(one.sweeps)}", one.sweeps[number]
+    return [replace(sweep, notes=(*sweep.notes, note))]
 
 
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -> Inputs:

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
 _COMMAND_ARGUMENTS = (
-    *("depth", "invert", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats"),
-    *("strip", "thickness_map", "to", "view"),
+    *("depth", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats", "strip"),
+    *("thickness_map", "to"),
 )
 """Flags that one command has outside the groups of `pellicle.cli.flags`."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}

@@ -59,16 +59,22 @@ def read(
         try:
             measurements += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
-            worst = BAD_DATA
-            _report_error(path, as_flags(str(error)), json)
-            continue
+            from pellicle.reporting.json_record import error_record
+
+            worst, message = BAD_DATA, as_flags(str(error))
+            message = message if path in message else f"{path}: {message}"
+            say(f"pellicle: {message}")
+            if json:
+                show(error_record(message, BAD_DATA))
     if out is not None:
         from pellicle.data.cube import Cube
 
         if any(isinstance(one, Cube) for one in measurements):
             raise UsageError("--out writes spectra, and a cube stays in its file: leave it out")
-    for measurement in measurements:
-        _show(measurement, json)
+    from pellicle.reporting.measured_text import describe, to_json
+
+    for one in measurements:
+        show(to_json(one) if json else describe(one, tuple(map(as_flags, one.notes))))
     if out is not None:
         _write(Path(out), measurements, formats)
     return worst
@@ -93,11 +99,10 @@ def _measurements(
             raise
         try:  # a NetCDF file that is no spectrum may be a cube
             return [_cube(path, options, of_cube)]
-        except ValueError as error:
-            reason = error
-        if "no axis" in str(reason):
-            raise
-        raise reason from None
+        except ValueError as reason:
+            if "no axis" not in str(reason):
+                raise reason from None
+        raise
 
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:
@@ -130,21 +135,6 @@ def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
     if stated:
         raise UsageError(f"{stated[0]}: states its own angles; leave --angle out")
     return [replace(one, angle=np.full(len(one), float(options.angle))) for one in spectra]
-
-
-def _report_error(path: str, message: str, as_json: bool) -> None:
-    from pellicle.reporting.json_record import error_record
-
-    message = message if path in message else f"{path}: {message}"
-    say(f"pellicle: {message}")
-    if as_json:
-        show(error_record(message, BAD_DATA))
-
-
-def _show(measured: Spectrum | Colours | Cube, as_json: bool) -> None:
-    from pellicle.reporting.measured_text import describe, to_json
-
-    show(to_json(measured) if as_json else describe(measured, tuple(map(as_flags, measured.notes))))
 
 
 def _write(folder: Path, measurements: list[Any], formats: list[str]) -> None:

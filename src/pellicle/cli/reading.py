@@ -271,8 +271,6 @@ def _as_measured(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     import equinox as eqx
     import numpy as np
 
-    from pellicle.cli.flags import light
-    from pellicle.cli.reading import read
     from pellicle.scene.film import Light
 
     path = recipe.files[0]

@@ -135,13 +135,6 @@ def _interrupt_main_thread() -> None:
         _thread.interrupt_main()
 
 
-def end_with_parent() -> None:
-    """End this process when the one that started it has ended, even by a signal that it cannot catch."""
-    parent = parent_process()
-    if parent is not None:
-        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
-
-
 def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers: int) -> Iterator[Result]:
     """Compute `function` of each task in worker processes and yield the results in the order of the tasks.
 
@@ -152,8 +145,13 @@ def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers:
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin)
     waiting: list[Future[Result]] = []
     try:
-        with _quiet_and_single_threaded():
-            waiting = [pool.submit(_run, function, task) for task in tasks]
+        # processes ignore Ctrl-C until they have a task, and use one thread each
+        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            with single_threaded():
+                waiting = [pool.submit(_run, function, task) for task in tasks]
+        finally:
+            signal.signal(signal.SIGINT, handler)
         while waiting:
             result = waiting[0].result()
             del waiting[0]
@@ -166,19 +164,10 @@ def in_order(function: Callable[[Task], Result], tasks: Iterable[Task], workers:
         pool.shutdown(cancel_futures=True)
 
 
-@contextmanager
-def _quiet_and_single_threaded() -> Iterator[None]:
-    """Processes started in the block ignore Ctrl-C until they have a task, and use one thread each."""
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with single_threaded():
-            yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-
-
 def _begin() -> None:
-    end_with_parent()
+    parent = parent_process()
+    if parent is not None:  # end with it, even by a signal that it cannot catch
+        threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
     sys.unraisablehook = send_again
     with redirect_stderr(StringIO()):  # this process has printed what there is to say
         start()

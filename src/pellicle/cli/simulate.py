@@ -300,7 +300,7 @@ def demo(
 
     Makes a folder with a recipe, a spectrum and results, and prints the commands that made them.
     """
-    from pellicle.cli.chart import chart
+    from pellicle.cli.chart import ChartFlags, chart
     from pellicle.files import write_text
     from pellicle.sampling.chain import missing
 
@@ -320,7 +320,7 @@ def demo(
     start()
     code = Batch(files, sampler=sampler, out=str(folder / "result")).run()
     say("", f"$ pellicle chart {recipe} --out {image} --thickness 0:600")
-    chart(str(recipe), out=str(image), thickness="0:600")
+    chart(str(recipe), out=str(image), how=ChartFlags(thickness="0:600"))
     if sampler is None:
         say(f"no posterior was sampled: {install_command('posterior')}")
     say(f"see {folder}/result (report.txt, figure.png) and {image}")
