@@ -124,7 +124,7 @@ def _objects(scene: Scene, title: str, out: str, nm: tuple[float, float], how: C
         thicknesses = [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)]
         if view == "bubble":
             thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
-        renderings.objects(scene, out, view, thicknesses, layer, title, **how.eye)
+        renderings.objects(scene, out, view, thicknesses, title, layer=layer, **how.eye)
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
     return 0
 

@@ -138,15 +138,7 @@ class ColourInverse:
 
 
 def invert(
-    table: FilmColourTable,
-    colours: Any,
-    angle: Any = 0.0,
-    *,
-    space: str = "srgb",
-    sigma: Any = SIGMA,
-    exposure: float | tuple[float, float] = 1.0,
-    thickness: tuple[float, float] | None = None,
-    orders: int = 8,
+    table: FilmColourTable, colours: Any, angle: Any = 0.0, *, orders: int = 8, **how: Any
 ) -> ColourThickness:
     """Return every admissible thickness of measured colours, with its probability.
 
@@ -160,12 +152,12 @@ def invert(
     - `table`: colours of the film (`FilmColourTable.build`), under the lamp of the measurement.
     - `colours`: (..., 3) at one `angle`, (..., angles, 3) at several.
     - `angle`: of incidence in degrees, one or (angles,).
+    - `orders`: the largest number of orders returned.
     - `space`: "srgb" (0 to 1, display values), "linear-rgb", "xyz" (Y = 1 for a perfect reflector) or "lab".
     - `sigma`: standard deviation of a channel, one or (3,), in the unit of the space.
     - `exposure`: factor between the film's colours and the measured ones, relative to a perfect reflector:
       a number where it is known, (lowest, highest) where it is free and common to all angles of a colour.
     - `thickness`: range (nm) within that of the table, which is the default.
-    - `orders`: the largest number of orders returned.
 
     sRGB channels of 0 and 1 are limits: the film may be darker or brighter.
 
@@ -179,10 +171,7 @@ def invert(
 
     **Raises:** ValueError for an unknown space, and for shapes, a σ, an exposure or a range that cannot be.
     """
-    inverse = ColourInverse.build(
-        table, angle, space=space, sigma=sigma, exposure=exposure, thickness=thickness
-    )
-    return inverse(colours, orders)
+    return ColourInverse.build(table, angle, **how)(colours, orders)
 
 
 def _screened(colours: np.ndarray, model: ColourInverse) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from pellicle.reporting.plain_text import csv_rows
 from pellicle.scene.film import Scene
 from pellicle.simulation.colours import colour_table, interference_colours
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""
 
@@ -30,59 +27,41 @@ def chart(
     path: str | os.PathLike[str],
     thickness: tuple[float, float],
     angle: tuple[float, float],
-    layer: str | None = None,
-    *,
-    observer: str = "1931",
-    illuminant: str = "D65",
     title: str = "",
     inverse: ChartInverse | None = None,
+    **how: Any,
 ) -> float:
     """Draw a film's colours against thickness and angle of incidence into `path` (.png, .pdf or .svg).
 
-    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges; `layer`, `observer` and `illuminant` are
-    those of `pellicle.simulation.colours.interference_colours`. `inverse` adds a panel with every thickness
-    that has the colour of another one.
+    The colours over all angles, below them a strip of the first angle, and then the inverse.
+
+    **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges. `inverse` adds a panel with every
+    thickness that has the colour of another one. `layer`, `observer` and `illuminant` are those of
+    `pellicle.simulation.colours.interference_colours`.
 
     **Returns:** the share of the colours that sRGB cannot show.
 
     **Raises:** UsageError for another file type, and where the file exists or cannot be written.
     """
     target = figure_path(path)
-    nm, degrees = np.linspace(*thickness, ACROSS), np.linspace(*angle, UP)
-    colours = interference_colours(scene, nm, degrees, layer, observer=observer, illuminant=illuminant)
-    linear = np.asarray(colours.linear_srgb)
-    shown = np.clip(np.asarray(colours.srgb), 0, 1)
-    save_figure(_draw_chart(shown, thickness, angle, f"{title}   {illuminant}", inverse), target)
-    return float(np.mean(outside(linear)))
-
-
-def _draw_chart(
-    srgb: np.ndarray,
-    thickness: tuple[float, float],
-    angle: tuple[float, float],
-    title: str,
-    inverse: ChartInverse | None,
-) -> Figure:
-    """The colours over all angles, below them a strip of the first angle, and then the inverse."""
-    heights = [4, 1] if inverse is None else [4, 1, 6]
-    figure = new_figure(8, 0.8 * sum(heights))
-    swatch, strip, *others = figure.subplots(
-        len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}
-    )
+    colours = interference_colours(scene, np.linspace(*thickness, ACROSS), np.linspace(*angle, UP), **how)
+    srgb, ratios = np.clip(np.asarray(colours.srgb), 0, 1), [4, 1] if inverse is None else [4, 1, 6]
+    figure = new_figure(8, 0.8 * sum(ratios))
+    swatch, strip, *others = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     swatch.imshow(srgb, origin="lower", aspect="auto", extent=(*thickness, *angle))
     swatch.set(ylabel="angle of incidence (°)")
-    swatch.set_title(title.strip(), loc="left")
+    swatch.set_title(f"{title}   {how.get('illuminant', 'D65')}".strip(), loc="left")
     strip.imshow(srgb[:1], origin="lower", aspect="auto", extent=(*thickness, 0, 1))
     strip.set(yticks=[], ylabel=f"{angle[0]:g}°")
-    for axes in others:
-        assert inverse is not None
+    if inverse is not None:
         row, order = np.nonzero(inverse.admissible)
         nm = inverse.found.thickness[row, order]
         size = 12 + 24 * np.sqrt(inverse.found.probability[row, order])
-        axes.scatter(inverse.source[row], nm, size, color=inverse.srgb[row], edgecolors="none")
-        axes.set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
+        others[0].scatter(inverse.source[row], nm, size, color=inverse.srgb[row], edgecolors="none")
+        others[0].set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
     (others or [strip])[-1].set_xlabel("thickness (nm)")
-    return figure
+    save_figure(figure, target)
+    return float(np.mean(outside(np.asarray(colours.linear_srgb))))
 
 
 COLOURS = 301
@@ -116,11 +95,8 @@ def invert_chart(
     path: str | os.PathLike[str],
     thickness: tuple[float, float],
     angle: float,
-    layer: str | None = None,
-    *,
-    observer: str = "1931",
-    illuminant: str = "D65",
     source: str = "",
+    **how: Any,
 ) -> ChartInverse:
     """Invert the colours of a film at one angle and write them into a CSV file.
 
@@ -133,23 +109,23 @@ def invert_chart(
     **Raises:** UsageError where the file exists or cannot be written, and as `colour_table` does.
     """
     low = max(angle - 1.0, 0.0)  # a table needs a range of angles
-    table = colour_table(scene, thickness, (low, low + 1.0), layer, observer=observer, illuminant=illuminant)
+    table = colour_table(scene, thickness, (low, low + 1.0), **how)
     nm = np.linspace(*table.thickness, COLOURS)
     srgb = np.round(255 * np.asarray(table(nm, np.cos(np.deg2rad(angle))).srgb)) / 255
     inverse = ChartInverse(nm, srgb, ColourInverse.build(table, angle)(srgb, orders=16))
     comments = [
-        f"thicknesses of the sRGB colours of {source} at {angle:g} degrees under {illuminant}",
+        f"thicknesses of the sRGB colours of {source} at {angle:g} degrees under"
+        f" {how.get('illuminant', 'D65')}",
         f"noise {SIGMA:.3g} of each channel, pellicle {version('pellicle')}",
     ]
     rows, written, films = [], set(), inverse.found
     for row, colour in enumerate(np.round(255 * srgb).astype(int).tolist()):
         name = "{:02x}{:02x}{:02x}".format(*colour)
         if name not in written:
-            columns = (films.thickness, films.stderr, films.probability, films.delta_e)
             for order in np.flatnonzero(inverse.admissible[row]):
-                nm_text, stderr, probability, delta_e = (float(x[row, order]) for x in columns)
-                numbers = [f"{nm_text:.1f}", f"{stderr:.1f}", f"{probability:.4f}", f"{delta_e:.2f}"]
-                rows.append([name, *colour, *numbers])
+                numbers = (float(x[row, order]) for x in films[:4])
+                texts = "{:.1f},{:.1f},{:.4f},{:.2f}".format(*numbers).split(",")
+                rows.append([name, *colour, *texts])
         written.add(name)
     write_text(path, csv_rows(_HEADER, rows, comments))
     return inverse

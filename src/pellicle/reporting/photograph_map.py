@@ -75,8 +75,7 @@ def to_csv(made: ThicknessMap) -> str:
     assert made.position is not None
     for i, (position, colour) in enumerate(zip(made.position, made.colours, strict=True)):
         for order in np.flatnonzero(np.nan_to_num(films.probability[i]) >= LEAST):
-            columns = (films.thickness, films.stderr, films.probability, films.delta_e)
-            values = [f"{float(x[i, order]):.6g}" for x in columns]
+            values = [f"{float(x[i, order]):.6g}" for x in films[:4]]
             rgb = (f"{x:.5f}" for x in colour)
             rows.append([f"{position:.6g}", *rgb, order + 1, *values, films.status[i]])
     return csv_rows(_HEADER, rows)

@@ -147,12 +147,9 @@ def objects(
     path: str | os.PathLike[str],
     view: str,
     thickness: Sequence[float],
-    layer: str | None = None,
     title: str = "",
-    *,
-    illuminant: str = "D65",
-    observer: str = "1931",
     size: int = SMALL,
+    **how: Any,
 ) -> None:
     """Draw balls of the substrate under films of several thicknesses (nm), or stages of a bubble that drains,
     by the thickness of the film at its top, into `path`.
@@ -163,7 +160,7 @@ def objects(
 
     **Raises:** UsageError as `stack` and `bubble` do, for another file type, and where the file exists.
     """
-    target, films = figure_path(path), stack(scene, layer, observer=observer, illuminant=illuminant)
+    target, films = figure_path(path), stack(scene, **how)
     rows, factor = (_balls if view == "balls" else _stages)(films, thickness, size)
     names = [f"{nm:g} nm" if view == "balls" else f"{float(f'{nm:.3g}'):g} nm at the top" for nm in thickness]
     figure = new_figure(0.3 + 1.9 * len(names), 0.6 + 1.95 * len(rows))
@@ -175,7 +172,7 @@ def objects(
     for axes, name in zip(panels[0], names, strict=True):
         axes.set_title(name, fontsize="small")
     place = "studio" if view == "balls" else "light tent"
-    _describe(figure, title, f"{illuminant}, {place}; exposure × {factor:g}")
+    _describe(figure, title, f"{how.get('illuminant', 'D65')}, {place}; exposure × {factor:g}")
     save_figure(figure, target, dpi=DPI)
 
 
