@@ -1,6 +1,7 @@
 """Panels of measured data, and of data, fit and residuals."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -56,11 +57,9 @@ def measured(spectrum: Spectrum) -> Section:
         lines, bands = [], []
         for j, (rows, name) in enumerate(settings):
             colour = "residual" if name is None else SERIES[j % len(SERIES)]
-            drawn, named = stroke(x, q.data, rows, q.turns), name or ""
-            lines += [
-                Line(*drawn, "", colour, width=0.6),
-                Line(*drawn, named, colour, "point", listed=j < MOST_NAMED),
-            ]
+            drawn = stroke(x, q.data, rows, q.turns)
+            lines.append(Line(*drawn, "", colour, width=0.6))
+            lines.append(Line(*drawn, name or "", colour, "point", listed=j < MOST_NAMED))
             if q.sigma is not None:
                 at, low = stroke(x, q.data - q.sigma, rows)
                 bands.append(Band(at, low, stroke(x, q.data + q.sigma, rows)[1], "±σ", colour, listed=False))
@@ -75,17 +74,11 @@ def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) ->
         assert q.model is not None
         lines = [Line(x, q.data, "data", "points", "point")]
         for j, (rows, setting) in enumerate(settings):
-            lines.append(
-                Line(
-                    *stroke(x, q.model, rows, q.turns),
-                    "fit" if setting is None else f"fit, {setting}",
-                    SERIES[j % len(SERIES)],
-                    "dashed" if j // len(SERIES) % 2 else "solid",
-                    0.9 if q.place else 1.4,
-                    listed=len(settings) <= MOST_NAMED,
-                    model=True,
-                )
-            )
+            name = "fit" if setting is None else f"fit, {setting}"
+            style: Any = (SERIES[j % len(SERIES)], "dashed" if j // len(SERIES) % 2 else "solid")
+            drawn = stroke(x, q.model, rows, q.turns)
+            listed = len(settings) <= MOST_NAMED
+            lines.append(Line(*drawn, name, *style, 0.9 if q.place else 1.4, listed=listed, model=True))
         panels.append(_values(q, lines, [], "inside" if q is columns[0] else ""))
     return [*_in_rows(spectrum, columns, panels), [_residuals(spectrum, columns, x)]]
 

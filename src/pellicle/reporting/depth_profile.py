@@ -47,8 +47,7 @@ def to_json(profile: DepthProfile, path: str) -> dict[str, Any]:
             {
                 **taken(section, "above", "below"),
                 "layers": [
-                    {"name": name, "upper_nm": upper, "lower_nm": lower}
-                    for name, upper, lower in section.layers
+                    dict(zip(("name", "upper_nm", "lower_nm"), x, strict=True)) for x in section.layers
                 ],
                 "depth_nm": section.depth,
                 "intensity": section.intensity,
@@ -86,8 +85,8 @@ def _depth_csv(profile: DepthProfile, comments: list[str]) -> str:
     for i, nm in enumerate(profile.at):
         for j, section in enumerate(profile.sections, start=1):
             columns = (section.medium, section.depth, section.intensity[i], section.absorbed[i])
-            for medium, depth, intensity, absorbed in zip(*columns, strict=True):
-                numbers = f"{depth:.10g}", f"{intensity:.8g}", f"{absorbed:.8g}"
+            for medium, depth, *shares in zip(*columns, strict=True):
+                numbers = f"{depth:.10g}", *(f"{x:.8g}" for x in shares)
                 rows.append((nm, j, medium.replace(",", ";"), *numbers))
     return csv_rows(names, rows, [*comments, about])
 
@@ -102,18 +101,8 @@ def draw(profile: DepthProfile) -> Figure:
             legend: Place = "above" if not i and row is rows[0] else ""
             ends = group.depth[0], group.depth[-1]
             top = max(float(np.nanmax(line.y)) for line in lines)
-            row.append(
-                Panel(
-                    label,
-                    lines,
-                    [],
-                    2.2,
-                    legend=legend,
-                    limits=(0.0, 1.35 * top or 1.0),
-                    span=ends,
-                    spans=_layers(group) if row is rows[0] else _layers(group, named=False),
-                )
-            )
+            axes: Any = {"legend": legend, "limits": (0.0, 1.35 * top or 1.0), "span": ends}
+            row.append(Panel(label, lines, [], 2.2, spans=_layers(group, named=row is rows[0]), **axes))
     sections = [Section("depth (nm)", rows), _against_wavelength(profile)]
     return matplotlib_figure.draw(sections, "", max(8.0, 4.2 * len(profile.sections)))
 

@@ -18,7 +18,7 @@ from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
 from pellicle.fitting.result import Fit, Part, Profile, Rival
 from pellicle.fitting.status import RIVAL
 from pellicle.reporting import data_panels
-from pellicle.reporting.drawable import Band, Line, Panel, Section, Table
+from pellicle.reporting.drawable import Band, Line, Panel, Section, Style, Table
 from pellicle.reporting.matplotlib_figure import draw
 from pellicle.reporting.plotly_figure import figure, thinning
 from pellicle.sampling.result import Prediction
@@ -44,22 +44,18 @@ def draw_spectrum(spectrum: Spectrum) -> Figure:
 
 def draw_predictions(predictions: Sequence[Prediction]) -> Figure:
     """Draw each data set over the bands of 95 % of the model's curves and of repeated measurements."""
-    return draw([_prediction(prediction) for prediction in predictions], "")
-
-
-def _prediction(prediction: Prediction) -> Section:
-    order = np.argsort(prediction.axis.values, kind="stable")
-    x, bands = prediction.axis.values[order], []
-    for draws, opacity, name in (
-        (prediction.noisy, 0.25, "repeated measurements"),
-        (prediction.model, 0.8, "model"),
-    ):
-        low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
-        bands.append(Band(x, low, high, f"{name}, 95 %", "fit", opacity))
-    data = [Line(x, prediction.data[order], "data", "residual", "point")]
-    scale = "log" if prediction.decades else "linear"
-    panel = Panel(prediction.label, data, bands, 3.0, legend="inside", scale=scale)
-    return Section(prediction.axis.label, [[panel]])
+    sections = []
+    for p in predictions:
+        order = np.argsort(p.axis.values, kind="stable")
+        x, bands = p.axis.values[order], []
+        for draws, opacity, name in ((p.noisy, 0.25, "repeated measurements"), (p.model, 0.8, "model")):
+            low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
+            bands.append(Band(x, low, high, f"{name}, 95 %", "fit", opacity))
+        data = [Line(x, p.data[order], "data", "residual", "point")]
+        scale = "log" if p.decades else "linear"
+        panel = Panel(p.label, data, bands, 3.0, legend="inside", scale=scale)
+        sections.append(Section(p.axis.label, [[panel]]))
+    return draw(sections, "")
 
 
 def rival_label(rival: Rival, fit: Fit) -> str:
@@ -87,16 +83,11 @@ def of_candidates(best: Fit, others: Sequence[tuple[str, Fit]], number: int) -> 
 
 def _of_parts(part: Part, others: Sequence[tuple[str, Part]], number: int) -> dict[str, Any]:
     rivals = [(name, data_panels.fitted(other).panels) for name, other in others]
-    return figure(f"data-{number}", _caption(part), data_panels.fitted(part), rivals)
-
-
-def _caption(part: Part) -> str:
-    name = f"{part.name}: " if part.name else ""
-    step = thinning(len(part.curve.model))
+    step, start = thinning(len(part.curve.model)), f"{part.name}: data" if part.name else "Data"
     thinned = f" One point of {step} is drawn; the CSV file has them all." if step > 1 else ""
     unit = " degrees" if isinstance(part.curve, Curve) and part.curve.delta_data is not None else ""
-    about = f"{name}data, fit and residuals (data − fit). The rms residual is {part.rms:.3g}{unit}.{thinned}"
-    return about if name else f"D{about[1:]}"
+    caption = f"{start}, fit and residuals (data − fit). The rms residual is {part.rms:.3g}{unit}.{thinned}"
+    return figure(f"data-{number}", caption, data_panels.fitted(part), rivals)
 
 
 def of_misfit(fit: Fit) -> dict[str, Any] | None:
@@ -150,8 +141,12 @@ def sections(fit: Fit) -> list[Section]:
     parts = [data_panels.fitted(part) for part in fit.parts]
     if fit.layer_test is not None:
         return parts
-    others = [misfit(fit), index(fit), *map(_profile, fitted_profiles(fit))]
-    return [*parts, *(section for section in others if section is not None)]
+    sections = [*parts, *filter(None, (misfit(fit), index(fit)))]
+    for profile in fitted_profiles(fit):  # n and k of a graded layer against depth
+        layer = "" if profile.layer == "layer" else f"in {profile.layer} "
+        panels = [[panel] for panel in _n_and_k({"": profile}, "depth")]
+        sections.append(Section(f"depth {layer}(nm), at {profile.wavelength:g} nm", panels))
+    return sections
 
 
 def title(fit: Fit) -> str:
@@ -188,16 +183,21 @@ def misfit(fit: Fit) -> Section | None:
     places = [(rival.parameters[name], rival.delta_chi2) for _, rival in rivals]
     minima = [] if not name else [(fit[name].value, 0.0), *sorted(places, key=lambda place: place[1])]
     thickness, delta = completed(fit.profile, minima)
-    span = _span(thickness, delta)
+    hopeful = delta < HOPELESS
+    shown = thickness[hopeful] if np.any(hopeful) else thickness  # ends whose misfit is hopeless are cut
+    margin = 0.03 * float(np.ptp(shown)) or 1.0
+    span = float(shown.min()) - margin, float(shown.max()) + margin
     lines = [
         Line(thickness, delta, "misfit", "data", width=0.9, listed=False),
         Line(np.array(span), np.full(2, RIVAL), f"ambiguous below {RIVAL:g}", "blue", "dotted", 0.8),
     ]
     if minima:
-        lines.append(_minima(minima[:1], "best", "circle", [("best fit: show it alone", None)]))
+        lines.append(_minima(minima[:1], "best", "fit", "circle", [("best fit: show it alone", None)]))
     if rivals:
         clicks = [("click to see its curve", i if r.curves else None) for i, r in rivals]
-        lines.append(_minima(places, "rivals", "diamond", clicks))
+        lines.append(_minima(places, "rivals", "rival", "diamond", clicks))
+    heights = [float(np.percentile(delta[hopeful], 95)) if hopeful.any() else 0.0, *(y for _, y in minima)]
+    top = max(10 * RIVAL, *heights)
     panel = Panel(
         "misfit Δχ²",
         lines,
@@ -205,7 +205,7 @@ def misfit(fit: Fit) -> Section | None:
         legend="above",
         scale="symlog",
         threshold=RIVAL,
-        limits=(-2.0, _ceiling(delta, minima)),
+        limits=(-2.0, top * (top / RIVAL) ** 0.6),  # with room for labels
         span=span,
         notes=_labelled(minima, ROOM_FOR_LABEL * (span[1] - span[0])),
     )
@@ -220,21 +220,16 @@ def _thickness(fit: Fit) -> str:
 
 
 def _minima(
-    places: list[tuple[float, float]], name: str, style: str, clicks: list[tuple[str, int | None]]
+    places: list[tuple[float, float]],
+    name: str,
+    colour: str,
+    style: Style,
+    clicks: list[tuple[str, int | None]],
 ) -> Line:
-    x, y = np.transpose(places)
-    return Line(
-        x,
-        y,
-        name,
-        "fit" if name == "best" else "rival",
-        "circle" if style == "circle" else "diamond",
-        hints=[
-            f"{nm:.5g} nm: Δχ² {delta:.3g}<br>{hint}"
-            for (nm, delta), (hint, _) in zip(places, clicks, strict=True)
-        ],
-        links=[{"rival": rival} for _, rival in clicks],
-    )
+    rows = zip(places, clicks, strict=True)
+    hints = [f"{nm:.5g} nm: Δχ² {delta:.3g}<br>{hint}" for (nm, delta), (hint, _) in rows]
+    links = [{"rival": rival} for _, rival in clicks]
+    return Line(*np.transpose(places), name, colour, style, hints=hints, links=links)
 
 
 def rival_place(fit: Fit, rival: Rival) -> Panel:
@@ -253,21 +248,6 @@ def completed(profile: Profile, minima: list[tuple[float, float]]) -> tuple[np.n
     thickness = np.concatenate([thickness, [nm for nm, _ in below]])
     order = np.argsort(thickness, kind="stable")
     return thickness[order], np.concatenate([delta_chi2, [delta for _, delta in below]])[order]
-
-
-def _span(thickness: np.ndarray, delta: np.ndarray) -> tuple[float, float]:
-    """Range of thickness to show: ends whose misfit is hopeless are cut."""
-    shown = thickness[delta < HOPELESS] if np.any(delta < HOPELESS) else thickness
-    margin = 0.03 * float(np.ptp(shown)) or 1.0
-    return float(shown.min()) - margin, float(shown.max()) + margin
-
-
-def _ceiling(delta: np.ndarray, minima: list[tuple[float, float]]) -> float:
-    """Upper end of the misfit, with room for labels."""
-    hopeful = delta[delta < HOPELESS]
-    heights = [float(np.percentile(hopeful, 95)) if hopeful.size else 0.0, *(height for _, height in minima)]
-    top = max(10 * RIVAL, *heights)
-    return top * (top / RIVAL) ** 0.6
 
 
 def _labelled(minima: list[tuple[float, float]], room: float) -> list[tuple[float, float, str]]:
@@ -311,13 +291,6 @@ def index_panels(fit: Fit) -> list[Panel]:
         [panel] = _n_and_k({"": birefringence}, "wavelength", extinction=False)
         panels.append(replace(panel, label=BIREFRINGENCE))
     return panels
-
-
-def _profile(profile: FittedProfile) -> Section:
-    """n and k of a graded layer against depth."""
-    layer = "" if profile.layer == "layer" else f"in {profile.layer} "
-    panels = _n_and_k({"": profile}, "depth")
-    return Section(f"depth {layer}(nm), at {profile.wavelength:g} nm", [[panel] for panel in panels])
 
 
 def _n_and_k(

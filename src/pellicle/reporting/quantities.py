@@ -71,21 +71,13 @@ def _channels(
     colours: Sequence[str],
 ) -> list[Quantity]:
     """Residuals of channels are drawn in σ, where that is known."""
-    residual = values - model
+    residual, found = values - model, []
     scaled = residual if sigma is None else residual / sigma
-    return [
-        Quantity(
-            name,
-            name,
-            values[:, c],
-            None if sigma is None else sigma[:, c],
-            model[:, c],
-            residual[:, c],
-            scaled[:, c],
-            (name, colours[c % len(colours)], "point"),
-        )
-        for c, name in enumerate(data.channels)
-    ]
+    for c, name in enumerate(data.channels):
+        columns = [None if x is None else x[:, c] for x in (sigma, model, residual, scaled)]
+        line = (name, colours[c % len(colours)], "point")
+        found.append(Quantity(name, name, values[:, c], *columns, drawn=line))
+    return found
 
 
 def weighted_delta(curve: Curve) -> np.ndarray:
@@ -109,27 +101,15 @@ def _of_spectrum(data: Spectrum, curve: Curve | None, q: Measured, i: int) -> Qu
             values["missed"] = weighted_delta(curve)[:, q.column] if weighted else values["residual"]
     label = (q if q.cell is None else q._replace(label=q.cell.label)).axis
     label = label if data.calibrated else f"{label} × unknown scale"
-    return Quantity(q.name, label, **values, turns=q.wraps, **_style(data, q, i))
-
-
-def _style(data: Spectrum, q: Measured, i: int) -> dict[str, Any]:
-    """Place in a grid, and line of the residual, of the i-th quantity."""
-    if q.cell is not None:
+    if q.cell is not None:  # its place in a grid, and the line of its residual
         row, column = q.cell.row, q.cell.column
         # angles share the colour of their column
-        line = (
-            SERIES[column] if q.unit else f"C{i % 10}",
-            "dashed" if (row if q.unit else i >= 10) else "solid",
-        )
-        return {
-            "drawn": (q.cell.residual, *line),
-            "place": (row, column),
-            "title": data.kind.grid[row][column],
-            "smallest": q.cell.smallest,
-        }
-    if q.unit:
-        return {"drawn": (q.label, *(("blue", "dashed") if q.wraps else ("residual", "solid")))}
-    return {}
+        colour, later = (SERIES[column], row > 0) if q.unit else (f"C{i % 10}", i >= 10)
+        values |= {"place": (row, column), "title": data.kind.grid[row][column], "smallest": q.cell.smallest}
+        values["drawn"] = (q.cell.residual, colour, "dashed" if later else "solid")
+    elif q.unit:
+        values["drawn"] = (q.label, *(("blue", "dashed") if q.wraps else ("residual", "solid")))
+    return Quantity(q.name, label, **values, turns=q.wraps)
 
 
 def abscissa(data: Spectrum | Colours | BrdfSamples) -> tuple[np.ndarray, str]:
@@ -166,18 +146,15 @@ def lines_of(spectrum: Spectrum) -> list[tuple[np.ndarray, str | None]]:
     every = spectrum.settings
     if (x is spectrum.angle and spectrum.azimuth is None) or x is spectrum.azimuth:
         return [(np.argsort(x, kind="stable"), None)]
+    groups: list[tuple[np.ndarray, str | None]] = []
     if x is spectrum.angle:
         assert spectrum.azimuth is not None
         azimuths = np.unique(spectrum.azimuth)
-        groups: Sequence[tuple[np.ndarray, str | None]] = [
-            (
-                np.flatnonzero(spectrum.azimuth == azimuth),
-                f"azimuth {azimuth:g}°" if len(azimuths) > 1 else None,
-            )
-            for azimuth in azimuths
-        ]
+        for azimuth in azimuths:
+            name = f"azimuth {azimuth:g}°" if len(azimuths) > 1 else None
+            groups.append((np.flatnonzero(spectrum.azimuth == azimuth), name))
     else:
-        groups = [(setting.rows, named(setting, every)) for setting in every]
+        groups += [(setting.rows, named(setting, every)) for setting in every]
     return [(points[np.argsort(x[points], kind="stable")], name) for points, name in groups]
 
 
