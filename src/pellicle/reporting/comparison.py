@@ -11,11 +11,11 @@ from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.status import describe
 from pellicle.reporting import figures
 from pellicle.reporting.folders import PAGE, REPORT, folder_per_file, write_fit
-from pellicle.reporting.json_record import taken, versions, write_result
+from pellicle.reporting.json_record import failed, taken, versions, write_result
 from pellicle.reporting.json_record import to_json as fit_to_json
 from pellicle.reporting.page.document import page
 from pellicle.reporting.page.fit_pages import MOST_FIGURES, TONES
-from pellicle.reporting.plain_text import INDENT, block, table, wrapped
+from pellicle.reporting.plain_text import INDENT, blocks_of, table, wrapped
 
 SCHEMA = "pellicle.compare/1"
 _SHOWN = 5
@@ -40,11 +40,8 @@ def report(comparison: Comparison) -> str:
         values, more = _leading(c, _SHOWN)
         values += f" and {more} more" if more else ""
         fits += wrapped(f"{c.name}: {values}. {c.fit.verdict}", "", "  ")
-    return (
-        block("Verdict", [*wrapped(comparison.verdict), *wrapped(data)])
-        + block("Comparison", [*table(rows), "", note])
-        + block("Fits", fits)
-    )
+    verdict = [*wrapped(comparison.verdict), *wrapped(data)]
+    return blocks_of([("Verdict", verdict), ("Comparison", [*table(rows), "", note]), ("Fits", fits)])
 
 
 def _criteria(c: Candidate, best: Candidate, digits: int) -> tuple[str, ...]:
@@ -82,8 +79,7 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
 
 def failure(path: str, error: str) -> dict[str, Any]:
     """Build the record of data that could not be compared."""
-    data = {"path": path, "sha256": None, "signal": None, "points": 0}
-    return {"schema": SCHEMA, "data": data, "status": "failed", "error": error, "versions": versions()}
+    return failed(SCHEMA, {"path": path, "sha256": None, "signal": None, "points": 0}, error)
 
 
 def write_comparison(folder: str | os.PathLike[str], comparison: Comparison) -> Path:

@@ -75,10 +75,10 @@ def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) ->
         lines = [Line(x, q.data, "data", "points", "point")]
         for j, (rows, setting) in enumerate(settings):
             name = "fit" if setting is None else f"fit, {setting}"
-            style: Any = (SERIES[j % len(SERIES)], "dashed" if j // len(SERIES) % 2 else "solid")
-            drawn = stroke(x, q.model, rows, q.turns)
-            listed = len(settings) <= MOST_NAMED
-            lines.append(Line(*drawn, name, *style, 0.9 if q.place else 1.4, listed=listed, model=True))
+            dashed = j // len(SERIES) % 2
+            style: Any = {"style": "dashed" if dashed else "solid", "width": 0.9 if q.place else 1.4}
+            style |= {"listed": len(settings) <= MOST_NAMED, "model": True}
+            lines.append(Line(*stroke(x, q.model, rows, q.turns), name, SERIES[j % len(SERIES)], **style))
         panels.append(_values(q, lines, [], "inside" if q is columns[0] else ""))
     return [*_in_rows(spectrum, columns, panels), [_residuals(spectrum, columns, x)]]
 

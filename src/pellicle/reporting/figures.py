@@ -229,7 +229,8 @@ def _minima(
     rows = zip(places, clicks, strict=True)
     hints = [f"{nm:.5g} nm: Δχ² {delta:.3g}<br>{hint}" for (nm, delta), (hint, _) in rows]
     links = [{"rival": rival} for _, rival in clicks]
-    return Line(*np.transpose(places), name, colour, style, hints=hints, links=links)
+    x, y = np.transpose(places)
+    return Line(x, y, name, colour, style, hints=hints, links=links)
 
 
 def rival_place(fit: Fit, rival: Rival) -> Panel:

@@ -9,7 +9,7 @@ from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import LEVEL, Estimate, Fit, Part, Status
 from pellicle.fitting.status import RIVAL, describe
-from pellicle.reporting.plain_text import COLUMNS, INDENT, block, facts, table, with_unit, wrapped
+from pellicle.reporting.plain_text import COLUMNS, INDENT, blocks_of, facts, table, with_unit, wrapped
 from pellicle.reporting.quantities import colours_in_words, differences, weighted_delta
 from pellicle.sampling.result import Posterior
 
@@ -23,6 +23,8 @@ ADVICE = {
     Status.CONVERGED: "Use the numbers within their errors.",
 }
 """The next step, for every status."""
+
+OTHER_MINIMA = f"other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)"
 
 _SIGMA = {
     "given": "sigma {}, as given",
@@ -56,14 +58,11 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
         ("Birefringence: extraordinary less ordinary index", facts(_birefringence(fit))),
         ("Uncertainty budget", budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),
-        (
-            f"Rivals: other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)",
-            _rivals(fit),
-        ),
+        (f"Rivals: {OTHER_MINIMA}", _rivals(fit)),
         ("Plan: what was simulated", plan),
         ("Warnings", [line for text in fit.warnings for line in wrapped(text, "- ", "  ")]),
     ]
-    text = "".join(block(title, lines) for title, lines in blocks if lines)
+    text = blocks_of(blocks)
     if posterior is None:
         return text
     from pellicle.reporting.posterior import posterior_report
@@ -76,12 +75,10 @@ def _birefringence(fit: Fit) -> list[tuple[str, str]]:
     indices = None if fit.layer_test else fit.principal_indices.get(BIREFRINGENCE)
     if indices is None or not np.any(indices.n_stderr > 0):
         return []
-    if np.ptp(indices.n) < 1e-9:
-        return [("all wavelengths", f"{indices.n[0]:.5f} ± {indices.n_stderr[0]:.2g}")]
-    some = np.unique([0, indices.wavelength.size // 2, indices.wavelength.size - 1])
-    return [
-        (f"{indices.wavelength[i]:g} nm", f"{indices.n[i]:.5f} ± {indices.n_stderr[i]:.2g}") for i in some
-    ]
+    same, last = np.ptp(indices.n) < 1e-9, indices.wavelength.size - 1
+    names = ["all wavelengths"] if same else [f"{nm:g} nm" for nm in indices.wavelength]
+    some = [0] if same else np.unique([0, (last + 1) // 2, last])
+    return [(names[i], f"{indices.n[i]:.5f} ± {indices.n_stderr[i]:.2g}") for i in some]
 
 
 def _verdict(fit: Fit) -> list[str]:
@@ -162,10 +159,8 @@ def _residuals(part: Part) -> list[tuple[str, str]]:
     """Rms and noise of one part; in a joint fit also its reduced χ², as each has its own noise."""
     curve = part.curve
     unit = " degrees" if isinstance(curve, Curve) and curve.delta_data is not None else ""
-    if isinstance(curve, BrdfCurve) and part.sigma_from == "given":
-        sigma = f"{part.sigma:.2g} 1/sr in the median"
-    else:
-        sigma = f"{part.sigma:.2g}{unit}"
+    of_brdf = isinstance(curve, BrdfCurve) and part.sigma_from == "given"
+    sigma = f"{part.sigma:.2g}" + (" 1/sr in the median" if of_brdf else unit)
     rms, noise = f"{part.rms:.4g}{unit}", _SIGMA[part.sigma_from].format(sigma)
     of = f" of {part.name}" if part.name else ""
     if part.name:
@@ -198,14 +193,8 @@ NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|came
 def _parameters(fit: Fit) -> list[str]:
     """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
     width = max((len(name) for name in fit.parameters), default=0) + 1
-    rows = [
-        (
-            f"{p.name + ':':<{width}}",
-            value_in_words(p),
-            bounds_in_words(p),
-        )
-        for p in sorted(fit.parameters.values(), key=lambda p: not p.free)
-    ]
+    every = sorted(fit.parameters.values(), key=lambda p: not p.free)
+    rows = [(f"{p.name + ':':<{width}}", value_in_words(p), bounds_in_words(p)) for p in every]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
     return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
 
@@ -216,10 +205,9 @@ def value_in_words(p: Estimate) -> str:
     best = with_unit(f"{p.value:.6g}", p.unit)
     if not p.free:
         return f"{best} (fixed)"
-    sides = (("at least", p.lower_limit), ("at most", p.upper_limit))
-    limits = [
-        f"{side} {with_unit(f'{limit:.4g}', p.unit)} at 95 %" for side, limit in sides if limit is not None
-    ]
+    sides = {"at least": p.lower_limit, "at most": p.upper_limit}
+    known = {side: limit for side, limit in sides.items() if limit is not None}
+    limits = [f"{side} {with_unit(f'{limit:.4g}', p.unit)} at 95 %" for side, limit in known.items()]
     if not math.isfinite(p.stderr):
         return f"not determined ({', '.join([f'best {best}', *limits])})"
     relative = 100 * p.stderr / abs(p.value) if p.value else math.inf
@@ -236,11 +224,8 @@ def bounds_in_words(p: Estimate) -> str:
     if not p.at_bound:
         return bounds
     side = "lower" if p.value - p.lower <= p.upper - p.value else "upper"
-    return (
-        f"{bounds}  at its default {side} bound"
-        if p.default_bounds
-        else f"{bounds}  AT ITS {side.upper()} BOUND"
-    )
+    where = f"at its default {side} bound" if p.default_bounds else f"AT ITS {side.upper()} BOUND"
+    return f"{bounds}  {where}"
 
 
 def _correlations(fit: Fit) -> list[str]:

@@ -64,9 +64,8 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
         **_known(fit, "probability"),
     }
     if test is not None:
-        baselines = [taken(baseline, "name", "held_out") for baseline in test.baselines]
         record |= {"model": fit.surface.model, **taken(test, "residual", "layered", "held_out")}
-        record["baselines"] = baselines
+        record["baselines"] = [taken(baseline, "name", "held_out") for baseline in test.baselines]
     return strict(record) | ({} if posterior is None else {"posterior": posterior_to_json(posterior)})
 
 
@@ -155,23 +154,20 @@ def failure(
     paths = [os.fspath(path)] if isinstance(path, str | os.PathLike) else list(path)
     data = [{"path": name, "sha256": sha256, "signal": None, "points": 0} for name in paths]
     return {
-        "schema": SCHEMA,
-        "data": data[0] if alone else data,
-        "status": "failed",
+        **failed(SCHEMA, data[0] if alone else data, str(error)),
         "verdict": "No fit was made.",
-        "error": str(error),
         "parameters": {},
         "rivals": [],
-        "chi2_reduced": None,
-        "rms": None,
-        "effective_points": None,
+        **dict.fromkeys(("chi2_reduced", "rms", "effective_points")),
         "correlation": {"names": [], "matrix": []},
-        "budget": [],
-        "plan": [],
-        "warnings": [],
-        "versions": versions(),
+        **{name: [] for name in ("budget", "plan", "warnings")},
         "seconds": 0.0,
     }
+
+
+def failed(schema: str, data: Any, error: str) -> dict[str, Any]:
+    """Build the record of what could not be compared."""
+    return {"schema": schema, "data": data, "status": "failed", "error": error, "versions": versions()}
 
 
 def error_record(error: str, exit_code: int) -> dict[str, Any]:
@@ -192,10 +188,8 @@ def indented(record: Mapping[str, Any]) -> str:
 @cache
 def versions() -> Mapping[str, str | None]:
     """Versions of pellicle, Python and the packages that numbers depend on, without importing them."""
-    installed: dict[str, str | None] = {
-        "pellicle": version("pellicle"),
-        "python": ".".join(map(str, sys.version_info[:3])),
-    }
+    python = ".".join(map(str, sys.version_info[:3]))
+    installed: dict[str, str | None] = {"pellicle": version("pellicle"), "python": python}
     for name in _PACKAGES:
         try:
             installed[name] = version(name)

@@ -15,7 +15,7 @@ from pellicle.mapping.pixels.results import BY_NEIGHBOURS, NO_DATA
 from pellicle.reporting.fit_text import ADVICE
 from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise
-from pellicle.reporting.plain_text import block, facts, wrapped
+from pellicle.reporting.plain_text import blocks_of, facts, wrapped
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -49,7 +49,7 @@ def cube_report(made: Dataset | Map, summary: MapSummary | None = None) -> str:
         ("Errors", wrapped(ERRORS)),
         ("Plan: what was simulated", facts(plan_rows(summary))),
     ]
-    return "".join(block(title, lines) for title, lines in blocks if lines)
+    return blocks_of(blocks)
 
 
 def status_rows(made: MapSummary) -> list[tuple[str, str]]:
@@ -155,7 +155,10 @@ def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:
     """Median, range, standard error and slope of a parameter; the first row bears its name."""
     if not math.isfinite(p.percentiles[2]):
         return []
-    least, low, middle, high, largest = (_number(value, p) for value in p.percentiles)
+    digits = ".5g"
+    if math.isfinite(p.stderr) and p.stderr > 0:  # a digit more than the standard error has
+        digits = f".{min(max(0, 1 - math.floor(math.log10(p.stderr))), 9)}f"
+    least, low, middle, high, largest = (f"{value:{digits}}" for value in p.percentiles)
     unit = f" {p.unit}" if p.unit else ""
     stderr, noise = _error(p.stderr, unit), _error(p.stderr_noise, unit)
     rows = [
@@ -165,25 +168,13 @@ def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:
     if p.plane is not None:
         slopes = ", ".join(f"{name} {slope:+.3g}" for name, slope in p.plane.slopes.items())
         shape = "plane" if len(p.plane.slopes) > 1 else "line"
+        share = f"{math.floor(1000 * min(p.plane.explains, 0.999)) / 10:.1f}"  # cut, so that it is never 100
         text = (
-            f"a {shape} explains {share_of_variance(p.plane.explains)} % of the variance: slope {slopes}"
+            f"a {shape} explains {share} % of the variance: slope {slopes}"
             f" {p.plane.unit}, rms beside it {_error(p.plane.rms, unit)}"
         )
         rows.append(("", text))
     return rows
-
-
-def share_of_variance(explains: float) -> str:
-    """Percentage, cut rather than rounded so that it is never 100."""
-    return f"{math.floor(1000 * min(explains, 0.999)) / 10:.1f}"
-
-
-def _number(value: float, p: ParameterSummary) -> str:
-    """A value with a digit more than its standard error has."""
-    if not math.isfinite(p.stderr) or p.stderr <= 0:
-        return f"{value:.5g}"
-    decimals = min(max(0, 1 - math.floor(math.log10(p.stderr))), 9)
-    return f"{value:.{decimals}f}"
 
 
 def _error(value: float, unit: str) -> str:
@@ -220,7 +211,15 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
         "status": facts.counts,
         "places": facts.places,
         "converged": facts.counts.get(str(Status.CONVERGED), 0) / facts.with_data if facts.with_data else 0.0,
-        "parameters": {p.name: _parameter_json(p) for p in facts.parameters},
+        "parameters": {
+            p.name: {
+                **taken(p, "variable", "unit"),
+                **dict(zip(("least", "q05", "median", "q95", "largest"), p.percentiles, strict=True)),
+                **taken(p, "stderr", "stderr_noise"),
+                **({} if p.plane is None else {"plane": asdict(p.plane)}),
+            }
+            for p in facts.parameters
+        },
         "rates": {rate.variable: asdict(rate) for rate in facts.rates},
         "plan": facts.plan,
         "preview": int(about.get("preview", 1)),
@@ -230,10 +229,3 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
         "versions": versions(),
     }
     return strict(record)
-
-
-def _parameter_json(p: ParameterSummary) -> dict[str, Any]:
-    names = ("least", "q05", "median", "q95", "largest")
-    record = taken(p, "variable", "unit") | dict(zip(names, p.percentiles, strict=True))
-    plane = {} if p.plane is None else {"plane": asdict(p.plane)}
-    return record | taken(p, "stderr", "stderr_noise") | plane

@@ -19,6 +19,11 @@ def block(title: str, lines: Sequence[str]) -> str:
     return "\n".join([f"[[{title}]]", *lines]) + "\n"
 
 
+def blocks_of(parts: Iterable[tuple[str, Sequence[str]]]) -> str:
+    """Format the titled parts of a report that have lines."""
+    return "".join(block(title, lines) for title, lines in parts if lines)
+
+
 def wrapped(text: str, first: str = "", rest: str = "") -> list[str]:
     """Wrap `text`; `first` precedes the first line and `rest` each other one."""
     return textwrap.wrap(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from pellicle.sampling.result import Prediction
 
+MARGINAL = ("median", "2.5 %", "97.5 %", "mean", "sd")
+"""Numbers of the marginal of a parameter."""
 _LEAST_MASS = 0.005
 """Minima with less of the posterior are not listed."""
 
@@ -46,7 +48,7 @@ def posterior_report(posterior: Posterior) -> str:
 
 
 def _marginals(posterior: Posterior) -> list[str]:
-    head = ("", "median", "2.5 %", "97.5 %", "mean", "sd", "")
+    head = ("", *MARGINAL, "")
     rows = [
         (m.name, *(_number(x, m) for x in (m.q50, m.q025, m.q975, m.mean)), f"{m.sd:.2g}", m.unit)
         for m in posterior.parameters.values()
@@ -55,9 +57,8 @@ def _marginals(posterior: Posterior) -> list[str]:
     lead = next(iter(posterior.parameters.values()))
     several = [mode for mode in lead.modes if mode.mass >= _LEAST_MASS]
     if len(several) > 1:
-        rows = [
-            (f"{lead.name} near", _number(mode.value, lead), f"{100 * mode.mass:.1f} %") for mode in several
-        ]
+        near = f"{lead.name} near"
+        rows = [(near, _number(mode.value, lead), f"{100 * mode.mass:.1f} %") for mode in several]
         lines += ["", *table([("minimum", "", "share"), *rows])]
     return lines
 

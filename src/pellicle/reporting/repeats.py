@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pellicle.files import MARKER, new_folder, write_text
-from pellicle.reporting.json_record import indented, strict, taken, versions
-from pellicle.reporting.plain_text import block, csv_rows, facts, table, wrapped, written_by
+from pellicle.reporting.json_record import failed, indented, strict, taken, versions
+from pellicle.reporting.plain_text import blocks_of, csv_rows, facts, table, wrapped, written_by
 
 if TYPE_CHECKING:
     from pellicle.fitting.repeated_measurements import RepeatedParameter, Repeats
@@ -20,16 +20,10 @@ FILES = RECORD, TABLE, TEXT = "repeats.json", "repeats.csv", "repeats.txt"
 
 def report(repeats: Repeats) -> str:
     """Format the verdict, a row for each parameter, and what was left out."""
-    sentences = warnings(repeats)
-    return (
-        block("Repeats", wrapped(repeats.verdict))
-        + block("Scatter of the parameters", [*table(rows(repeats)), "", *facts(notes(repeats))])
-        + (
-            block("Warnings", [line for text in sentences for line in wrapped(text, "- ", "  ")])
-            if sentences
-            else ""
-        )
-    )
+    scatter = [*table(rows(repeats)), "", *facts(notes(repeats))]
+    sentences = [line for text in warnings(repeats) for line in wrapped(text, "- ", "  ")]
+    parts = (("Repeats", wrapped(repeats.verdict)), ("Scatter of the parameters", scatter))
+    return blocks_of([*parts, ("Warnings", sentences)])
 
 
 def rows(repeats: Repeats) -> list[tuple[str, ...]]:
@@ -37,20 +31,11 @@ def rows(repeats: Repeats) -> list[tuple[str, ...]]:
     from pellicle.fitting.repeated_measurements import short
 
     head = ("", "mean", "± its sd", "scatter", "stated noise", "ratio", "probability", "± 95 %", "unit")
-    return [head] + [
-        (
-            p.name,
-            f"{p.mean:.7g}",
-            short(p.sd_mean),
-            short(p.sd),
-            short(p.stated),
-            short(p.ratio),
-            f"{p.probability:.2g}",
-            short(p.expanded),
-            p.unit,
-        )
-        for p in repeats.parameters.values()
-    ]
+    cells = []
+    for p in repeats.parameters.values():
+        scatter = map(short, (p.sd_mean, p.sd, p.stated, p.ratio))
+        cells.append((p.name, f"{p.mean:.7g}", *scatter, f"{p.probability:.2g}", short(p.expanded), p.unit))
+    return [head, *cells]
 
 
 def notes(repeats: Repeats) -> list[tuple[str, str]]:
@@ -89,8 +74,7 @@ def to_json(repeats: Repeats) -> dict[str, Any]:
 
 def failure(paths: Sequence[str], error: str) -> dict[str, Any]:
     """Build the record of repeats that could not be compared."""
-    data = [{"path": path, "status": None, "used": False} for path in paths]
-    return {"schema": SCHEMA, "data": data, "status": "failed", "error": error, "versions": versions()}
+    return failed(SCHEMA, [{"path": path, "status": None, "used": False} for path in paths], error)
 
 
 def _parameter(p: RepeatedParameter) -> dict[str, Any]:

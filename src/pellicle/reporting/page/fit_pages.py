@@ -17,7 +17,6 @@ import numpy as np
 from pellicle.fitting.curves import ColourCurve
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit, Part, Status
-from pellicle.fitting.status import RIVAL
 from pellicle.reporting import figures, fit_text
 from pellicle.reporting import repeats as repeats_text
 from pellicle.reporting.drawable import Line, Panel, Section, Style, labelled
@@ -29,6 +28,7 @@ from pellicle.reporting.page import repetition
 from pellicle.reporting.page.document import Table, page, picture
 from pellicle.reporting.plain_text import with_unit
 from pellicle.reporting.plotly_figure import figure
+from pellicle.reporting.posterior import MARGINAL
 from pellicle.reporting.quantities import colour_codes, colours_in_words, colours_of
 from pellicle.sampling.result import Posterior, verdict
 
@@ -116,8 +116,7 @@ def _rivals(fit: Fit) -> Table:
     units = {name: p.unit for name, p in fit.parameters.items()}
     heads = [labelled(name, units.get(name, "")) for name in names]
     head = ["rival", "Δχ²", *(["probability"] if known else []), *heads]
-    caption = f"Other minima and how much worse they fit (Δχ² below {RIVAL:g}: about as well)"
-    return Table(caption, head, rows)
+    return Table(f"O{fit_text.OTHER_MINIMA[1:]}", head, rows)
 
 
 def _parameters(fit: Fit) -> Table:
@@ -197,11 +196,7 @@ def posterior_section(posterior: Posterior, pictures: Mapping[str, bytes]) -> di
     ]
     return {
         "verdict": verdict(posterior),
-        "marginals": Table(
-            "Marginal of each parameter",
-            ("parameter", "median", "2.5 %", "97.5 %", "mean", "sd", "unit"),
-            rows,
-        ),
+        "marginals": Table("Marginal of each parameter", ("parameter", *MARGINAL, "unit"), rows),
         "checks": Table("Checks of the chain", (), about),
         "trace": _trace(posterior),
         "pictures": [picture(pictures[name], text) for name, text in _PICTURES.items() if name in pictures],
