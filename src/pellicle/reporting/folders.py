@@ -175,10 +175,8 @@ def write_index(
     """
     from pellicle.reporting.page.fit_pages import batch_page
 
-    target = new_folder(folder)
-    places = [None if own is None else Path(own) / PAGE for own in folders[: len(records)]]
-    links = [
-        place.relative_to(target).as_posix() if place is not None and place.exists() else None
-        for place in places
-    ]
+    target, links = new_folder(folder), []
+    for own in folders[: len(records)]:
+        place = None if own is None else Path(own) / PAGE
+        links.append(place.relative_to(target).as_posix() if place and place.exists() else None)
     write_text(target / PAGE, batch_page(records, links, repeats), overwrite=True)

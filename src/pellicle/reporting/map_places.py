@@ -50,10 +50,8 @@ class Axis:
     def number(self, value: float) -> str:
         """Format a coordinate with the digits that tell neighbours apart."""
         off = 0.02 * self.step
-        decimals = next(
-            (d for d in range(9) if np.all(abs(np.round(self.values, d) - self.values) <= off)), 9
-        )
-        return f"{value:.{decimals}f}"
+        enough = (d for d in range(9) if np.all(abs(np.round(self.values, d) - self.values) <= off))
+        return f"{value:.{next(enough, 9)}f}"
 
     def span(self, first: float, last: float) -> str:
         """`x = 0.2 to 1.4 mm`."""
@@ -66,9 +64,8 @@ class Axis:
         middles = (self.values[1:] + self.values[:-1]) / 2
         if not middles.size:
             return self.values[0] + self.step * np.array([-0.5, 0.5])
-        return np.concatenate(
-            [[2 * self.values[0] - middles[0]], middles, [2 * self.values[-1] - middles[-1]]]
-        )
+        ends = 2 * self.values[[0, -1]] - middles[[0, -1]]
+        return np.concatenate([ends[:1], middles, ends[1:]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +189,10 @@ def _in_frame(marked: np.ndarray, known: np.ndarray, axes: MapAxes, counted: boo
     if count <= FEW and axes.kind != "line":
         return "at " + " and at ".join(axes.place(*index) for index in np.argwhere(marked).tolist())
     if axes.kind == "line":
-        return _on_line(marked, axes.x)
+        runs = sorted(_runs(marked), key=lambda run: run[0] - run[1])[:FEW]
+        if sum(b - a for a, b in runs) < MOST * marked.sum():
+            return "in scattered pixels"
+        return "at " + _spans(sorted(runs), axes.x)
     if axes.kind == "sites":
         return _at_sites(marked, known, axes)
     if count == known.sum():
@@ -214,13 +214,6 @@ def _around(marked: np.ndarray, axes: MapAxes) -> str:
     assert axes.y is not None
     x, y = (axis.span(*axis.values[at[[0, -1]]]) for axis, at in ((axes.x, columns), (axes.y, rows)))
     return f"all around {x}, {y}"
-
-
-def _on_line(marked: np.ndarray, axis: Axis) -> str:
-    runs = sorted(_runs(marked), key=lambda run: run[0] - run[1])[:FEW]
-    if sum(b - a for a, b in runs) < MOST * marked.sum():
-        return "in scattered pixels"
-    return "at " + _spans(sorted(runs), axis)
 
 
 def _at_sites(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
@@ -253,15 +246,13 @@ def _rows(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
         if len(runs) > FEW:
             return f"{mostly}in {sum(b - a for a, b in runs)} {word}s"
         if len(runs) == 1:
-            edges = [
-                end for end, at in zip(ends, (runs[0][0] == 0, runs[0][1] == each.size), strict=True) if at
-            ]
+            [(first, last)] = runs
+            edges = [end for end, at in zip(ends, (first == 0, last == each.size), strict=True) if at]
             if len(edges) == 1:
                 return f"{mostly}along the {edges[0]} edge, {_spans(runs, axis)}"
         number = sum(b - a for a, b in runs)
-        return (
-            f"{mostly}in {'one' if number == 1 else number} {word}{'s' * (number > 1)}, {_spans(runs, axis)}"
-        )
+        count = "one" if number == 1 else number
+        return f"{mostly}in {count} {word}{'s' * (number > 1)}, {_spans(runs, axis)}"
     return ""
 
 
@@ -314,11 +305,9 @@ def _patches(marked: np.ndarray, known: np.ndarray, axes: MapAxes, counted: bool
         x = x_axis.span(*x_axis.values[[columns.start, columns.stop - 1]])
         return f"{size}at {x}, {y_axis.span(*y_axis.values[[rows.start, rows.stop - 1]])}"
 
-    texts = [described(i) for i in largest[:listed].tolist()]
+    texts = " and ".join(described(i) for i in largest[:listed].tolist())
     mostly = _mostly(sizes[largest[:listed]].sum() / marked.sum())
-    return mostly + (
-        f"in one patch {texts[0]}" if listed == 1 else f"in {listed} patches, {' and '.join(texts)}"
-    )
+    return f"{mostly}in one patch {texts}" if listed == 1 else f"{mostly}in {listed} patches, {texts}"
 
 
 def _mostly(covered: float) -> str:

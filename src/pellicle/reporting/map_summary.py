@@ -140,7 +140,8 @@ def summarise(made: Dataset | Map) -> MapSummary:
             places[word] = place(codes == CODES[word], known, axes)
     thin = thinned(dataset, axes)
     used = is_decided(np.asarray(thin["status"]))
-    parameters = tuple(_parameter(thin, name, used) for name in free_parameters(dataset))
+    shown = map_axes(thin)
+    parameters = tuple(_parameter(thin, name, used, shown) for name in free_parameters(dataset))
     rates = summarise_rates(thin)
     about, counted = dict(dataset.attrs), evidence(dataset)
     plan = json.loads(about["plan"]) if about.get("plan") is not None else []
@@ -161,28 +162,17 @@ def _step(axes: MapAxes) -> int:
     return max(int(np.ceil((np.prod(axes.shape, dtype=float) / MOST_PIXELS) ** (1 / along))), 1)
 
 
-def _parameter(dataset: Dataset, variable: str, used: np.ndarray) -> ParameterSummary:
-    values = np.asarray(dataset[variable], dtype=float)
-    own = values[used]
-    empty = not np.isfinite(own).any()
-    return ParameterSummary(
-        parameter_name(dataset, variable),
-        variable,
-        unit_of(dataset, variable),
-        np.full(5, np.nan) if empty else np.nanpercentile(own, [0, 5, 50, 95, 100]),
-        _median(dataset, f"{variable}_stderr", used),
-        _median(dataset, f"{variable}_stderr_noise", used),
-        None if empty else _plane(values, used, map_axes(dataset), unit_of(dataset, variable)),
-    )
-
-
-def _median(dataset: Dataset, variable: str, used: np.ndarray) -> float:
-    """Median over pixels, NaN where nothing is known."""
-    if variable not in dataset:
-        return float("nan")
-    values = np.asarray(dataset[variable], dtype=float)[used]
-    values = values[~np.isnan(values)]
-    return float(np.median(values)) if values.size else float("nan")
+def _parameter(dataset: Dataset, variable: str, used: np.ndarray, axes: MapAxes) -> ParameterSummary:
+    values, unit, medians = np.asarray(dataset[variable], dtype=float), unit_of(dataset, variable), []
+    for name in (f"{variable}_stderr", f"{variable}_stderr_noise"):
+        errors = np.asarray(dataset[name], dtype=float)[used] if name in dataset else np.full(1, np.nan)
+        medians.append(float("nan") if np.all(np.isnan(errors)) else float(np.nanmedian(errors)))
+    percentiles, plane = np.full(5, np.nan), None
+    if np.isfinite(values[used]).any():
+        percentiles = np.nanpercentile(values[used], [0, 5, 50, 95, 100])
+        plane = _plane(values, used, axes, unit)
+    name = parameter_name(dataset, variable)
+    return ParameterSummary(name, variable, unit, percentiles, *medians, plane=plane)
 
 
 def _plane(values: np.ndarray, used: np.ndarray, axes: MapAxes, unit: str) -> Plane | None:
@@ -196,8 +186,8 @@ def _plane(values: np.ndarray, used: np.ndarray, axes: MapAxes, unit: str) -> Pl
     else:
         grid = [axis.values for axis in directions]
     used = used & np.isfinite(values)
-    own = values[used]
-    if own.size <= len(directions) + 1:
+    own, units = values[used], {axis.unit for axis in directions}
+    if own.size <= len(directions) + 1 or len(units) > 1:
         return None
     columns = np.stack([np.ones(own.size), *(part[used] - part[used].mean() for part in grid)], axis=1)
     solution, _, rank, _ = np.linalg.lstsq(columns, own, rcond=None)
@@ -205,10 +195,9 @@ def _plane(values: np.ndarray, used: np.ndarray, axes: MapAxes, unit: str) -> Pl
     if rank < columns.shape[1] or variance == 0:
         return None
     explains = 1 - np.var(rest) / variance
-    length = directions[0].unit
-    units = {axis.unit for axis in directions}
-    if explains < LEAST_EXPLAINED or len(units) > 1:
+    if explains < LEAST_EXPLAINED:
         return None
+    [length] = units
     per = f"{unit or '1'}/{ {'pixels': 'pixel'}.get(length, length or 'step') }".replace(" ", "")
     slopes = {axis.name: float(s) for axis, s in zip(directions, solution[1:], strict=True)}
     return Plane(slopes, per, float(np.sqrt(np.mean(rest**2))), float(explains))
@@ -252,17 +241,12 @@ def summarise_rates(dataset: Dataset) -> tuple[RateSummary, ...]:
         known = status != RATES.index("no-data")
         if not known.any():
             continue
-        of = {key: made[f"{name}_rate{key}"].values[known] for key in ("", "_stderr", "_stderr_noise")}
-        low, middle, high = np.percentile(of[""], [5, 50, 95]).tolist()
-        rates.append(
-            RateSummary(
-                name,
-                made[f"{name}_rate"].attrs["units"],
-                (low, middle, high),
-                float(np.median(of["_stderr"])),
-                float(np.median(of["_stderr_noise"])),
-                int(np.count_nonzero(status == RATES.index("constant"))),
-                int(np.count_nonzero(status == RATES.index("not-constant"))),
-            )
+        values, *errors = (
+            made[f"{name}_rate{key}"].values[known] for key in ("", "_stderr", "_stderr_noise")
         )
+        low, middle, high = np.percentile(values, [5, 50, 95]).tolist()
+        stderr, noise = (float(np.median(x)) for x in errors)
+        counts = (int(np.count_nonzero(status == RATES.index(x))) for x in ("constant", "not-constant"))
+        unit = made[f"{name}_rate"].attrs["units"]
+        rates.append(RateSummary(name, unit, (low, middle, high), stderr, noise, *counts))
     return tuple(rates)

@@ -58,46 +58,31 @@ def describe(name: str) -> str:
     is_file = entry is None and source.page == name.strip() and Path(source.page).is_file()
     of_file = read_material_file(source.page) if is_file else None
     names = ("format", "columns", "title", "comments")
+    # n, and k where it is known, at the sodium line, or in the middle of a range without it
+    at = SODIUM_NM if low <= SODIUM_NM <= high else round((low + high) / 2)
+    value = complex(source(at))
+    k = f", k = {value.imag:.4g}" if source.has_extinction else ""
+    index = f"n = {value.real:.5g}{k} at {at:g} nm"
     facts = [
         ("file" if is_file else "page", source.page),
         *((name, getattr(of_file, name)) for name in (names if is_file else ())),
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
-        ("index", _index(source)),
+        ("index", index),
         ("caution", source.caution),
         ("why" if entry else "sample", "" if is_file else source.note),
         ("reference", source.citation),
         ("aliases", ", ".join(entry.aliases) if entry else ""),
     ]
-    text = [
-        source.name,
-        *(
-            textwrap.fill(
-                value,
-                100,
-                initial_indent=f"  {label:<11}",
-                subsequent_indent=" " * 13,
-                break_on_hyphens=False,
-            )
-            for label, value in facts
-            if value
-        ),
-    ]
+    text, how = [source.name], {"width": 100, "subsequent_indent": " " * 13, "break_on_hyphens": False}
+    for label, value in ((label, value) for label, value in facts if value):
+        text.append(textwrap.fill(value, initial_indent=f"  {label:<11}", **how))
     parts = source.page.split("/")
     others = contents.pages_of_book(parts[1]) if len(parts) == 3 and not is_file else []
     if others:
         rows = (_row(f"{p.book}/{p.page}", p)[:1] + _row("", p)[2:] + (p.comments[:60],) for p in others)
         text += ["", f"pages of {parts[1]} in this installation:", *(f"  {line}" for line in aligned(rows))]
     return "\n".join(text) + "\n"
-
-
-def _index(source: Material) -> str:
-    """n, and k where it is known, at the sodium line, or in the middle of a range without it."""
-    low, high = source.wavelength_range
-    at = SODIUM_NM if low <= SODIUM_NM <= high else round((low + high) / 2)
-    value = complex(source(at))
-    k = f", k = {value.imag:.4g}" if source.has_extinction else ""
-    return f"n = {value.real:.5g}{k} at {at:g} nm"
 
 
 def shown_range(material: Material) -> tuple[float, float]:

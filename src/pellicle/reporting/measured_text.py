@@ -35,13 +35,10 @@ def describe(measured: Spectrum | Colours | Cube, notes: tuple[str, ...] | None 
 
 def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
     """Convert the summary to a dictionary; numbers that are unknown are None."""
-    match measured:
-        case Spectrum():
-            record = _spectrum_record(measured)
-        case Colours():
-            record = _colours_record(measured)
-        case _:
-            record = _cube_record(measured)
+    if isinstance(measured, Spectrum):
+        record = _spectrum_record(measured)
+    else:
+        record = _colours_record(measured) if isinstance(measured, Colours) else _cube_record(measured)
     return strict(record | {"notes": measured.notes, "versions": versions()})
 
 

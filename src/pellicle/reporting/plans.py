@@ -63,12 +63,7 @@ def to_json(plan: Plan, savings: Savings) -> dict[str, Any]:
     effects = []
     for row in plan.rows:
         saving = savings.effects.get(row.effect)
-        effects.append(
-            {
-                **taken(row, "effect", "on", "why", "error_bound"),
-                "cost": 0.0 if saving is None else saving.seconds,
-                "error_without": None if saving is None else saving.error,
-            }
-        )
+        saved = {"cost": getattr(saving, "seconds", 0.0), "error_without": getattr(saving, "error", None)}
+        effects.append(taken(row, "effect", "on", "why", "error_bound") | saved)
     record = taken(plan, "tolerance", "error_bound", "gradient_error")
     return {"schema": "pellicle.plan/1", **record, "effects": effects}

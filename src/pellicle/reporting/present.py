@@ -132,10 +132,8 @@ def html(result: Fit | Posterior | Comparison | Repeats | Cost | Map) -> str:
             rows = [(p.name, f"{p.value:.8g}", f"{p.stderr:.2g}", p.unit) for p in result.free]
         case Posterior():
             head, columns = escape(verdict(result)), ("", "median", "2.5 %", "97.5 %", "unit")
-            rows = [
-                (m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975)), m.unit)
-                for m in result.parameters.values()
-            ]
+            every = result.parameters.values()
+            rows = [(m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975)), m.unit) for m in every]
         case _:
             return f"<pre>{escape(report(result))}</pre>"
     heads = "".join(f"<th>{column}</th>" for column in columns)

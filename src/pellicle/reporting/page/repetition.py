@@ -74,6 +74,12 @@ def _written(fit: Fit) -> list[tuple[str, str]]:
         return []
 
 
+_BIBTEX = """\
+@software{pellicle,
+  author = {{The pellicle developers}},
+  title = {pellicle: thickness and refractive index of thin layers from measured spectra},
+  version = {VERSION},
+}"""
 _GRANIER = "X. Granier and W. Heidrich: A simple layered RGB BRDF model. Pacific Graphics 2002."
 _BELCOUR = (
     "L. Belcour and P. Barla: A practical extension to microfacet theory for the modeling of varying"
@@ -107,13 +113,4 @@ def sources(fit: Fit, posterior: Posterior | None = None) -> list[str]:
 
 def bibtex() -> str:
     """BibTeX entry of this version of pellicle."""
-    number = version("pellicle")
-    return "\n".join(
-        [
-            "@software{pellicle,",
-            "  author = {{The pellicle developers}},",
-            "  title = {pellicle: thickness and refractive index of thin layers from measured spectra},",
-            f"  version = {{{number}}},",
-            "}",
-        ]
-    )
+    return _BIBTEX.replace("VERSION", version("pellicle"))
