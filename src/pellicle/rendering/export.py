@@ -222,14 +222,10 @@ def _of_surface(surface: Surface) -> Film:
             " blinn-phong-film"
         )
     numbers: dict[str, Any] = dict(surface.start_numbers())
-    own = (("n", "k"), ("base_n", "base_k"))
-    layer, base = (
-        _medium(numbers, *keys) if given is None else given
-        for given, keys in zip((surface.film, surface.base), own, strict=True)
-    )
-    scene = Scene(
-        Layer(layer, float(numbers["thickness"])), base, ambient=_medium(numbers, "ambient_n", "ambient_k")
-    )
+    layer = _medium(numbers, "n", "k") if surface.film is None else surface.film
+    base = _medium(numbers, "base_n", "base_k") if surface.base is None else surface.base
+    ambient = _medium(numbers, "ambient_n", "ambient_k")
+    scene = Scene(Layer(layer, float(numbers["thickness"])), base, ambient=ambient)
     notes = []
     if np.any(numbers.get("diffuse", 0.0)):
         notes.append("the diffuse part of the surface is left out")
@@ -249,9 +245,6 @@ def _medium(numbers: Mapping[str, Any], n: str, k: str) -> Constant | Table:
     if np.ndim(index) == 0 and np.ndim(extinction if extinction is not None else 0.0) == 0:
         return Constant(float(index), None if extinction is None else float(extinction))
     nm = numbers["wavelengths"]
-    table = along_the_spectrum(np.broadcast_to(index, np.shape(nm)), nm)
-    if extinction is None:
-        return table
-    return Table(
-        table.wavelength, table.n, along_the_spectrum(np.broadcast_to(extinction, np.shape(nm)), nm).n
-    )
+    known = [x for x in (index, extinction) if x is not None]
+    tables = [along_the_spectrum(np.broadcast_to(x, np.shape(nm)), nm) for x in known]
+    return Table(tables[0].wavelength, *(table.n for table in tables))

@@ -149,8 +149,9 @@ def effective(formula: Formula, look: Appearance) -> Solution:
     """
     start = physical(formula, look)
     keys = formula.keys
-    lower = np.concatenate([[_BOUNDS[0]], *(np.full(k.channels, k.lower) for k in keys)])
-    upper = np.concatenate([[_BOUNDS[1]], *(np.full(k.channels, k.upper) for k in keys)])
+    lower, upper = (
+        np.concatenate([[_BOUNDS[i]], *(np.full(key.channels, key[1 + i]) for key in keys)]) for i in (0, 1)
+    )
     own = np.concatenate([np.ravel(start.numbers[k.name]) for k in keys])
     # a little inside the bounds, where every number has a slope
     inside = np.clip(own, lower[1:] + 0.01 * (upper - lower)[1:], upper[1:] - 0.01 * (upper - lower)[1:])
@@ -189,9 +190,7 @@ def _truth(look: Appearance) -> dict[str, Any]:
     }
 
 
-@partial(jax.jit, static_argnums=0)
-def _xyz(formula: Formula, numbers: dict[str, Any], thickness: Any) -> Any:
-    return formula.xyz(numbers, thickness)
+_xyz = jax.jit(Formula.xyz, static_argnums=0)
 
 
 @partial(jax.jit, static_argnums=0)

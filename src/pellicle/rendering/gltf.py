@@ -104,9 +104,8 @@ def sphere_mesh(rows: int = 48, columns: int = 96) -> Mesh:
     """Return a sphere of `rows` from the upper pole (+y) to the lower one, and `columns` around it."""
     v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
     theta, phi = np.pi * v, 2 * np.pi * u
-    positions = np.stack(
-        [-np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1
-    ).reshape(-1, 3)
+    xyz = [-np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)]
+    positions = np.stack(xyz, axis=-1).reshape(-1, 3)
     texture = np.stack([u, v], axis=-1).reshape(-1, 2)
     upper_left = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1)
     right, below = upper_left + 1, upper_left + columns + 1
@@ -175,18 +174,13 @@ def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> byt
         model.textures = [gltf.Texture(source=0, sampler=0)]
         added["KHR_materials_iridescence"]["iridescenceThicknessTexture"] = {"index": 0}
     model.extensionsUsed = list(added)
-    model.materials = [
-        gltf.Material(
-            name=material.name,
-            pbrMetallicRoughness=gltf.PbrMetallicRoughness(
-                baseColorFactor=[*colour, 1.0],
-                metallicFactor=float(look.metallic),
-                roughnessFactor=float(np.sqrt(look.roughness)),  # glTF squares it to GGX's α
-            ),
-            extensions=added,
-            extras={"pellicle": material.record()},
-        )
-    ]
+    pbr = gltf.PbrMetallicRoughness(
+        baseColorFactor=[*colour, 1.0],
+        metallicFactor=float(look.metallic),
+        roughnessFactor=float(np.sqrt(look.roughness)),  # glTF squares it to GGX's α
+    )
+    about = {"pbrMetallicRoughness": pbr, "extras": {"pellicle": material.record()}}
+    model.materials = [gltf.Material(name=material.name, extensions=added, **about)]
     return image
 
 
@@ -202,18 +196,15 @@ def _add_sphere(model: Any, gltf: Any) -> bytes:
     )
     for number, (array, kind, component, dtype, use) in enumerate(arrays):
         content = array.astype(dtype).tobytes()
-        model.bufferViews.append(
-            gltf.BufferView(buffer=0, byteOffset=len(blob), byteLength=len(content), target=use)
-        )
+        place = {"buffer": 0, "byteOffset": len(blob), "byteLength": len(content)}
+        model.bufferViews.append(gltf.BufferView(target=use, **place))
         bounds = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if number == 0 else {}
-        model.accessors.append(
-            gltf.Accessor(bufferView=number, componentType=component, count=len(array), type=kind, **bounds)
-        )
+        about = {"bufferView": number, "componentType": component, "count": len(array), "type": kind}
+        model.accessors.append(gltf.Accessor(**about, **bounds))
         blob += content + b"\0" * (-len(content) % 4)
     attributes = gltf.Attributes(POSITION=0, NORMAL=1, TEXCOORD_0=2)
-    model.meshes = [
-        gltf.Mesh(name="sphere", primitives=[gltf.Primitive(attributes=attributes, indices=3, material=0)])
-    ]
+    primitive = gltf.Primitive(attributes=attributes, indices=3, material=0)
+    model.meshes = [gltf.Mesh(name="sphere", primitives=[primitive])]
     model.nodes, model.scenes, model.scene = [gltf.Node(mesh=0, name="sphere")], [gltf.Scene(nodes=[0])], 0
     return blob
 

@@ -14,6 +14,7 @@ Source: MaterialX 1.39.5, libraries/pbrlib/genglsl/lib/mx_microfacet_specular.gl
 """
 
 import json
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -163,14 +164,9 @@ METAL = Formula(
 )
 
 
-def formula(look: Appearance) -> Formula:
-    """The formula of MaterialX's own nodes, and of Standard Surface, for a base."""
-    return CONDUCTOR if look.metallic else DIELECTRIC
-
-
-def open_pbr_formula(look: Appearance) -> Formula:
-    """The formula of OpenPBR for a base."""
-    return METAL if look.metallic else DIELECTRIC
+def formula(look: Appearance, metal: Formula = CONDUCTOR) -> Formula:
+    """The formula of MaterialX's own nodes, and of Standard Surface, for a base; with `METAL` of OpenPBR."""
+    return metal if look.metallic else DIELECTRIC
 
 
 _BRIGHTEST = 0.99
@@ -235,17 +231,14 @@ def bsdf_of(material: Material) -> tuple[str, str, dict[str, tuple[str, Any]]]:
     """Category, name and inputs of the node of the film, by name as type and value."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    inputs: dict[str, tuple[str, Any]] = {
-        "roughness": ("vector2", [look.roughness] * 2),
-        "thinfilm_thickness": ("float", solution.scale * material.thickness),
-        "thinfilm_ior": ("float", float(numbers["ior"])),
-    }
+    inputs = {"roughness": ("vector2", [look.roughness] * 2)}
+    inputs |= _floats(thinfilm_thickness=solution.scale * material.thickness, thinfilm_ior=numbers["ior"])
     if look.metallic:
-        colours = {"ior": ("color3", _list(numbers["n"])), "extinction": ("color3", _list(numbers["k"]))}
+        colours = {"ior": _colour(numbers["n"]), "extinction": _colour(numbers["k"])}
         return "conductor_bsdf", "film_conductor", colours | inputs
-    glass: dict[str, tuple[str, Any]] = {
-        "tint": ("color3", _list(numbers["tint"])),
-        "ior": ("float", float(numbers["base"])),
+    glass = {
+        "tint": _colour(numbers["tint"]),
+        **_floats(ior=numbers["base"]),
         "scatter_mode": ("string", "RT"),
     }
     return "dielectric_bsdf", "film_dielectric", glass | inputs
@@ -255,26 +248,18 @@ def standard_surface(material: Material) -> dict[str, tuple[str, Any]]:
     """Inputs of a Standard Surface, by name as type and value."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    inputs: dict[str, tuple[str, Any]] = {
-        "specular": ("float", 1.0),
-        "specular_roughness": ("float", float(np.sqrt(look.roughness))),  # squared to GGX's α
-        "thin_film_thickness": ("float", solution.scale * material.thickness),
-        "thin_film_IOR": ("float", float(numbers["ior"])),
-    }
+    inputs = _floats(
+        specular=1.0,
+        specular_roughness=np.sqrt(look.roughness),  # squared to GGX's α
+        thin_film_thickness=solution.scale * material.thickness,
+        thin_film_IOR=numbers["ior"],
+    )
     if look.metallic:
         reflectance, edge = artistic_colours(numbers["n"], numbers["k"])
-        return inputs | {
-            "base": ("float", 1.0),
-            "base_color": ("color3", _list(reflectance)),
-            "specular_color": ("color3", _list(edge)),
-            "metalness": ("float", 1.0),
-        }
-    return inputs | {
-        "base": ("float", 0.0),
-        "specular_color": ("color3", _list(numbers["tint"])),
-        "specular_IOR": ("float", float(numbers["base"])),
-        "transmission": ("float", 1.0),
-    }
+        colours = {"base_color": _colour(reflectance), "specular_color": _colour(edge)}
+        return inputs | colours | _floats(base=1.0, metalness=1.0)
+    glass = _floats(base=0.0, specular_IOR=numbers["base"], transmission=1.0)
+    return inputs | glass | {"specular_color": _colour(numbers["tint"])}
 
 
 def artistic_colours(n: Any, k: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -322,28 +307,25 @@ def open_pbr(material: Material) -> dict[str, tuple[str, Any]]:
     """Inputs of an OpenPBR surface, by name as type and value; its thickness is in µm."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    values: dict[str, tuple[str, Any]] = {
-        "specular_roughness": ("float", float(np.sqrt(look.roughness))),  # squared to GGX's α
-        "thin_film_weight": ("float", float(numbers.get("weight", 1.0))),
-        "thin_film_thickness": ("float", 1e-3 * solution.scale * material.thickness),
-        "thin_film_ior": ("float", float(numbers["ior"])),
-    }
+    values = _floats(
+        specular_roughness=np.sqrt(look.roughness),  # squared to GGX's α
+        thin_film_weight=numbers.get("weight", 1.0),
+        thin_film_thickness=1e-3 * solution.scale * material.thickness,
+        thin_film_ior=numbers["ior"],
+    )
     if look.metallic:
-        return values | {
-            "base_color": ("color3", np.asarray(numbers["base"]).tolist()),
-            "base_metalness": ("float", 1.0),
-            "specular_color": ("color3", np.asarray(numbers["edge"]).tolist()),
-        }
-    return values | {
-        "base_weight": ("float", 0.0),
-        "specular_color": ("color3", np.asarray(numbers["tint"]).tolist()),
-        "specular_ior": ("float", float(numbers["base"])),
-        "transmission_weight": ("float", 1.0),
-    }
+        colours = {"base_color": _colour(numbers["base"]), "specular_color": _colour(numbers["edge"])}
+        return values | colours | _floats(base_metalness=1.0)
+    glass = _floats(base_weight=0.0, specular_ior=numbers["base"], transmission_weight=1.0)
+    return values | glass | {"specular_color": _colour(numbers["tint"])}
 
 
-def _list(value: Any) -> list[float]:
-    return np.broadcast_to(np.asarray(value, float), 3).tolist()
+def _floats(**numbers: Any) -> dict[str, tuple[str, Any]]:
+    return {name: ("float", float(number)) for name, number in numbers.items()}
+
+
+def _colour(value: Any) -> tuple[str, Any]:
+    return "color3", np.broadcast_to(np.asarray(value, float), 3).tolist()
 
 
 def _library() -> Any:
@@ -352,4 +334,6 @@ def _library() -> Any:
 
 
 TARGET = Target("materialx", "MaterialX", (".mtlx",), ("MaterialX",), formula, write)
-OPEN_PBR = Target("openpbr", "OpenPBR", (".mtlx",), ("MaterialX",), open_pbr_formula, write_open_pbr)
+OPEN_PBR = Target(
+    "openpbr", "OpenPBR", (".mtlx",), ("MaterialX",), partial(formula, metal=METAL), write_open_pbr
+)

@@ -55,9 +55,8 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
         with replacing(chosen["lookup"]) as temporary:
             np.savez_compressed(temporary, **arrays)
         write_text(chosen["plugin"], _text("mitsuba_plugin.py"), overwrite=True)
-        nm = look.thickness
-        if material.thickness_map is not None:
-            nm = material.thickness_map
+        nm = look.thickness if material.thickness_map is None else material.thickness_map
+        if "map" in chosen:
             write_grey_image(chosen["map"], nm)
         scene = {
             "comment": f"import {PLUGIN} and call its register() first, see there",
@@ -77,36 +76,28 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
 
 def _paths(path: Path, uneven: bool) -> dict[str, Path]:
     """The files that are written, by what they are."""
-    stem = path.with_suffix("")
-    paths = {
-        "rgb": path.with_suffix(".bsdf"),
-        "spectral": stem.with_name(f"{stem.name}_spectral.bsdf"),
-        "lookup": path.with_suffix(".npz"),
-        "plugin": path.with_name(f"{PLUGIN}.py"),
-        "measured": path.with_suffix(".xml"),
-        "scene": stem.with_name(f"{stem.name}_lookup.xml"),
+    names = {
+        "rgb": f"{path.stem}.bsdf",
+        "spectral": f"{path.stem}_spectral.bsdf",
+        "lookup": f"{path.stem}.npz",
+        "plugin": f"{PLUGIN}.py",
+        "measured": f"{path.stem}.xml",
+        "scene": f"{path.stem}_lookup.xml",
     }
     if path.suffix.lower() == ".bsdf":
         if uneven:
             raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
-        return {key: paths[key] for key in ("rgb", "spectral")}
-    if uneven:
-        image = stem.with_name(f"{stem.name}_thickness.png")
-        return {
-            "lookup": paths["lookup"],
-            "map": image,
-            "plugin": paths["plugin"],
-            "scene": paths["measured"],
-        }
-    return paths
+        names = {key: names[key] for key in ("rgb", "spectral")}
+    elif uneven:
+        names = names | {"map": f"{path.stem}_thickness.png", "scene": names["measured"]}
+        names = {key: names[key] for key in ("lookup", "map", "plugin", "scene")}
+    return {key: path.with_name(name) for key, name in names.items()}
 
 
 def _scene(content: Mapping[str, Any]) -> str:
     """Text of a scene with a sphere."""
-    template = Template(
-        _text("mitsuba_scene.xml"), trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
-    )
-    return template.render(content)
+    how: Any = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    return Template(_text("mitsuba_scene.xml"), **how).render(content)
 
 
 def _text(name: str) -> str:
