@@ -82,18 +82,18 @@ def disperses(case: Case) -> bool:
 
 def remaining_parameters(scene: Scene, variant: Scene) -> list[int]:
     """Positions, among the free parameters of a scene, of those that a changed scene still has."""
-    # paths are the same for a medium that is wrapped in another one (`base`)
-    names, others = (
-        [
-            "".join(str(step) for step in path if getattr(step, "name", "") != "base")
-            for path, _ in free_leaves(x)
-        ]
-        for x in (scene, variant)
-    )
-    positions: list[int] = []
-    for name in others:
-        positions.append(names.index(name, positions[-1] + 1 if positions else 0))
-    return positions
+
+    def names(scene: Scene) -> list[str]:
+        # paths are the same for a medium that is wrapped in another one (`base`)
+        paths = (
+            [step for step in path if getattr(step, "name", "") != "base"] for path, _ in free_leaves(scene)
+        )
+        return ["".join(map(str, path)) for path in paths]
+
+    every, positions = names(scene), [-1]
+    for name in names(variant):
+        positions.append(every.index(name, positions[-1] + 1))
+    return positions[1:]
 
 
 def with_effect(plan: Plan, effect: str, on: bool, count: int = 0) -> Plan:

@@ -128,17 +128,19 @@ def _with_angles(angle: Callable[[Any], Any], case: Case) -> Variant:
     )
 
 
-def _collection(reflections: int | None, case: Case) -> Variant | str:
-    """The scene with all light from its back face collected, or that of so many reflections there."""
-    if reflections is None:
-        scene = all_collected(case.scene)
-        same = scene.substrate == case.scene.substrate and scene.layers == case.scene.layers
-        return "all light from the back face is collected" if same else changed(scene)
+def _all_collected(case: Case) -> Variant | str:
+    """The scene with all light from its back face collected."""
+    scene = all_collected(case.scene)
+    same = scene.substrate == case.scene.substrate and scene.layers == case.scene.layers
+    return "all light from the back face is collected" if same else changed(scene)
+
+
+def _one_reflection(case: Case) -> Variant | str:
+    """The scene with the light of one reflection at its back face."""
     plates = [x for x in case.scene.layers if isinstance(x, Plate)]
     if plates or case.scene.substrate.back_reflections is not None:
         return "reflections are counted at the back of a substrate, where all are collected"
-    substrate = replace(case.scene.substrate, back_reflections=reflections)
-    return changed(replace(case.scene, substrate=substrate))
+    return changed(replace(case.scene, substrate=replace(case.scene.substrate, back_reflections=1)))
 
 
 def _damping(case: Case, on: bool, count: int = 0) -> Variant:
@@ -191,30 +193,28 @@ def _finer(case: Case) -> Variant | str:
     if not _is_rising(case) or len(own) < 2:
         return "too few wavelengths to insert others"
     more = np.sort(np.concatenate([own, 0.5 * (own[1:] + own[:-1])]))
-    return Variant(
-        case.plan,
-        with_wavelength(case.scene, more),
-        lambda signal: signal.reshape(len(more), -1)[::2].reshape(-1),
-    )
+    finish = lambda signal: signal.reshape(len(more), -1)[::2].reshape(-1)  # noqa: E731
+    return Variant(case.plan, with_wavelength(case.scene, more), finish)
+
+
+def _planned(case: Case) -> Variant:
+    return Variant(plan(case.scene, case.tolerance), case.scene)
+
+
+def _sliced(count: int) -> Apply:
+    return having(*_GRADED, partial(removed, HomogeneousSlices(count)))
 
 
 _BACK, _GRADED = ("back-face", "the substrate has no back face"), ("gradient", "no layer is graded")
+_CLOSED = ("coherence", "the full plan is the closed form")
 ORDERS = (1, 2, 3, 5, 8)
 SLICES, HOMOGENEOUS_SLICES = (2, 4, 8), (8, 32)
 
 METHODS = (
     Method("float64", "nothing", lambda case: Variant(case.plan, case.scene)),
     Method("float32", "nine digits of sixteen", lambda case: Variant(case.plan, case.scene), double=False),
-    Method(
-        "planned",
-        "what its plan leaves out",
-        lambda case: Variant(plan(case.scene, case.tolerance), case.scene),
-    ),
-    Method(
-        "closed form",
-        "the damping of fringes",
-        having("coherence", "the full plan is the closed form", partial(_damping, on=False)),
-    ),
+    Method("planned", "what its plan leaves out", _planned),
+    Method("closed form", "the damping of fringes", having(*_CLOSED, partial(_damping, on=False))),
     *(Method(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
     Method("incoherent", "interference", partial(_orders, 0)),
     *(Method(f"{n} nodes", "finer averages", partial(_nodes, n)) for n in (3, 7)),
@@ -222,26 +222,15 @@ METHODS = (
     Method("s alone", "p", without("polarisation", "there is only one polarisation")),
     Method("one ray", "the cone of light", without("angle-spread", "no cone of light")),
     Method("half space", "the plate's back face", without(*_BACK)),
-    Method("one back reflection", "later ones", having(*_BACK, partial(_collection, 1))),
-    Method(
-        "all collected",
-        "that part of the light misses the detector",
-        having(*_BACK, partial(_collection, None)),
-    ),
+    Method("one back reflection", "later ones", having(*_BACK, _one_reflection)),
+    Method("all collected", "that part of the light misses the detector", having(*_BACK, _all_collected)),
     Method("smooth faces", "roughness", without("roughness", "every face is smooth")),
     Method("isotropic average", "birefringence", without("anisotropy", "no medium is birefringent")),
     Method("aligned axes", "the tilt of optic axes", aligned_axes),
     Method("4×4 matrices", "nothing", general_matrices),
     Method("mean of the depth", "the gradient", without(*_GRADED)),
     *(Method(f"{n} slices", "finer slices", having(*_GRADED, partial(fewer_slices, n))) for n in SLICES),
-    *(
-        Method(
-            f"{n} homogeneous slices",
-            "the gradient within each",
-            having(*_GRADED, partial(removed, HomogeneousSlices(n))),
-        )
-        for n in HOMOGENEOUS_SLICES
-    ),
+    *(Method(f"{n} homogeneous slices", "the gradient within each", _sliced(n)) for n in HOMOGENEOUS_SLICES),
     Method("transparent layer", "its absorption", having("absorption", "no layer absorbs", transparent)),
     Method("constant index", "dispersion: the index of mid-band", constant_index),
     Method("twice the wavelengths", "nothing", _finer),

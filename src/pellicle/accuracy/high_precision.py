@@ -79,25 +79,17 @@ def _points(scene: Scene) -> list[_Point]:
     share = 1.0 if part is None or part.back_collected is None else part.back_collected
     reflections = None if part is None else part.back_reflections
     wavelength = np.asarray(scene.light.wavelength)
-    tables = [
-        (_indices(g.above, wavelength), [_indices(x.material, wavelength) for x in g.layers],
-         _indices(g.below, wavelength), [_exact(x.thickness) for x in g.layers])
-        for g in described
-    ]  # fmt: skip
-    return [
-        _Point(
-            mpf(float(nm)),
-            mpf(float(scene.light.angle[i])) * mp.pi / 180,
-            [
-                _Group(above[i], [(n[i], d) for n, d in zip(layers, depths, strict=True)], below[i])
-                for above, layers, below, depths in tables
-            ],
-            [_exact(plate.plate_mm) for plate in plates],
-            _exact(share),
-            reflections,
-        )
-        for i, nm in enumerate(wavelength)
-    ]
+    media = [(_indices(g.above, wavelength), _indices(g.below, wavelength)) for g in described]
+    layers = [[(_indices(x.material, wavelength), _exact(x.thickness)) for x in g.layers] for g in described]
+    shared = [_exact(plate.plate_mm) for plate in plates], _exact(share), reflections
+    points = []
+    for i, nm in enumerate(wavelength):
+        each = [
+            _Group(above[i], [(n[i], d) for n, d in within], below[i])
+            for (above, below), within in zip(media, layers, strict=True)
+        ]
+        points.append(_Point(_exact(nm), _exact(scene.light.angle[i]) * mp.pi / 180, each, *shared))
+    return points
 
 
 def _exact(number: Any) -> Any:

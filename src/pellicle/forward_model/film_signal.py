@@ -19,12 +19,7 @@ from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.errors import UsageError
 from pellicle.forward_model import mixed_polarisations
-from pellicle.forward_model.coherent_groups import (
-    CoherentGroup,
-    coherent_groups,
-    power,
-    response_of,
-)
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, materials_in
 from pellicle.optics import ellipsometry, plate
@@ -184,10 +179,8 @@ def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bo
         def known(part: Any) -> bool:
             return isinstance(part, Material) and not free_leaves(part)
 
-        def at_wavelengths(part: Any) -> Any:
-            return _tabulated(part, wavelength, slope) if known(part) else part
-
-        return jax.tree.map(at_wavelengths, dispersion, is_leaf=known)
+        evaluated = lambda part: _tabulated(part, wavelength, slope) if known(part) else part  # noqa: E731
+        return jax.tree.map(evaluated, dispersion, is_leaf=known)
     if not slope:
         return Tabulated(wavelength, known_index(dispersion, wavelength), None)
     return Tabulated(wavelength, *jax.device_get(_index_and_slope(dispersion, wavelength)))
@@ -246,15 +239,12 @@ def build(plan: Plan) -> Simulate:
         rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else kind.of_power(rows[0])
 
-    return simulate if plan.reference is None else _against(simulate, build(plan.reference))
-
-
-def _against(simulate: Simulate, reference: Simulate) -> Simulate:
-    """The contrast of a scene against its reference."""
+    if plan.reference is None:
+        return simulate
+    reference = build(plan.reference)
 
     def contrast(scene: Scene) -> Any:
-        kind = scene.light.kind.seen_in(scene, False)
-        return kind.against(simulate(scene), reference(of_reference(scene)))
+        return scene.light.kind.seen_in(scene, False).against(simulate(scene), reference(of_reference(scene)))
 
     return contrast
 

@@ -20,12 +20,7 @@ from numpy.typing import ArrayLike
 
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
-from pellicle.forward_model.coherent_groups import (
-    CoherentGroup,
-    coherent_groups,
-    power,
-    response_of,
-)
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, plate, response
@@ -238,21 +233,18 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
         plan = exact(every)
         powers = _mean_powers(tabulated(every), plan=plan.static_key, letters=_polarisations(plan, every))
         R, T, layers, plates = jax.tree.map(np.asarray, powers)
-        media, rows = [], []
+        rows: dict[str, Any] = {}
         for i, run in enumerate(runs):
-            start = 0
-            for name, count in run:
-                media.append(name)
-                rows.append(np.sum(layers[i][start : start + count], axis=0))
-                start += count
+            ends = np.cumsum([0, *(count for _, count in run)])
+            for (name, count), start in zip(run, ends[:-1], strict=True):
+                rows[name] = np.sum(layers[i][start : start + count], axis=0)
             if i < len(plates):
-                media.append(names[i])
-                rows.append(plates[i])
+                rows[names[i]] = plates[i]
         sections = _sections(plan, fixed, chosen, names, runs)
     own, there = slice(nm.size), slice(nm.size, None)
-    absorptance = np.array(rows)
-    shares = {"R": R[there], "T": T[there], **dict(zip(media, absorptance[:, there], strict=True))}
-    return DepthProfile(nm, R[own], T[own], tuple(media), absorptance[:, own], chosen, shares, sections)
+    absorptance = np.array([*rows.values()])
+    shares = {name: row[there] for name, row in {"R": R, "T": T, **rows}.items()}
+    return DepthProfile(nm, R[own], T[own], tuple(rows), absorptance[:, own], chosen, shares, sections)
 
 
 def _names(scene: Scene) -> tuple[list[str], list[list[tuple[str, int]]]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.colour import integration_bands
 from pellicle.colour.observers import Sensor, srgb_sensor
-from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, response
 from pellicle.optics.interface import allow_tunnelling
@@ -73,16 +73,12 @@ def stack(
     if not all(isinstance(each, Layer) for each in fixed.layers):
         raise UsageError("a sphere has coherent layers only: leave out plates and mixed interfaces")
     media = [fixed.ambient, *(each.material for each in fixed.layers), fixed.substrate.material]
-    ambient, *layers, substrate = (_index(medium, eye.wavelength) for medium in media)
+    indices: list[Any] = [known_index(medium, eye.wavelength) for medium in media]
+    if not all(np.all(np.isfinite(part)) for part in jax.tree.leaves(indices)):
+        raise UsageError("a material has no data between 380 and 730 nm, which a colour needs")
+    ambient, *layers, substrate = jax.tree.map(lambda part: part * np.ones(len(eye.wavelength)), indices)
     thickness = tuple(float(each.thickness) for each in fixed.layers)
     return Stack(eye, ambient, tuple(layers), substrate, thickness, varied)
-
-
-def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> Any:
-    index = known_index(medium, wavelength)
-    if not all(np.all(np.isfinite(part)) for part in jax.tree.leaves(index)):
-        raise UsageError("a material has no data between 380 and 730 nm, which a colour needs")
-    return jax.tree.map(lambda part: part * np.ones(len(wavelength)), index)
 
 
 def spectra(films: Stack, thickness: float | np.ndarray, cosine: np.ndarray) -> Spectra:
@@ -159,13 +155,11 @@ def ball(films: Stack, thickness: float, environment: Environment, size: int) ->
     reflected = pixels.rendering(colour(light.reflected) * seen)
     if np.max(np.imag(to_complex(films.substrate))) > OPAQUE:
         return Ball(reflected, None)
-    index = [
-        float(np.interp(550.0, films.eye.wavelength, np.real(to_complex(medium))))
-        for medium in (films.substrate, films.ambient)
-    ]
+    media = (np.real(to_complex(medium)) for medium in (films.substrate, films.ambient))
+    n2, n0 = (float(np.interp(550.0, films.eye.wavelength, index)) for index in media)
     # light after one chord, two, ...: T² R′^(chords − 1) of what lies where it leaves
     outside = np.arccos(pixels.cosine)
-    inside = np.arcsin(np.clip(np.sin(outside) / (index[0] / index[1]), -1.0, 1.0))
+    inside = np.arcsin(np.clip(np.sin(outside) / (n2 / n0), -1.0, 1.0))
     total = np.zeros((len(outside), 3))
     spectrum = light.transmitted**2
     for chord in range(CHORDS):

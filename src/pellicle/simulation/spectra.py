@@ -72,8 +72,7 @@ def simulate_spectrum(
                 f"`{name}` has {np.size(given)} numbers and there are {nm.size} wavelengths: give one number,"
                 " or one for each wavelength"
             )
-    given = {"depolarisation_noise": depolarisation_noise, "kind": kind}
-    simulated = simulate_signal(scene, nm, noise, seed, **given)
+    simulated = simulate_signal(scene, nm, noise, seed, 0.0, depolarisation_noise, kind)
     share, share_noise = simulated.depolarisation, simulated.depolarisation_noise
     share_sigma = np.full(nm.shape, share_noise) if share is not None and share_noise > 0 else None
     arrays = kind.arrays(simulated.values.reshape(nm.size, -1))
@@ -116,8 +115,8 @@ def simulate_signal(
     wavelength = np.asarray(wavelength, dtype=float)
     with jax.enable_x64(True):
         fixed = with_wavelength(insert(scene, start_values(scene)), wavelength)
-        scale: Any = 1.0 if isinstance(fixed.instrument.scale, Drift) else fixed.instrument.scale
-        offset: Any = 0.0 if isinstance(fixed.instrument.offset, Drift) else fixed.instrument.offset
+        stated: Any = (fixed.instrument.scale, 1.0), (fixed.instrument.offset, 0.0)
+        scale, offset = (usual if isinstance(x, Drift) else x for x, usual in stated)
         instrument = replace(fixed.instrument, scale=scale, offset=offset)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, instrument)
         chosen = plan(fixed, tolerance)

@@ -63,8 +63,7 @@ def render(
         for start in range(0, len(theta), _BATCH):
             rows = np.minimum(np.arange(start, start + _BATCH), len(theta) - 1)
             batch = {key: jnp.asarray(x[rows, None], jnp.float32) for key, x in maps.items()}
-            lit = _radiance(shading.brdf, narrowest > NARROW, batch, jnp.asarray(axes[rows]), *shared)
-            radiance.append(np.asarray(lit))
+            radiance.append(_radiance(shading.brdf, narrowest > NARROW, batch, axes[rows], *shared))
     return pixels.rendering(np.concatenate(radiance)[: len(theta)] @ shading.to_srgb)
 
 
@@ -83,11 +82,9 @@ def lobe_widths(surface: Surface) -> tuple[float, float]:
     """GGX roughness of the narrowest lobe, and one that spreads directions as widely as all lobes."""
     values = surface.start_numbers()
     rough = [float(value) for key, value in values.items() if key.endswith("roughness")]
+    phong = [float(value) for key, value in values.items() if key.startswith("exponent")]
     # cos^e around the mirror direction is nearly cos^4e around the normal, GGX of α² = 2/(4e + 2)
-    phong = [
-        np.sqrt(2 / (4 * float(value) + 2)) for key, value in values.items() if key.startswith("exponent")
-    ]
-    lobes = [*rough, *phong] or [1.0]
+    lobes = [*rough, *(np.sqrt(2 / (4 * exponent + 2)) for exponent in phong)] or [1.0]
     tilt: Any = surface.numbers.get("deviation", 0.0)
     apart = np.tan(np.deg2rad(tilt.upper if isinstance(tilt, Free) else float(tilt)))
     return float(min(lobes)), float(np.clip(np.hypot(max(lobes), apart), 0.003, 1.0))
@@ -159,9 +156,8 @@ def in_plane(surface: Surface, incidence: float, leaving: np.ndarray) -> np.ndar
     return np.asarray(_evaluate(surface.brdf, numbers, jnp.broadcast_to(i, o.shape), o))
 
 
-@partial(jax.jit, static_argnums=0)  # one program; compiled one by one its operations take seconds
-def _evaluate(brdf: Model, parameters: dict[str, Any], i: Any, o: Any) -> Any:
-    return brdf(parameters, i, o)
+# one program; compiled one by one its operations take seconds
+_evaluate = jax.jit(lambda brdf, *arguments: brdf(*arguments), static_argnums=0)
 
 
 THIN = 1000.0
@@ -198,8 +194,11 @@ def in_colour(surface: Surface) -> Shading:
     if not numbers.get("multiple_scattering"):
         numbers.pop("multiple_scattering", None)
     if brdf.from_film_colour is not None:
-        indices = _indices(surface, numbers, _EVERYWHERE)
-        film, base = (_medium(indices, *keys) for keys in KEYS.values())
+        indices, media = _indices(surface, numbers, _EVERYWHERE), []
+        for n, k in KEYS.values():
+            absorbs = np.any(indices.get(k, 0.0))
+            media.append(Table(_EVERYWHERE, indices[n], indices[k] if absorbs else None))
+        film, base = media
         above = indices.get("ambient_n")
         ambient = numbers.get("coat_n", 1.0) if above is None else Table(_EVERYWHERE, above)
         heights = (0.99 * low, 1.01 * high + 1.0)
@@ -237,11 +236,6 @@ def _indices(surface: Surface, numbers: dict[str, Any], nm: np.ndarray) -> dict[
     for part, medium in (("film", surface.film), ("base", surface.base)):
         given |= index_numbers(part, medium, nm, surface.numbers, surface.brdf)
     return given
-
-
-def _medium(indices: dict[str, np.ndarray], n: str, k: str) -> Table:
-    absorbs = np.any(indices.get(k, 0.0))
-    return Table(_EVERYWHERE, indices[n], indices[k] if absorbs else None)
 
 
 WAVES = 24

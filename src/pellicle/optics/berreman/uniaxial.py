@@ -91,8 +91,7 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     x, y, _ = medium.axis
     (c, f, exponent), (c_e, f_e, exponent_e) = elements_and_exponents((t.Q, t.W), k)
     drift = times_i(k * t.mu)
-    growth = jnp.maximum(-real(exponent), -real(exponent_e) - real(drift))
-    growth = jax.lax.stop_gradient(growth)
+    growth = jax.lax.stop_gradient(jnp.maximum(-real(exponent), -real(exponent_e) - real(drift)))
     factor, factor_e = stored((exp(-exponent - growth), exp(-exponent_e - drift - growth)))
     c, f, c_e, f_e = stored((c * factor, f * factor, c_e * factor_e, f_e * factor_e))
 
@@ -108,10 +107,8 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), jnp.broadcast_to(near, shape)
 
     def by_differences(_: Any) -> tuple[Number, Number]:
-        differences = _differences(t, k, growth)
-        return tuple(
-            where(near, _broadcast(new, shape), old) for new, old in zip(differences, (X, Y), strict=True)
-        )  # type: ignore[return-value]
+        new_X, new_Y = (_broadcast(new, shape) for new in _differences(t, k, growth))
+        return where(near, new_X, X), where(near, new_Y, Y)
 
     X, Y = jax.lax.cond(jnp.any(near), by_differences, lambda _: (X, Y), None)
     X, Y, V = stored((X, Y, t.gamma * f_e - t.Q * X))
@@ -123,9 +120,7 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
 
     def apply(fields: Fields) -> Fields:
         Ex, Hy, Ey, Hx = fields
-        along = x * Ex + t.tilt * Hy + y * Ey
-        slope = t.across * Ex + lower * Hy + y * Hx
-        along, slope = stored((along, slope))
+        along, slope = stored((x * Ex + t.tilt * Hy + y * Ey, t.across * Ex + lower * Hy + y * Hx))
         into_b, into_d = stored((times_i(-(V * along)) - Y * slope, times_i(X * slope) - Y * along))
         return (
             c * Ex + ordinary_p[0] * Hy + t.tilt * into_b + lower * into_d,
