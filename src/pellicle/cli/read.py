@@ -59,13 +59,8 @@ def read(
         try:
             measurements += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
-            from pellicle.reporting.json_record import error_record
-
-            worst, message = BAD_DATA, as_flags(str(error))
-            message = message if path in message else f"{path}: {message}"
-            say(f"pellicle: {message}")
-            if json:
-                show(error_record(message, BAD_DATA))
+            worst = BAD_DATA
+            _report_error(path, as_flags(str(error)), json)
     if out is not None:
         from pellicle.data.cube import Cube
 
@@ -78,6 +73,15 @@ def read(
     if out is not None:
         _write(Path(out), measurements, formats)
     return worst
+
+
+def _report_error(path: str, message: str, as_json: bool) -> None:
+    from pellicle.reporting.json_record import error_record
+
+    message = message if path in message else f"{path}: {message}"
+    say(f"pellicle: {message}")
+    if as_json:
+        show(error_record(message, BAD_DATA))
 
 
 def _measurements(

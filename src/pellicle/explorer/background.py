@@ -17,17 +17,13 @@ NOW, SOON = 0, 1
 """Order of compilation: what a view waits for, and what the next view may need."""
 
 
-def _nothing() -> None:
-    """Mark the end of the queue."""
-
-
 class Compiler:
     """Results of slow functions by key, each computed once by a background thread."""
 
     def __init__(self) -> None:
         self._found: dict[Hashable, Any] = {}
         self._asked: dict[Hashable, int] = {}
-        self._queue: PriorityQueue[tuple[int, int, Hashable, Callable[[], Any]]] = PriorityQueue()
+        self._queue: PriorityQueue[tuple[int, int, Hashable, Callable[[], Any] | None]] = PriorityQueue()
         self._numbers = count()
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True, name="pellicle-compiler")
@@ -59,13 +55,13 @@ class Compiler:
 
     def close(self) -> None:
         """End the thread, after the program that it is compiling."""
-        self._queue.put((-1, next(self._numbers), None, _nothing))
+        self._queue.put((-1, next(self._numbers), None, None))
         self._thread.join()
 
     def _work(self) -> None:
         while True:
             _, _, key, make = self._queue.get()
-            if make is _nothing:
+            if make is None:  # the end of the queue
                 return
             if key in self._found:
                 continue

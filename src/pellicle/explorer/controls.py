@@ -95,21 +95,13 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
     named = dict(zip(free_paths(scaffold), parameters(scaffold), strict=True))
     controls = []
     for path, number in named.items():
-        value = present[path]
-        controls.append(
-            Control(
-                name=number.name,
-                label=_LABELS.get(number.key, number.key),
-                unit={"deg": "°"}.get(number.unit, number.unit),
-                lower=number.lower,
-                upper=number.upper,
-                value=value.start if isinstance(value, Free) else float(value),
-                group=_group(scene, path),
-                path=path,
-                optional=getattr(path[-1], "name", "") in _OPTIONAL and number.lower <= 0,
-                free=value if isinstance(value, Free) else None,
-            )
-        )
+        value: Any = present[path]
+        label = _LABELS.get(number.key, number.key)
+        free = value if isinstance(value, Free) else None
+        unit, start = {"deg": "°"}.get(number.unit, number.unit), float(value) if free is None else free.start
+        bounds, group = (number.lower, number.upper), _group(scene, path)
+        optional = getattr(path[-1], "name", "") in _OPTIONAL and number.lower <= 0
+        controls.append(Control(number.name, label, unit, *bounds, start, group, path, optional, free))
     return tuple(controls)
 
 
@@ -138,9 +130,8 @@ def with_value(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
         return tuple(with_value(x, tuple(rest), value) if i == step.idx else x for i, x in enumerate(tree))
     changed = object.__new__(type(tree))
     for name, field in vars(tree).items():
-        object.__setattr__(
-            changed, name, with_value(field, tuple(rest), value) if name == step.name else field
-        )
+        new = with_value(field, tuple(rest), value) if name == step.name else field
+        object.__setattr__(changed, name, new)
     return changed
 
 
@@ -180,15 +171,13 @@ def _present(scene: Scene) -> dict[tuple[Any, ...], Any]:
 
 def _constants(scene: Scene) -> list[tuple[Any, ...]]:
     """Places of media of layers and of the substrate that are one constant index."""
-    layers = enumerate(scene.layers)
-    paths: list[tuple[Any, ...]] = [
-        (GetAttrKey("layers"), SequenceKey(i), GetAttrKey("material"))
-        for i, x in layers
-        if isinstance(x, Layer | Plate) and isinstance(x.material, Constant)
-    ]
-    if isinstance(scene.substrate.material, Constant):
-        paths.append((GetAttrKey("substrate"), GetAttrKey("material")))
-    return paths
+    media: dict[tuple[Any, ...], Any] = {
+        (GetAttrKey("layers"), SequenceKey(i)): x
+        for i, x in enumerate(scene.layers)
+        if isinstance(x, Layer | Plate)
+    }
+    media[(GetAttrKey("substrate"),)] = scene.substrate
+    return [(*path, GetAttrKey("material")) for path, x in media.items() if isinstance(x.material, Constant)]
 
 
 def _addable(scene: Scene) -> list[tuple[Any, ...]]:

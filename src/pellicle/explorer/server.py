@@ -45,7 +45,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
         from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse
         from starlette.routing import Route
     except ImportError:
-        raise UsageError(_missing("starlette")) from None
+        raise UsageError(f"the explorer needs starlette: {install_command('explore')}") from None
     hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
 
     def refused(request: Request, given: str) -> Response | None:
@@ -57,16 +57,14 @@ def application(session: Session, token: str, port: int) -> Starlette:
         return None
 
     async def page(request: Request) -> Response:
-        refusal = refused(request, request.query_params.get("token", ""))
-        if refusal is not None:
+        if refusal := refused(request, request.query_params.get("token", "")):
             return refusal
         nonce = secrets.token_urlsafe(16)
         headers = {**_HEADERS, "Content-Security-Policy": policy(nonce)}
         return HTMLResponse(document(nonce), headers=headers)
 
     async def api(request: Request) -> Response:
-        refusal = refused(request, request.headers.get(_TOKEN, ""))
-        if refusal is not None:
+        if refusal := refused(request, request.headers.get(_TOKEN, "")):
             return refusal
         content = bytearray()
         async for part in request.stream():
@@ -95,7 +93,7 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
     try:
         import uvicorn
     except ImportError:
-        raise UsageError(_missing("uvicorn")) from None
+        raise UsageError(f"the explorer needs uvicorn: {install_command('explore')}") from None
     # the protocol is named, or asyncio sends with delay: answers would wait 40 ms for an acknowledgement
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -108,20 +106,10 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
             f"port {port} cannot be opened ({reason}): choose another, or none for a free one"
         ) from None
     opened, token = listener.getsockname()[1], secrets.token_urlsafe(24)
-    settings = uvicorn.Config(
-        application(session, token, opened),
-        log_level="error",
-        access_log=False,
-        lifespan="off",
-        server_header=False,
-        timeout_graceful_shutdown=1,
-    )
+    how: Any = {"log_level": "error", "access_log": False, "lifespan": "off", "server_header": False}
+    settings = uvicorn.Config(application(session, token, opened), timeout_graceful_shutdown=1, **how)
     with listener:
         listener.listen(64)
         session.prepare()
         ready(f"http://{HOST}:{opened}/?token={token}")
         uvicorn.Server(settings).run(sockets=[listener])
-
-
-def _missing(package: str) -> str:
-    return f"the explorer needs {package}: {install_command('explore')}"

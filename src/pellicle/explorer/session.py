@@ -290,9 +290,13 @@ def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
     except ValueError:
         form = "Unicode text" if encoded is None else "base64"
         raise UsageError(f"{name}: is not {form}") from None
-    if len(content) > LARGEST_FILE:
-        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
+    _check_size(name, len(content))
     return name, content
+
+
+def _check_size(name: str, size: int) -> None:
+    if size > LARGEST_FILE:
+        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
 
 
 def _inside(folder: Path | None, name: Any) -> Path:
@@ -302,8 +306,7 @@ def _inside(folder: Path | None, name: Any) -> Path:
         raise UsageError(f"{name}: only files in the folder of the recipe can be read")
     if not path.is_file():
         raise DataError(f"{name}: no such file in the folder of the recipe")
-    if path.stat().st_size > LARGEST_FILE:
-        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
+    _check_size(name, path.stat().st_size)
     return path
 
 
@@ -320,7 +323,6 @@ def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
             note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
             spectra = [replace(each, notes=(*each.notes, note)) for each in spectra]
     except (UsageError, DataError) as error:
-        kind = type(error)
-        raise kind(str(error).replace(str(path), name)) from None
+        raise type(error)(str(error).replace(str(path), name)) from None
     notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in spectra]
     return [replace(each, path=name, notes=own) for each, own in zip(spectra, notes, strict=True)]

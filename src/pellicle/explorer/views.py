@@ -77,7 +77,10 @@ class FilmView:
             )
         if np.ndim(scene.light.azimuth):
             raise UsageError("the explorer draws one azimuth of the sample: give the scene one")
-        self.wavelength, self.folded = _wavelengths(scene, wavelength), folded
+        if wavelength is None:
+            wavelength = scene.light.wavelength
+        visible = _visible(scene) if wavelength is None else np.unique(np.asarray(wavelength, float))
+        self.wavelength, self.folded = visible, folded
         self.angles = light_angles(scene.light, len(self.wavelength))
         self.against_angle = len(self.wavelength) == 1
         if len(self.angles) == 1 and not self.against_angle:
@@ -166,12 +169,16 @@ class FilmView:
 
         Raises ValueError as programs do.
         """
-        controls, active = self._bounded(structure), structure.names
+        bounds, active = dict(structure.active), structure.names
+        controls = tuple(  # with the upper bounds of the structure
+            replace(c, upper=bounds[c.name], value=min(c.value, bounds[c.name])) if c.name in bounds else c
+            for c in self.controls
+        )
         if kind == "sphere":
             return angle_program(self.scene, controls, active)
         scene, count = template(self.scene, controls, active), self.seen_at(kind).size
         if count:
-            scene = with_value(scene, ANGLE, Free(0.0, dict(structure.active).get("angle", 90.0)))
+            scene = with_value(scene, ANGLE, Free(0.0, bounds.get("angle", 90.0)))
         names = [c.name for c in controls if not c.optional or c.name in active]
         if kind == "colour":
             return colour_program(scene, names, count)
@@ -201,23 +208,22 @@ class FilmView:
     def _measured_angle(self, path: str, angles: np.ndarray) -> Any:
         """The angle of a light as data state it, or the scene's own where they state none or that."""
         stated = self.scene.light.angle
-        if not angles.size:
-            if len(self.angles) > 1:
-                several = ", ".join(map(named, self.angles))
-                raise UsageError(
-                    f"{path}: states no angle of incidence, and the scene has {several}: leave one of them,"
-                    " or add a column angle_deg"
-                )
-            return float(self.angles[0]) if self.angles.size else stated
+        if not angles.size and len(self.angles) > 1:
+            several = ", ".join(map(named, self.angles))
+            raise UsageError(
+                f"{path}: states no angle of incidence, and the scene has {several}: leave one of them,"
+                " or add a column angle_deg"
+            )
+        if len(angles) > 1 and isinstance(stated, Free):
+            raise UsageError(
+                f"{path}: has several angles of incidence, and one free angle cannot stand for them: fix"
+                " it, and free angle_shift of the instrument for an error of all angles"
+            )
         if len(angles) > 1:
-            if isinstance(stated, Free):
-                raise UsageError(
-                    f"{path}: has several angles of incidence, and one free angle cannot stand for them: fix"
-                    " it, and free angle_shift of the instrument for an error of all angles"
-                )
             return angles
-        same = not self.angles.size and getattr(stated, "start", stated) == angles[0]
-        return stated if same else float(angles[0])
+        one = angles if angles.size else self.angles
+        same = not self.angles.size and (not angles.size or getattr(stated, "start", stated) == angles[0])
+        return stated if same else float(one[0])
 
     def rendering(self, colours: np.ndarray, size: int) -> bytes:
         """Draw a ball with the `colours` that the program "sphere" computed, as a PNG."""
@@ -244,21 +250,9 @@ class FilmView:
         numbers = [values[c.name] for c in self.controls if not c.optional or c.name in active]
         return exact(self.sampled(insert(template(self.scene, self.controls, active), numbers)))
 
-    def _bounded(self, structure: Structure) -> tuple[Control, ...]:
-        """The controls with the upper bounds of a structure."""
-        bounds = dict(structure.active)
-        return tuple(
-            replace(c, upper=bounds[c.name], value=min(c.value, bounds[c.name])) if c.name in bounds else c
-            for c in self.controls
-        )
 
-
-def _wavelengths(scene: Scene, wavelength: Any) -> np.ndarray:
-    """Wavelengths of a plot: those given, else of the scene's light, else visible ones of its materials."""
-    if wavelength is None:
-        wavelength = scene.light.wavelength
-    if wavelength is not None:
-        return np.unique(np.asarray(wavelength, float))
+def _visible(scene: Scene) -> np.ndarray:
+    """Visible wavelengths of the materials of a scene. Raises DataError where there are none."""
     nm = default_wavelengths(scene)
     if len(nm) < 2:
         raise DataError(

@@ -239,9 +239,11 @@ def build(plan: Plan) -> Simulate:
         rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
         return stack_rows(rows).T.reshape(-1) if ellipsometric else kind.of_power(rows[0])
 
-    if plan.reference is None:
-        return simulate
-    reference = build(plan.reference)
+    return simulate if plan.reference is None else _against(simulate, build(plan.reference))
+
+
+def _against(simulate: Simulate, reference: Simulate) -> Simulate:
+    """The contrast of a scene against its reference."""
 
     def contrast(scene: Scene) -> Any:
         return scene.light.kind.seen_in(scene, False).against(simulate(scene), reference(of_reference(scene)))
