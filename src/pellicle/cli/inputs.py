@@ -137,16 +137,13 @@ def inputs(
     described |= {"reading": how} if (how := reading.given() | fitting.given()) else {}
     options = FitOptions(**result.fitting.given() | fitting.given())
     written = result.written | options.given()
-    result = replace(
-        result, joint=joint or result.joint, fitting=options, described=described, written=written
-    )
-    return result if repeats is None else _as_repeats(result, repeats or result.repeats)
+    joint = joint or result.joint
+    result = replace(result, joint=joint, fitting=options, described=described, written=written)
+    return result if repeats is None or not (repeats or result.repeats) else _as_repeats(result)
 
 
-def _as_repeats(files: Inputs, repeats: bool) -> Inputs:
-    """Inputs of repeated measurements, each sweep of a file by itself; unchanged where they are none."""
-    if not repeats:
-        return files
+def _as_repeats(files: Inputs) -> Inputs:
+    """Inputs of repeated measurements, each sweep of a file by itself."""
     if files.joint:
         raise UsageError(
             "repeats are fitted one by one, and a joint fit takes all files together: choose one"

@@ -106,12 +106,13 @@ def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any
     from pellicle.reporting.json_record import indented, versions
     from pellicle.reporting.map_text import SCHEMA
 
-    store, marker, remains = None, None, set()
+    store, remains = None, set()
     if folder is not None:
         remains = {folder, *folder.iterdir()} if folder.exists() else set()
-        store, marker = folder / STORE, new_folder(folder) / MARKER
-        if not marker.exists():  # it marks the folder as ours, so that a killed run can go on in it
-            write_text(marker, indented({"schema": SCHEMA, "status": "running", "versions": versions()}))
+        store = new_folder(folder) / STORE
+        if not (folder / MARKER).exists():  # it marks the folder as ours: a killed run can go on in it
+            begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
+            write_text(folder / MARKER, indented(begun))
     progress = PixelProgress(path)
     try:
         with progress:
@@ -121,11 +122,11 @@ def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
         return None
     except ValueError:  # a cube that cannot be read leaves no folder
-        if folder is not None and store is not None and marker is not None and not progress.done:
-            if store not in remains:
-                shutil.rmtree(store, ignore_errors=True)
-            if marker not in remains:
-                marker.unlink(missing_ok=True)
+        if folder is not None and not progress.done:
+            if folder / STORE not in remains:
+                shutil.rmtree(folder / STORE, ignore_errors=True)
+            if folder / MARKER not in remains:
+                (folder / MARKER).unlink(missing_ok=True)
             if folder not in remains and not any(folder.iterdir()):
                 folder.rmdir()
         raise

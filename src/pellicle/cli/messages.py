@@ -71,21 +71,12 @@ def _flags(code: str) -> str | None:
         return None
     if not isinstance(parsed, ast.Call):
         return None
-    words = []
-    for name in parsed.args:
-        if not isinstance(name, ast.Name) or name.id not in flag_names():
-            return None
-        words.append(flag_names()[name.id])
+    words: list[str | None] = [flag_names().get(getattr(name, "id", "")) for name in parsed.args]
     for keyword in parsed.keywords:
-        negative = _NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}")
-        if negative:
-            words.append(negative)
-            continue
-        value = _word(keyword.value, call)
-        if keyword.arg not in flag_names() or value is None:
-            return None
-        words.append(f"{flag_names()[keyword.arg]} {value}".rstrip())
-    return " ".join(words)
+        flag, value = flag_names().get(keyword.arg or ""), _word(keyword.value, call)
+        stated = None if flag is None or value is None else f"{flag} {value}".rstrip()
+        words.append(_NEGATIVES.get(f"{keyword.arg}={ast.unparse(keyword.value)}", stated))
+    return None if None in words else " ".join(map(str, words))
 
 
 def _word(value: ast.expr, source: str) -> str | None:
@@ -97,12 +88,14 @@ def _word(value: ast.expr, source: str) -> str | None:
             return None
         case ast.Constant(value=str(text)):
             return shlex.quote(text)
-        case ast.Tuple(elts=items) | ast.Call(func=ast.Name(id="Free"), args=items, keywords=[]):
+        case (
+            ast.Call(func=ast.Name(id="Free"), args=items, keywords=[])
+            | ast.Tuple(elts=items)
+            | ast.List(items)
+        ):
             words = [_word(item, source) for item in items]
-            return None if None in words else ":".join(map(str, words))
-        case ast.List(elts=items):
-            words = [_word(item, source) for item in items]
-            return None if None in words else ",".join(map(str, words))
+            between = "," if isinstance(value, ast.List) else ":"
+            return None if None in words else between.join(map(str, words))
         case ast.Call():
             return None
     return ast.get_source_segment(source, value)
@@ -160,49 +153,40 @@ def log_to_stderr() -> Iterator[None]:
     """Write the library's log messages to stderr, with the seconds since the start of the block."""
     import jax.monitoring as monitoring
 
-    clock, compilation, level = _Clock(), _Compilation(), LOG.level
+    clock, level = _Clock(), LOG.level
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(clock)
-    monitoring.register_event_duration_secs_listener(compilation)
+    monitoring.register_event_duration_secs_listener(clock.listen)
     LOG.addHandler(handler)
     LOG.setLevel(logging.INFO)
     try:
         yield
     finally:
-        LOG.info("time: %.2f s, %s", clock.seconds, compilation)
+        LOG.info("%s", clock)
         LOG.setLevel(level)
         LOG.removeHandler(handler)
-        monitoring.unregister_event_duration_listener(compilation)
+        monitoring.unregister_event_duration_listener(clock.listen)
 
 
 class _Clock(logging.Formatter):
-    """Formats a record as one line: the seconds since the start, then the message."""
+    """Formats a record as one line, the seconds since the start and the message; as a listener it counts the
+    programs that JAX compiles or loads, and the seconds that it takes."""
 
     def __init__(self):
         super().__init__()
-        self.began = time.perf_counter()
-
-    @property
-    def seconds(self) -> float:
-        return time.perf_counter() - self.began
+        self.began, self.compiling, self.programs = time.perf_counter(), 0.0, 0
 
     def format(self, record: logging.LogRecord) -> str:
-        return f"{self.seconds:6.2f} s  {as_flags(record.getMessage())}"
+        return f"{time.perf_counter() - self.began:6.2f} s  {as_flags(record.getMessage())}"
 
-
-class _Compilation:
-    """Counts the programs that JAX compiles or loads, and the seconds that it takes."""
-
-    def __init__(self):
-        self.seconds, self.programs = 0.0, 0
-
-    def __call__(self, event: str, duration_secs: float, **_: Any) -> None:
+    def listen(self, event: str, duration_secs: float, **_: Any) -> None:
         if event.startswith(_COMPILE):
-            self.seconds += duration_secs
+            self.compiling += duration_secs
             self.programs += event == _COMPILED
 
     def __str__(self) -> str:
-        return f"{self.seconds:.2f} s of them to compile or load {self.programs} programs"
+        spent = f"{self.compiling:.2f} s of them to compile or load {self.programs} programs"
+        return f"time: {time.perf_counter() - self.began:.2f} s, {spent}"
 
 
 class TimeLeft:

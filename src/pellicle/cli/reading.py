@@ -194,8 +194,8 @@ def read_films(path: str, reading: FileOptions, angle: float | list[float] | Non
         raise UsageError(
             f"{path}: {', '.join(named(wrong))}: of spectra, and these are colours; leave it out"
         )
-    of_camera = {*CameraOptions.declared(), *_PIXELS} - {"transmitted"}
-    options: dict[str, Any] = {name: x for name, x in reading.given().items() if name in of_camera}
+    as_stated = {*CameraOptions.declared(), *_PIXELS, "signal_unit", "columns"} - {"transmitted"}
+    options: dict[str, Any] = {name: x for name, x in reading.given().items() if name in as_stated}
     films = read_colours_by_film(
         path,
         space=reading.signal,
@@ -203,8 +203,6 @@ def read_films(path: str, reading: FileOptions, angle: float | list[float] | Non
         angle=reading.angle if isinstance(reading.angle, list) else angle,
         polarisation=reading.polarisation or "unpolarised",
         noise=sigma(reading.noise),
-        signal_unit=reading.signal_unit,
-        columns=reading.columns,
         **options,
     )
     if reading.spectrum in (None, ALL):
@@ -294,8 +292,7 @@ def each_setting(scene: Scene, nm: np.ndarray) -> tuple[Scene, np.ndarray]:
     angles, azimuths = scene.light.angle, scene.light.azimuth
     if not np.ndim(angles) and not np.ndim(azimuths):
         return scene, nm
-    several, turns = np.size(angles), np.size(azimuths)
-    repeated = {}
+    several, turns, repeated = np.size(angles), np.size(azimuths), {}
     if np.ndim(angles):
         repeated["angle"] = np.repeat(angles, turns * len(nm))
     if np.ndim(azimuths):
@@ -319,16 +316,15 @@ def wavelengths(recipe: FilmRecipe, scene: Scene) -> np.ndarray:
             )
         say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every {VISIBLE[2]:g} nm (the recipe gives none)")
         return nm
+    stated = f"{recipe.path}: [data] wavelengths"
     if isinstance(grid, list):
         nm = np.array(grid)
     elif (grid.stop - grid.start) / grid.step > MOST:
-        raise DataError(
-            f"{recipe.path}: [data] wavelengths are more than {MOST:,} points: give a larger step"
-        )
+        raise DataError(f"{stated} are more than {MOST:,} points: give a larger step")
     else:
         nm = np.arange(grid.start, grid.stop + grid.step / 2, grid.step)
     if not len(nm) or not np.all(np.diff(nm) > 0) or nm[0] <= 0:
-        raise DataError(f"{recipe.path}: [data] wavelengths must be rising positive numbers")
+        raise DataError(f"{stated} must be rising positive numbers")
     return nm
 
 

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from pellicle.simulation.spectra import SimulatedSignal
 
 
+SYNTHETIC = "SYNTHETIC: simulated, not measured"
+
+
 @dataclass(frozen=True)
 class SimulationFlags(Flags):
     """Flags of the noise and of the effects of a simulation."""
@@ -81,7 +84,7 @@ def simulate(
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
     said = f"{noise:g}" if isinstance(noise, float | int) else noise
     source = f"recipe {Path(recipe).name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
-    comments = ["SYNTHETIC: simulated, not measured", source]
+    comments = [SYNTHETIC, source]
     if isinstance(described, SurfaceRecipe):
         _write_samples(described, out, noise, how, comments)
     elif isinstance(noise, str):
@@ -145,16 +148,11 @@ def _write_depth_profile(recipe: FilmRecipe | SurfaceRecipe, out: str, depth: st
     scene = recipe.scene()
     log_scene(scene)
     profile = depth_profile(scene, chosen, wavelengths(recipe, scene))
-    source = f"recipe {Path(recipe.path).name}, pellicle {version('pellicle')}"
+    source, name = f"recipe {Path(recipe.path).name}, pellicle {version('pellicle')}", str(recipe.path)
     angle, light = getattr(scene.light.angle, "start", scene.light.angle), scene.light.polarisation
-    comments = [
-        "SYNTHETIC: simulated, not measured",
-        source,
-        f"angle {angle:g} degrees, {light}",
-        _truth(scene),
-    ]
-    folder = write_depth_profile(out, profile, str(recipe.path), comments)
-    show(to_json(profile, str(recipe.path)) if json else report(profile, str(recipe.path)))
+    comments = [SYNTHETIC, source, f"angle {angle:g} degrees, {light}", _truth(scene)]
+    folder = write_depth_profile(out, profile, name, comments)
+    show(to_json(profile, name) if json else report(profile, name))
     say(f"{folder}: figure and tables written")
 
 
@@ -195,17 +193,10 @@ def _write_colours(
             f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
         )
     log_scene(scene)
-    colours, plan = simulate_colours(
-        scene,
-        seen.sensor,
-        table.data.signal or "srgb",
-        recipe_angles(recipe),
-        gamma=table.camera.gamma or 1.0,
-        camera=seen.matrix,
-        noise=noise,
-        seed=how.seed,
-        tolerance=how.tolerance,
-    )
+    options: Any = {"gamma": table.camera.gamma or 1.0, "camera": seen.matrix, "noise": noise}
+    options |= {"seed": how.seed, "tolerance": how.tolerance}
+    space, angles = table.data.signal or "srgb", recipe_angles(recipe)
+    colours, plan = simulate_colours(scene, seen.sensor, space, angles, **options)
     log_plan(plan)
     write_colours(out, [colours], comments=[*comments, *seen.notes, _truth(scene)])
     say(f"{out}: {len(colours)} colour{'s' * (len(colours) != 1)} in {colours.space}")
@@ -259,17 +250,14 @@ def _write_samples(
     samples, plan = simulate_samples(surface, directions(recipe), noise, how.seed, how.tolerance)
     log_plan(plan)
     units = {parameter.key: parameter.unit for parameter in surface.brdf.parameters}
-    means = {
-        key: np.ravel(numbers @ surface.bands.weights if numbers.size > 1 else numbers)
-        for key, numbers in surface.start_numbers().items()
-        if key != "weights"
-    }
-    truth = ", ".join(
-        f"{key} = {' '.join(f'{x:.10g}' for x in numbers)} {units.get(key, 'nm')}".rstrip()
-        for key, numbers in means.items()
-    )
-    truth += ", means over the bands of a sensor" if surface.sensor is not None else ""
-    write_brdf_samples(out, samples, comments=[*comments, f"truth: model {surface.model}, {truth}"])
+    truth = [f"truth: model {surface.model}"]
+    for key, numbers in surface.start_numbers().items():
+        if key != "weights":
+            means = np.ravel(numbers @ surface.bands.weights if numbers.size > 1 else numbers)
+            values = " ".join(f"{x:.10g}" for x in means)
+            truth.append(f"{key} = {values} {units.get(key, 'nm')}".rstrip())
+    truth += ["means over the bands of a sensor"] if surface.sensor is not None else []
+    write_brdf_samples(out, samples, comments=[*comments, ", ".join(truth)])
     say(f"{out}: {len(samples)} samples of {', '.join(samples.channels)}", *samples.notes)
 
 
