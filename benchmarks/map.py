@@ -26,7 +26,7 @@ from scipy.optimize import least_squares  # noqa: E402
 
 import pellicle as pl  # noqa: E402
 from pellicle.data.cube import Cube  # noqa: E402
-from pellicle.mapping.pixels.fit import fit_pixels, prepare  # noqa: E402
+from pellicle.mapping.pixels import fit_pixels, prepare  # noqa: E402
 
 NM = np.linspace(420.0, 900.0, 100)
 SIGMA = 0.002

@@ -19,8 +19,8 @@ from maps.films import index, reflectance
 
 import pellicle as pl
 from pellicle.data.cube import Cube
-from pellicle.mapping.pixels.fit import fit_pixels, prepare, spectrum
-from pellicle.mapping.pixels.results import STATUSES, PixelFits
+from pellicle.fitting.batch.data import STATUSES, BatchFits
+from pellicle.mapping.pixels import fit_pixels, prepare, spectrum
 
 NM = np.linspace(420.0, 900.0, 100)
 SIGMA = 0.003
@@ -95,7 +95,7 @@ def gold(size: int) -> Sample:
     )
 
 
-def table(sample: Sample, found: PixelFits) -> list[str]:
+def table(sample: Sample, found: BatchFits) -> list[str]:
     """One row for each region: how many pixels have a right status, and each status."""
     lines = ["| region | pixels | right status, % | statuses, % |", "|---|---|---|---|"]
     words = np.array(STATUSES)[found.status]
@@ -108,7 +108,7 @@ def table(sample: Sample, found: PixelFits) -> list[str]:
     return lines
 
 
-def coverage(sample: Sample, found: PixelFits, regions: tuple[str, ...]) -> list[str]:
+def coverage(sample: Sample, found: BatchFits, regions: tuple[str, ...]) -> list[str]:
     """Shares of pixels within 1, 1.96 and 3 standard errors (noise) of the truth, with binomial errors."""
     usable = np.isin(sample.region.ravel(), regions) & (found.status == STATUSES.index("converged"))
     z = ((found.values[:, 0] - sample.thickness.ravel()) / found.stderr_noise[:, 0])[usable]
@@ -124,7 +124,7 @@ def coverage(sample: Sample, found: PixelFits, regions: tuple[str, ...]) -> list
     return [*lines, f"- within 3 combined standard errors {100 * np.mean(combined):.2f} %"]
 
 
-def agreement(sample: Sample, found: PixelFits, count: int) -> list[str]:
+def agreement(sample: Sample, found: BatchFits, count: int) -> list[str]:
     """Pixels drawn at random, fitted by `pellicle.fit`."""
     random = np.random.default_rng(19)
     names, model = sample.region.ravel(), prepare(sample.cube, sample.scene)

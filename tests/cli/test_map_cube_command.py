@@ -9,8 +9,7 @@ import pytest
 import xarray
 from PIL import Image
 
-from pellicle.mapping.pixels.data import ORDERS
-from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
+from pellicle.fitting.batch.data import CODES, NO_DATA, ORDERS, BatchFits
 
 RECIPE = """
 [scene]
@@ -28,7 +27,7 @@ def fitted(model, cube, where):
     delta = np.full((len(values), ORDERS), np.inf)
     delta[:, 0] = 0
     one = np.ones(len(values))
-    return PixelFits(100 * values, values, values, status, minima, delta, one, one)
+    return BatchFits(100 * values, values, values, status, minima, delta, one, one)
 
 
 @pytest.fixture
@@ -36,7 +35,7 @@ def fits(monkeypatch):
     """Replaces the fit of a block."""
 
     def fits(fit=fitted):
-        monkeypatch.setattr("pellicle.mapping.pixels.fit.fit_pixels", fit)
+        monkeypatch.setattr("pellicle.mapping.pixels.fit_pixels", fit)
 
     fits()
     return fits

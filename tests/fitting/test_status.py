@@ -9,7 +9,7 @@ import pellicle as pl
 from pellicle.fitting import minima
 from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Estimate, Rival, Status
-from pellicle.fitting.status import describe, expanded, judge, verdict
+from pellicle.fitting.status import ORDER, describe, distinct_rivals, expanded, judged, verdict
 
 GOLD = {"thickness": pl.Free(1, 1000), "material": "Au"}
 OPAQUE = "opaque: thickness is at least"
@@ -105,6 +105,14 @@ def test_misfit_where_the_residuals_are_noise_a_hundred_times_as_large_as_sigma_
 
 def estimate(name="thickness", value=300.0, stderr=1.0, at_bound=False, **more):
     return Estimate(name, value, stderr, "nm", 0.0, 1000.0, True, at_bound, **more)
+
+
+def judge(parameters, rivals, natural, **holds):
+    """The status of one fit with these estimates."""
+    free = list(parameters.values())
+    numbers = np.array([(p.value, p.stderr, p.at_bound and p.name not in natural) for p in free]).T
+    about = [p.name for p in free], [p.default_bounds for p in free], *numbers[:2], numbers[2].astype(bool)
+    return ORDER[judged(*about, ambiguous=bool(distinct_rivals(parameters, rivals)), **holds).position]
 
 
 EVERYTHING_WRONG = {

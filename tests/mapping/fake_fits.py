@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.mapping.pixels.data import ORDERS
-from pellicle.mapping.pixels.results import CODES, NO_DATA, PixelFits
+from pellicle.fitting.batch.data import CODES, NO_DATA, ORDERS, BatchFits
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ def fit(model, cube, where):
     delta[:, 0], delta[:, 1] = 0, 9
     status = np.where(known, CODES["converged"], CODES[NO_DATA]).astype(np.uint8)
     stderr = np.where(known[:, None], np.inf, np.nan)
-    return PixelFits(mean, stderr, mean / 50, status, minima, delta, values[:, 0], values[:, 1])
+    return BatchFits(mean, stderr, mean / 50, status, minima, delta, values[:, 0], values[:, 1])
 
 
 def slow(model, cube, where):

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import CODES
 from pellicle.mapping.continuity import decided_by_neighbours, evidence, row
-from pellicle.mapping.pixels.results import CODES
 
 PERIOD = 190.0
 """Distance of the minima in nm: 550 nm light in an index of 1.45."""

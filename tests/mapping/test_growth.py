@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import CODES
 from pellicle.mapping.growth import RATES, growth
-from pellicle.mapping.pixels.results import CODES
 
 NO_DATA, CONSTANT, NOT_CONSTANT = range(len(RATES))
 NOISE = 0.4

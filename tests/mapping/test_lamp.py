@@ -9,7 +9,7 @@ import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.lamp import LampCurve, lamp_curve
-from pellicle.mapping.pixels.fit import fit_pixels, prepare
+from pellicle.mapping.pixels import fit_pixels, prepare
 
 from ..airy import airy
 

@@ -9,13 +9,12 @@ import pytest
 import pellicle as pl
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError
+from pellicle.fitting.batch.data import CODES, STATUSES, batch_data
+from pellicle.fitting.batch.effects import _simulation
+from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.extended_scene import Number, Program
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
-from pellicle.mapping.pixels.data import pixel_data
-from pellicle.mapping.pixels.effects import _simulation
-from pellicle.mapping.pixels.fit import fit_pixels, prepare, spectrum
-from pellicle.mapping.pixels.results import CODES, STATUSES
-from pellicle.mapping.pixels.search import minima
+from pellicle.mapping.pixels import fit_pixels, prepare, spectrum
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
 FREE = pl.Free(0, 1600)
@@ -144,7 +143,7 @@ def wedge():
     cube = cube_of(values)
     model = prepare(cube, OXIDE)
     with jax.enable_x64(True):
-        data = pixel_data(cube.pixels((slice(None),)), model.problem.views[0].noise)
+        data = batch_data(cube.pixels((slice(None),)), model.problem.views[0].noise)
         return cube, model, minima(model.search, data)
 
 
@@ -190,7 +189,7 @@ def test_rivals_are_all_minima_of_the_deviance():
     )
     model, block = prepare(cube, scene), cube.pixels((slice(None),))
     with jax.enable_x64(True):
-        best = minima(model.search, pixel_data(block, model.problem.views[0].noise))
+        best = minima(model.search, batch_data(block, model.problem.views[0].noise))
         for pixel in range(2):
             prepared = pl.fitting.prepare(spectrum(cube, {key: x[pixel] for key, x in block.items()}), scene)
             every = pl.fitting.solve(prepared, np.linspace(25, 895, 30)[:, None])

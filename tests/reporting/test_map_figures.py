@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pellicle.mapping.pixels.results import CODES, STATUSES
+from pellicle.fitting.batch.data import CODES, STATUSES
 from pellicle.reporting import map_panels
 from pellicle.reporting.map_figures import figures
 from pellicle.reporting.map_panels import COLOURS, HATCHES

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pellicle.fitting.batch.data import CODES, STATUSES
 from pellicle.mapping.map_result import Run
-from pellicle.mapping.pixels.results import CODES, STATUSES
 from pellicle.reporting.map_places import map_axes, place
 from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report, share

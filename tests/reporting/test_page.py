@@ -11,9 +11,9 @@ import equinox as eqx
 import numpy as np
 import pytest
 
+from pellicle.fitting.batch.data import CODES
 from pellicle.fitting.comparison import compare
 from pellicle.fitting.result import Estimate, Rival
-from pellicle.mapping.pixels.results import CODES
 from pellicle.recipes.read import read_recipe
 from pellicle.reporting.comparison import comparison_page
 from pellicle.reporting.json_record import failure, to_json

@@ -35,7 +35,7 @@ class Measurements(Protocol):
         """Numbers of the scene or the surface that are not free."""
         ...
 
-    def amended(self, limits: list[Limits]) -> list[Limits]:
+    def amended(self, limits: Limits) -> Limits:
         """Limits of the parameters by what this kind of data cannot tell."""
         ...
 

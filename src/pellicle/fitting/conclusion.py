@@ -1,9 +1,12 @@
-"""From ranked minima to a status, estimates, limits and rivals."""
+"""From ranked minima to a status, estimates, limits and rivals.
+
+The numbers are those of one fit, or of many with leading axes (...); the words are those of one.
+"""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from logging import getLogger
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,20 +16,181 @@ from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.minima import Minima, deviance_at, solve
 from pellicle.fitting.noise import student
+from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, Neighbourhood, flat_sides, limits
 from pellicle.fitting.result import Estimate, Profile, Rival, Status
 from pellicle.fitting.reweighting import RankedMinima, rank
-from pellicle.fitting.status import RIVAL, judge
+from pellicle.fitting.status import ORDER, RIVAL, Judged, judged, outside
 
 log = getLogger(__name__)
 
 _SETTLED = 0.03
 """Square root of the change of χ² that does not matter to a limit at a rise of 2.7 and more."""
+_RULED_OUT = 1e8
+_MOST_RIVALS, _MOST_NEAR = 10, 3
+
+
+class Verdicts(NamedTuple):
+    """Numbers from which the words of fits follow, each (...).
+
+    `noise` are the limits of the parameters by the noise alone, `limits` those with all that enlarges them;
+    `delta_chi2` (..., minima) is how much worse the minima are than the best, in χ² on the effective points.
+    """
+
+    noise: Limits
+    limits: Limits
+    delta_chi2: np.ndarray
+    status: Judged
+
+
+def verdicts(
+    ranked: RankedMinima,
+    covariance: Errors,
+    discrepancy: Discrepancy,
+    around: Callable[[np.ndarray], Neighbourhood],
+    flat: Mapping[int, np.ndarray],
+    *,
+    misfit: Any,
+    binding: Container[str] = (),
+    amend: Callable[[Limits], Limits] = lambda limits: limits,
+) -> Verdicts:
+    """Judge the best of the ranked minima of fits, of which `misfit` (...) are not explained.
+
+    The `discrepancy` enlarges errors, and differences in χ² count less by it. Limits come from profiles in
+    the neighbourhood `around` minima of these `delta_chi2` where a fit is usable, else from the covariance
+    alone, as profiles would mean nothing; `flat` are the `flat_sides` (fits, 2) of scanned parameters.
+    `amend` has the last word on the limits by the noise. `binding` names parameters whose default bounds
+    count as those of the user.
+    """
+    parameters, values, freedom = ranked.problem.parameters, ranked.values, np.asarray(ranked.freedom)
+    delta_chi2 = _above_best(ranked, discrepancy.evidence_share)
+    noise, converged = _by_noise(ranked, covariance, lambda: around(delta_chi2), flat, misfit)
+    noise, linear = amend(noise), covariance.stderr[..., : len(parameters)]
+    lower, upper = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
+    # a profile likelihood has corrected the error of the noise; what is not noise adds to it
+    more = np.maximum(discrepancy.variance - covariance.variance, 0.0)[..., : len(parameters)]
+    # only the bounds limit it: the difference of two huge variances is rounding
+    more = np.where(linear > upper - lower, 0.0, more)
+    every = _widened(noise, values, more, freedom[..., None], (lower, upper))
+    rivals = np.asarray(ranked.problem.values(ranked.minima.units[..., 1 : _MOST_RIVALS + 1, :]))
+    apart = outside(values, every.stderr, rivals).any(axis=-1)
+    close = apart & (delta_chi2[..., 1 : _MOST_RIVALS + 1] < RIVAL)
+    status = _status(parameters, values, every.stderr, converged, misfit, close, binding)
+    return Verdicts(noise, every, delta_chi2, status)
+
+
+def _above_best(ranked: RankedMinima, share: Any) -> np.ndarray:
+    """Δχ² (..., minima) of the minima on the effective points.
+
+    Of a difference in χ² only a `share` (...) is evidence where residuals are larger than noise. Where few
+    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
+    """
+    deviance = ranked.minima.deviance
+    wider = np.asarray(student(ranked.freedom, RIVAL))[..., None]
+    return np.asarray(share)[..., None] * np.maximum(deviance - deviance[..., :1], 0.0) / wider**2
+
+
+def _by_noise(
+    ranked: RankedMinima,
+    covariance: Errors,
+    around: Callable[[], Neighbourhood],
+    flat: Mapping[int, np.ndarray],
+    misfit: Any,
+) -> tuple[Limits, Any]:
+    """Limits (..., parameters) by the noise, and which fits (...) have converged."""
+    parameters, shape = ranked.problem.parameters, ranked.values.shape
+    lower, upper = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
+    unsettled = profile_likelihood.by_curvature(covariance.stderr[..., : len(parameters)], lower, upper)
+    usable, converged = ~np.asarray(misfit), ranked.minima.converged[..., 0]
+    if not usable.any():
+        return Limits(unsettled, *np.full((2, *shape), np.nan)), converged
+    profiled = Limits(*(x.reshape(shape) for x in limits(around(), flat, usable.ravel())))
+    if covariance.curvature is not None:
+        profiled = _stretched(profiled, ranked.values, covariance.widening[..., : shape[-1]], (lower, upper))
+    # on a plateau, as of an opaque film, a solver has no point to settle at
+    depths = [i for i, p in enumerate(parameters) if p.key == "thickness"]
+    converged = converged | (usable & np.isinf(profiled.stderr[..., depths]).any(axis=-1))
+    used = (usable & converged)[..., None]
+    ends = (np.where(used, end, np.nan) for end in profiled[1:])
+    return Limits(np.where(used, profiled.stderr, unsettled), *ends), converged
+
+
+def _stretched(
+    limits: Limits, values: np.ndarray, ratio: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]
+) -> Limits:
+    """Limits `ratio` times as far from the values, within the bounds: to first order those at which the
+    misfit has risen by the square of it more (A. Rotnitzky and N. Jewell, 1990, Biometrika 77, 485)."""
+    lower, upper = (values + ratio * (end - values) for end in limits[1:])
+    return Limits(ratio * limits.stderr, np.maximum(lower, bounds[0]), np.minimum(upper, bounds[1]))
+
+
+def _widened(
+    limits: Limits,
+    values: np.ndarray,
+    variance: np.ndarray,
+    freedom: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+) -> Limits:
+    """Limits with a further variance, and as Student's t has them, within the bounds.
+
+    Where the data do not see a side there is no variance to add: its limit is that of the noise.
+    """
+    seen = np.isfinite(limits.stderr)
+    reach, wider = np.sqrt(ONE_SIDED * variance), student(freedom, ONE_SIDED)
+    lower = np.maximum(values - np.hypot(wider * (values - limits.lower), reach), bounds[0])
+    upper = np.minimum(values + np.hypot(wider * (limits.upper - values), reach), bounds[1])
+    return Limits(
+        np.sqrt(limits.stderr**2 + variance),
+        np.where(seen, lower, limits.lower),
+        np.where(seen, upper, limits.upper),
+    )
+
+
+def _status(
+    parameters: Sequence[Parameter],
+    values: np.ndarray,
+    stderr: np.ndarray,
+    converged: Any,
+    misfit: Any,
+    close: np.ndarray,
+    binding: Container[str],
+) -> Judged:
+    """The status of fits by their parameters (..., parameters), the leading one first."""
+    order = sorted(range(len(parameters)), key=lambda i: parameters[i].key != "thickness")
+    sample = [i for i in order if not parameters[i].name.startswith("instrument.")]
+    about = [parameters[i] for i in sample]
+    pairs = [(p, values[..., i]) for p, i in zip(about, sample, strict=True)]
+    resting = [p.on_bound(x) & ~np.asarray(p.on_natural_bound(x)) for p, x in pairs]
+    status = judged(
+        [p.name for p in about],
+        [p.limits is not None for p in about],
+        values[..., sample],
+        stderr[..., sample],
+        np.moveaxis(np.reshape(resting, (len(sample), *values.shape[:-1])), 0, -1),
+        converged=converged,
+        misfit=misfit,
+        ambiguous=close.any(axis=-1),
+        binding=binding,
+    )
+    if values.ndim == 1:
+        which = status.unseen, np.array(resting), status.at_bound
+        names = [", ".join(np.array([p.name for p in about])[mask]) or "none" for mask in which]
+        for question, answer in (
+            ("did the solver converge?", "yes" if converged else "no"),
+            ("does the scene not explain the data?", "yes" if misfit else "no"),
+            ("which parameters of the sample have no finite error?", names[0]),
+            (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", close.sum()),
+            ("which parameters lie on a bound?", names[1]),
+            ("which of these bounds matter?", names[2]),
+        ):
+            log.info("status: %s %s", question, answer)
+        log.info("status: %s", ORDER[status.position])
+    return status
 
 
 def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarray) -> Neighbourhood:
-    """Neighbourhood of the best of the ranked minima.
+    """Neighbourhood of the best of the ranked minima of one fit.
 
     `covariance` has the problem's parameters first; `others` (points, parameters) are further minima, in the
     parameters' own units.
@@ -74,128 +238,6 @@ def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarr
     )
 
 
-_RULED_OUT = 1e8
-_MOST_RIVALS, _MOST_NEAR = 10, 3
-
-
-def rivals(ranked: RankedMinima, share: float = 1.0) -> tuple[Rival, ...]:
-    """Every other minimum with its Δχ² on the effective points, best first.
-
-    Of a difference in χ² only a `share` is evidence where residuals are larger than noise. Where few
-    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
-    """
-    problem, minima = ranked.problem, ranked.minima
-    above = share * (minima.deviance - minima.deviance[0]) / student(ranked.freedom, RIVAL) ** 2
-    return tuple(
-        Rival(
-            dict(zip((p.name for p in problem.parameters), np.asarray(values).tolist(), strict=True)),
-            float(d),
-        )
-        for values, d in zip(problem.values(minima.units)[1 : _MOST_RIVALS + 1], above[1:], strict=False)
-        if d < _RULED_OUT
-    )
-
-
-def by_curvature(ranked: RankedMinima, errors: Errors) -> list[Limits]:
-    """Errors by the covariance alone, infinite where the data add nothing to the bounds.
-
-    For a fit whose numbers should not be used: profiles of it would mean nothing, and cost most where the
-    model misses the data.
-    """
-    parameters = ranked.problem.parameters
-    ends = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
-    bounded = profile_likelihood.by_curvature(errors.stderr[: len(parameters)], *ends)
-    return [Limits(sd) for sd in bounded.tolist()]
-
-
-def by_profile(
-    ranked: RankedMinima, errors: Errors, scans: Mapping[int, Profile], near: tuple[Rival, ...] = ()
-) -> list[Limits]:
-    """Errors and one-sided limits by profile likelihood.
-
-    `scans` are scans of the misfit by the position of their parameter; profiles start from the `near` rivals
-    too.
-    """
-    close = [list(r.parameters.values()) for r in near[:_MOST_NEAR] if r.delta_chi2 < RIVAL]
-    others = np.reshape(close, (-1, len(ranked.problem.parameters)))
-    around = neighbourhood(ranked, errors.by_curvature, others)
-    flat = {
-        axis: flat_sides(scan.thickness, scan.delta_chi2[None], around.best[:, axis])
-        for axis, scan in scans.items()
-    }
-    bounded = limits(around, flat).of_fit(0)
-    if errors.curvature is None:
-        return bounded
-    parameters, values = ranked.problem.parameters, ranked.values.tolist()
-    rows = zip(bounded, parameters, values, errors.widening.tolist(), strict=False)
-    return [_stretched(own, value, ratio, (p.lower, p.upper)) for own, p, value, ratio in rows]
-
-
-def _stretched(limits: Limits, value: float, ratio: float, bounds: tuple[float, float]) -> Limits:
-    """Limits `ratio` times as far from the value, within the bounds: to first order those at which the
-    misfit has risen by the square of it more (A. Rotnitzky and N. Jewell, 1990, Biometrika 77, 485)."""
-    lower = None if limits.lower is None else max(value + ratio * (limits.lower - value), bounds[0])
-    upper = None if limits.upper is None else min(value + ratio * (limits.upper - value), bounds[1])
-    return Limits(ratio * limits.stderr, lower, upper)
-
-
-def estimates(
-    ranked: RankedMinima,
-    errors: Errors,
-    discrepancy: Discrepancy,
-    bounded: list[Limits],
-    fixed: list[Estimate],
-) -> dict[str, Estimate]:
-    """Every parameter by name: free ones first, thickness before all; then nuisances and fixed numbers.
-
-    `errors` and the limits are those of the noise alone.
-    """
-    parameters, values = ranked.problem.parameters, ranked.values.tolist()
-    # a profile likelihood has corrected the error of the noise; what is not noise adds to it
-    more = np.maximum(discrepancy.variance - errors.stderr**2, 0.0).tolist()
-    free = []
-    rows = zip(parameters, values, bounded, more[: len(values)], errors.stderr.tolist(), strict=False)
-    for p, value, own, extra, linear_error in rows:
-        if linear_error > p.upper - p.lower:
-            extra = 0.0  # only the bounds limit it: the difference of two huge variances is rounding
-        limit = _widened(own, value, extra, ranked.freedom, (p.lower, p.upper))
-        ends = p.lower, p.upper, True, bool(p.on_bound(value)), limit.lower, limit.upper, p.limits is not None
-        noise = float(own.stderr), max(ranked.freedom, 1.0)
-        free.append(Estimate(p.name, value, float(limit.stderr), p.unit, *ends, *noise))
-    order = sorted(range(len(free)), key=lambda i: parameters[i].key != "thickness")
-    pairs = zip(ranked.problem.views, ranked.fits, strict=True)
-    nuisances = [c for view, fit in pairs for c in view.nuisances(fit.at)]
-    linear = []
-    widths = zip(errors.stderr[len(values) :].tolist(), more[len(values) :], strict=True)
-    for c, (noise_sd, extra) in zip(nuisances, widths, strict=True):
-        sd = math.sqrt(noise_sd**2 + extra)
-        reach = ONE_SIDED**0.5 * sd
-        # an offset compatible with 0 has an upper limit
-        upper = c.value + reach if c.not_negative and c.value < reach else None
-        ends = "", -math.inf, math.inf, True
-        linear.append(Estimate(c.name, c.value, sd, *ends, upper_limit=upper, stderr_noise=noise_sd))
-    return {e.name: e for e in [*(free[i] for i in order), *linear, *fixed]}
-
-
-def _widened(
-    limits: Limits, value: float, variance: float, freedom: float, bounds: tuple[float, float]
-) -> Limits:
-    """Limits with a further variance, and as Student's t has them, within the bounds.
-
-    Where the data do not see a side there is no variance to add: its limit is that of the noise.
-    """
-    if not math.isfinite(limits.stderr):
-        return limits
-    reach, wider = math.sqrt(ONE_SIDED * variance), student(freedom, ONE_SIDED)
-    lower = None if limits.lower is None else value - math.hypot(wider * (value - limits.lower), reach)
-    upper = None if limits.upper is None else value + math.hypot(wider * (limits.upper - value), reach)
-    return Limits(
-        math.sqrt(limits.stderr**2 + variance),
-        None if lower is None else max(lower, bounds[0]),
-        None if upper is None else min(upper, bounds[1]),
-    )
-
-
 def ranked_minima(
     make: Callable[[float], Problem],
     search: Callable[[Problem], Minima],
@@ -223,10 +265,10 @@ def ranked_minima(
 
 
 def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
-    """The scaled Jacobian at the best minimum, and the covariance from it."""
+    """The scaled Jacobian at the best minima (...), and the covariance from it."""
     at, variance = [fit.at for fit in ranked.fits], [fit.variance for fit in ranked.fits]
-    jacobian = scaled(ranked.problem, ranked.minima.units[0], at, variance)
-    sizes = [view.residuals(own).size for view, own in zip(ranked.problem.views, at, strict=True)]
+    jacobian = scaled(ranked.problem, ranked.minima.units[..., 0, :], at, variance)
+    sizes = [view.rows * view.channels for view in ranked.problem.views]
     pairs = zip(np.cumsum([0, *sizes]).tolist(), ranked.fits, strict=False)
     return jacobian, errors(jacobian, {at: fit.scores for at, fit in pairs if fit.scores is not None})
 
@@ -251,37 +293,64 @@ def conclude(
     scans: Mapping[int, Profile],
     near: bool = False,
     binding: frozenset[str] = frozenset(),
-    amend: Callable[[list[Limits]], Sequence[Limits]] = lambda limits: limits,
+    amend: Callable[[Limits], Limits] = lambda limits: limits,
 ) -> Conclusion:
-    """Judge the best of the ranked minima.
+    """Judge the best of the ranked minima of one fit: see `verdicts`.
 
-    The `discrepancy` enlarges errors, and differences in χ² count less by it. Limits come from profiles
-    where the fit is usable, else from the covariance alone; with `near` profiles start from near rivals too.
-    `amend` has the last word on them. `binding` names parameters whose default bounds count as those of the
-    user.
+    `scans` are scans of the misfit by the position of their parameter; with `near` profiles start from near
+    rivals too.
     """
-    converged, others = bool(ranked.minima.converged[0]), rivals(ranked, discrepancy.evidence_share)
-    bounded = by_curvature(ranked, covariance)
-    if not misfit:
-        profiled = by_profile(ranked, covariance, scans, others if near else ())
-        if not converged:
-            # on a plateau, as of an opaque film, a solver has no point to settle at
-            rows = zip(ranked.problem.parameters, profiled, strict=True)
-            converged = any(p.key == "thickness" and math.isinf(limit.stderr) for p, limit in rows)
-        bounded = profiled if converged else bounded
-    parameters = estimates(ranked, covariance, discrepancy, list(amend(bounded)), fixed)
-    pairs = zip(ranked.problem.parameters, ranked.values.tolist(), strict=True)
-    natural = frozenset(p.name for p, value in pairs if p.on_natural_bound(value))
-    status = judge(
-        converged=converged,
-        misfit=misfit,
-        parameters=parameters,
-        rivals=others,
-        natural=natural,
-        binding=binding,
+    points = np.asarray(ranked.problem.values(ranked.minima.units))[1 : _MOST_RIVALS + 1]
+
+    def around(delta_chi2: np.ndarray) -> Neighbourhood:
+        close = np.flatnonzero(delta_chi2[1 : len(points) + 1] < RIVAL)[:_MOST_NEAR] if near else []
+        return neighbourhood(ranked, covariance.by_curvature, points[close])
+
+    flat = {
+        axis: flat_sides(scan.thickness, scan.delta_chi2[None], ranked.values[axis, None])
+        for axis, scan in scans.items()
+    }
+    about = ranked, covariance, discrepancy, around, flat
+    numbers = verdicts(*about, misfit=np.array(misfit), binding=binding, amend=amend)
+    names, above = [p.name for p in ranked.problem.parameters], numbers.delta_chi2.tolist()
+    rivals = tuple(
+        Rival(dict(zip(names, values, strict=True)), delta)
+        for values, delta in zip(points.tolist(), above[1:], strict=False)
+        if delta < _RULED_OUT
     )
-    log.info("status: %s", status)
-    return Conclusion(status, parameters, others, identifiability.correlated(jacobian, parameters))
+    parameters = estimates(ranked, numbers, covariance, discrepancy, fixed)
+    correlated = identifiability.correlated(jacobian, parameters)
+    return Conclusion(ORDER[numbers.status.position], parameters, rivals, correlated)
+
+
+def estimates(
+    ranked: RankedMinima,
+    numbers: Verdicts,
+    covariance: Errors,
+    discrepancy: Discrepancy,
+    fixed: list[Estimate],
+) -> dict[str, Estimate]:
+    """Every parameter of one fit by name: free ones first, thickness before all; then nuisances and fixed
+    numbers."""
+    parameters, freedom, free = ranked.problem.parameters, max(float(ranked.freedom), 1.0), []
+    columns = ranked.values, *numbers.limits, numbers.noise.stderr
+    for p, value, stderr, *ends, noise in zip(parameters, *(x.tolist() for x in columns), strict=True):
+        limited = (None if math.isnan(end) else end for end in ends)
+        bounds = p.lower, p.upper, True, bool(p.on_bound(value)), *limited, p.limits is not None
+        free.append(Estimate(p.name, value, stderr, p.unit, *bounds, noise, freedom))
+    free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
+    pairs = zip(ranked.problem.views, ranked.fits, strict=True)
+    nuisances = [c for view, fit in pairs for c in view.nuisances(fit.at)]
+    first, linear = len(parameters), []
+    rows = zip(nuisances, covariance.variance[first:], discrepancy.variance[first:], strict=True)
+    for c, noise, every in rows:
+        value, sd = float(c.value), math.sqrt(max(noise, every))
+        reach = ONE_SIDED**0.5 * sd
+        # an offset compatible with 0 has an upper limit
+        limit = value + reach if c.not_negative and value < reach else None
+        about = "", -math.inf, math.inf, True
+        linear.append(Estimate(c.name, value, sd, *about, upper_limit=limit, stderr_noise=math.sqrt(noise)))
+    return {e.name: e for e in [*free, *linear, *fixed]}
 
 
 def common_rms(sizes: Sequence[int], rms: Sequence[float]) -> float:

@@ -90,40 +90,42 @@ class Scaled(NamedTuple):
 
     def blocks(self, sizes: Sequence[int], variance: Sequence[float]) -> list[np.ndarray]:
         """Rows of each view, of so many data values, by the σ of its weights: without its `variance`."""
-        rows = np.split(self.jacobian, np.cumsum(sizes))[: len(sizes)]
-        return [block * np.sqrt(widened) for block, widened in zip(rows, variance, strict=True)]
+        rows = np.split(self.jacobian, np.cumsum(sizes), axis=-2)[: len(sizes)]
+        pairs = zip(rows, variance, strict=True)
+        return [block * np.sqrt(widened)[..., None, None] for block, widened in pairs]
 
     def by_range(self, ranges: np.ndarray) -> np.ndarray:
         """The Jacobian with its columns in steps of `ranges` (columns,) of the parameters' own units."""
         return self.jacobian @ np.linalg.pinv(self.stretch) * ranges
 
 
-def scaled(problem: Problem, unit: np.ndarray, at: Sequence[Any], variance: Sequence[float]) -> Scaled:
-    """The Jacobian at a point (parameters,) of the unit cube, where `at` are the views' local models.
+def scaled(problem: Problem, unit: np.ndarray, at: Sequence[Any], variance: Sequence[Any]) -> Scaled:
+    """The Jacobian at points (..., parameters) of the unit cube, where `at` are the views' local models.
 
-    `variance` of each view multiplies σ²: noise, and correlation, as the residuals show them.
+    `variance` (...) of each view multiplies σ²: noise, and correlation, as the residuals show them.
     """
     nuisances = [view.nuisances(local) for view, local in zip(problem.views, at, strict=True)]
     every = [c for own in nuisances for c in own]
     slope = problem.coordinates.slope(problem.box, unit)
-    count = len(unit)
-    blocks, first = [], count
+    *lead, count = np.shape(unit)
+    size, blocks, first = count + len(every), [], count
     for view, local, own, widened in zip(problem.views, at, nuisances, variance, strict=True):
-        part = view.jacobian(local) / np.sqrt(widened)
-        block = np.zeros((len(part), count + len(every)))
-        block[:, :count] = part[:, : len(view.takes)] @ slope[list(view.takes)]
-        block[:, first : first + len(own)] = part[:, len(view.takes) :]
+        part = view.jacobian(local) / np.sqrt(widened)[..., None, None]
+        block = np.zeros((*part.shape[:-1], size))
+        block[..., :count] = part[..., : len(view.takes)] @ slope[..., list(view.takes), :]
+        block[..., first : first + len(own)] = part[..., len(view.takes) :]
         first += len(own)
         blocks.append(block)
-    priors = np.zeros((count + len(every),) * 2)
-    priors[:count, :count] = problem.box.prior_weight[:, None] * slope
-    priors[count:, count:] = np.eye(len(every))
-    stretch = np.zeros_like(priors)
-    stretch[:count, :count] = slope
-    stretch[count:, count:] = np.diag([c.prior_sd for c in every])
+    priors, stretch = np.zeros((2, *lead, size, size))
+    pull = np.zeros((*lead, size))
+    priors[..., :count, :count] = problem.box.prior_weight[:, None] * slope
+    priors[..., count:, count:] = np.eye(len(every))
+    stretch[..., :count, :count] = slope
+    pull[..., :count] = problem.box.prior_rows(problem.values(unit))
+    for i, c in enumerate(every, start=count):
+        stretch[..., i, i], pull[..., i] = c.prior_sd, c.pull
     names = (*(p.name for p in problem.parameters), *(c.name for c in every))
-    pull = [*np.asarray(problem.box.prior_rows(problem.values(unit))), *(c.pull for c in every)]
-    return Scaled(np.vstack([*blocks, priors]), stretch, names, np.array(pull, float))
+    return Scaled(np.concatenate([*blocks, priors], axis=-2), stretch, names, pull)
 
 
 def errors(scaled: Scaled, uneven: Mapping[int, np.ndarray] = MappingProxyType({})) -> Errors:

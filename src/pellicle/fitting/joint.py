@@ -207,7 +207,7 @@ class JointMeasurements(NamedTuple):
         """Fixed numbers of the scenes and of the surface."""
         return [*self.films.fixed(), *self.samples.fixed()]
 
-    def amended(self, limits: list[Limits]) -> list[Limits]:
+    def amended(self, limits: Limits) -> Limits:
         """Limits by what either kind cannot tell."""
         return self.samples.amended(self.films.amended(limits))
 

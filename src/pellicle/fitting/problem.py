@@ -67,11 +67,11 @@ class Nuisance(Protocol):
     @property
     def name(self) -> str: ...
     @property
-    def value(self) -> float: ...
+    def value(self) -> Any: ...
     @property
-    def prior_sd(self) -> float: ...
+    def prior_sd(self) -> Any: ...
     @property
-    def pull(self) -> float:
+    def pull(self) -> Any:
         """Distance from the mean of its prior, in standard deviations of that."""
         ...
 
@@ -83,7 +83,8 @@ class Nuisance(Protocol):
 class View(Protocol):
     """One set of data of a problem: the model of it, its weights, and which parameters it depends on.
 
-    `local` evaluates the model around one point; what it returns is the argument of the methods below it.
+    `local` evaluates the model around one point; what it returns is the argument of the methods below it. A
+    view of many data sets that one scene explains has leading axes (...) in its data and what they return.
     """
 
     @property
@@ -128,7 +129,7 @@ class View(Protocol):
         ...
 
     @property
-    def independent_fraction(self) -> float:
+    def independent_fraction(self) -> Any:
         """Effective points per point: correlated errors count less."""
         ...
 
@@ -162,12 +163,12 @@ class View(Protocol):
         """Number of neighbouring points that count as one."""
         ...
 
-    def reweighted(self, factor: Any, fraction: float) -> View:
-        """The view with its weights times `factor` (a number, (channels,) or (rows, channels)), each point
-        counting for `fraction` of an independent one."""
+    def reweighted(self, factor: Any, fraction: Any) -> View:
+        """The view with its weights times `factor` (broadcast to (..., rows, channels)), each point counting
+        for `fraction` (...) of an independent one."""
         ...
 
-    def counting(self, fraction: float) -> View:
+    def counting(self, fraction: Any) -> View:
         """The view with each point counting for `fraction` of an independent one, and no less."""
         ...
 

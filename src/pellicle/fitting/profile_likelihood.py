@@ -11,6 +11,7 @@ parameters and all fits that need them at once.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -45,17 +46,12 @@ _MOST_STEPS = 100
 
 
 class Limits(NamedTuple):
-    """A standard error, infinite where a side is open that physics does not close, and 95 % limits where
-    only one side is bounded. Those of many fits are arrays (fits, parameters), NaN where there are none."""
+    """Standard errors (..., parameters), infinite where a side is open that physics does not close, and 95 %
+    limits where only one side is bounded, NaN where there are none."""
 
     stderr: Any
-    lower: Any = None
-    upper: Any = None
-
-    def of_fit(self, fit: int) -> list[Limits]:
-        """The limits of each parameter of one fit."""
-        rows = zip(*(x[fit].tolist() for x in self), strict=True)
-        return [Limits(sd, *(None if np.isnan(end) else end for end in ends)) for sd, *ends in rows]
+    lower: Any = math.nan
+    upper: Any = math.nan
 
 
 class Neighbourhood(NamedTuple):
@@ -136,7 +132,7 @@ def limits(
     for search, deviance in zip(searches, _run(around, searches), strict=True):
         at = search.parameter.fit, search.parameter.axis
         for column, number in zip(result, deviance, strict=True):
-            column[at] = np.nan if number is None else number
+            column[at] = number
     return result
 
 
@@ -260,7 +256,7 @@ class _OneParameter:
         if side is None:
             return Limits(np.inf)
         limit = yield from self.crossing(side, ONE_SIDED)
-        return Limits(self.error, None, limit) if below else Limits(self.error, limit, None)
+        return Limits(self.error, upper=limit) if below else Limits(self.error, limit)
 
     def profiled(self, flat: tuple[bool, ...], natural: tuple[bool, ...]) -> _Values:
         """Limits where the misfit is no parabola; `flat` are sides known to be open, and an open side with a
@@ -271,15 +267,15 @@ class _OneParameter:
             low = yield from self.crossing(below, TWO_SIDED)
             high = yield from self.crossing(above, TWO_SIDED)
             return Limits((high - low) / (2 * TWO_SIDED**0.5))
-        lower = None if below is None else (yield from self.crossing(below, ONE_SIDED))
-        upper = None if above is None else (yield from self.crossing(above, ONE_SIDED))
-        limit = upper if lower is None else lower
+        lower = math.nan if below is None else (yield from self.crossing(below, ONE_SIDED))
+        upper = math.nan if above is None else (yield from self.crossing(above, ONE_SIDED))
+        limit = upper if below is None else lower
         closed = natural[0] or below is not None, natural[1] or above is not None
-        if all(closed) and limit is not None:
+        if all(closed) and not math.isnan(limit):
             return Limits(self.error, lower, upper)
         margin = min(self.value - self.lower, self.upper - self.value)
         rests = margin <= ON_BOUND * (self.upper - self.lower)
-        if rests and limit is not None and abs(limit - self.value) < STEEP * self.error and not any(flat):
+        if rests and abs(limit - self.value) < STEEP * self.error and not any(flat):
             return Limits(self.error)  # the data push against that bound: they see the parameter well enough
         return Limits(np.inf, lower, upper)
 

@@ -26,7 +26,7 @@ _ROUNDS, _ROBUST_ROUNDS = 3, 12
 
 @dataclass(frozen=True)
 class ViewFit:
-    """Fit quality of one view at the best minimum.
+    """Fit quality of one view at the best minimum, of many data sets with leading axes (...).
 
     `at` is the local model there; `variance` multiplies the σ² of the weights in the covariance; `length` is
     the number of neighbouring points that count as one; `chi2` is the misfit over `freedom` degrees;
@@ -35,18 +35,18 @@ class ViewFit:
     """
 
     at: Any
-    variance: float
-    length: float
-    chi2: float
-    freedom: float
-    outliers: int = 0
+    variance: Any
+    length: Any
+    chi2: Any
+    freedom: Any
+    outliers: Any = 0
     scores: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class RankedMinima:
     """Minima ranked on the effective points; `problem` carries the weights that the ranking used, `searched`
-    those of the search."""
+    those of the search. Those of many data sets have leading axes (...)."""
 
     searched: Problem
     problem: Problem
@@ -54,15 +54,15 @@ class RankedMinima:
     fits: tuple[ViewFit, ...]
 
     @property
-    def freedom(self) -> float:
-        """Degrees of freedom of a noise that comes from residuals, on the effective points; infinite where a
-        view's weights are known."""
+    def freedom(self) -> Any:
+        """Degrees of freedom (...) of a noise that comes from residuals, on the effective points; infinite
+        where a view's weights are known."""
         if any(view.noise.known for view in self.problem.views):
-            return math.inf
+            return np.full(np.shape(self.fits[0].length), np.inf)[()]
         return sum(fit.freedom / fit.length for fit in self.fits)
 
     @property
-    def chi2_reduced(self) -> float:
+    def chi2_reduced(self) -> Any:
         return sum(fit.chi2 for fit in self.fits) / sum(fit.freedom for fit in self.fits)
 
     @property
@@ -80,8 +80,8 @@ class RankedMinima:
 
     @property
     def values(self) -> np.ndarray:
-        """The best values of the parameters, in their own units."""
-        return np.asarray(self.problem.values(self.minima.units[0]))
+        """The best values of the parameters (..., parameters), in their own units."""
+        return np.asarray(self.problem.values(self.minima.units[..., 0, :]))
 
 
 def _view_fit(view: View, noise: NoiseEstimate, at: Any) -> ViewFit:
@@ -91,9 +91,27 @@ def _view_fit(view: View, noise: NoiseEstimate, at: Any) -> ViewFit:
         scores = view.residuals(at)
         if np.ndim(weight):  # the inflation contains their mean already
             scores = scores * math.sqrt(np.mean(weight) / np.mean(weight * scores**2))
-    variance = float(noise.variance(view.noise))
-    numbers = float(noise.length), float(noise.chi2), float(noise.freedom)
-    return ViewFit(at, variance, *numbers, int(np.sum(weight < 0.5)), scores)
+    numbers = noise.variance(view.noise), noise.length, noise.chi2, noise.freedom
+    outliers = int(np.sum(weight < 0.5)) if np.ndim(weight) else 0
+    return ViewFit(at, *(np.asarray(x, float)[()] for x in numbers), outliers, scores)
+
+
+def ranked_by_factor(problem: Problem, candidates: Minima, misfit: np.ndarray, at: Any) -> RankedMinima:
+    """Rank the minima of many data sets of one view as `rank` does, at which `at` are the best local models.
+
+    Without a robust loss all weights of a data set have one factor, which moves no minimum and multiplies the
+    `misfit` (..., minima), the part of the deviance that goes with the weights.
+    """
+    [view] = problem.views
+    noise = _noise_of_view(problem, view, at, None)
+    weighted = _reweighted(problem, [noise])
+    [after] = weighted.views
+    factor = noise.scale[..., 0] ** 2 * after.independent_fraction / view.independent_fraction
+    with np.errstate(invalid="ignore"):  # of minima that are not there, which are infinite
+        deviance = candidates.deviance + (np.asarray(factor)[..., None] - 1) * misfit
+    deviance = np.where(np.isfinite(candidates.deviance), deviance, np.inf)
+    ranked = replace(candidates, deviance=deviance)
+    return RankedMinima(problem, weighted, ranked, (_view_fit(after, noise, at),))
 
 
 def rank(
@@ -166,7 +184,7 @@ def _noise_of_view(problem: Problem, view: View, at: Any, loss: Loss | None) -> 
     residuals = view.residuals(at) * at_model
     totals = [sum(v.independent for v in problem.views if i in v.takes) for i in view.takes]
     used = sum(view.independent / total for total in totals) + view.nuisance_freedom(at)
-    freedom = max(view.independent - used, 1)
+    freedom = np.full(residuals.shape[:-2], max(view.independent - used, 1.0))[()]
     if loss is None:
         length = view.correlation_length(residuals)
         return noise_of(residuals, groups, freedom, length)._replace(at_model=at_model)
@@ -183,5 +201,7 @@ def _noise_of_view(problem: Problem, view: View, at: Any, loss: Loss | None) -> 
 
 def _reweighted(problem: Problem, noise: Sequence[NoiseEstimate]) -> Problem:
     pairs = zip(problem.views, noise, strict=True)
-    views = tuple(v.reweighted(own.scale * own.factor * own.at_model, 1 / own.length) for v, own in pairs)
-    return problem._replace(views=views)
+    views = (
+        v.reweighted(own.scale[..., None, :] * own.factor * own.at_model, 1 / own.length) for v, own in pairs
+    )
+    return problem._replace(views=tuple(views))

@@ -3,14 +3,11 @@
 import math
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
-from logging import getLogger
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.result import LEVEL, Estimate, Rival, Status
-
-log = getLogger(__name__)
 
 RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
@@ -84,52 +81,6 @@ def outside(values: np.ndarray, stderr: np.ndarray, rivals: np.ndarray) -> np.nd
     parameters)."""
     reach = np.where(np.isfinite(stderr), 3 * stderr, np.inf)
     return np.abs(rivals - values[..., None, :]) > reach[..., None, :]
-
-
-def judge(
-    *,
-    converged: bool,
-    misfit: bool,
-    parameters: Mapping[str, Estimate],
-    rivals: tuple[Rival, ...],
-    natural: frozenset[str],
-    binding: frozenset[str] = frozenset(),
-) -> Status:
-    """The first status that holds. `natural` names parameters that rest on a bound that physics sets.
-
-    A default bound counts only if `binding` names it or the thickness is not well determined.
-    """
-    free = [p for p in parameters.values() if p.free and not p.name.startswith("instrument.")]
-    names, resting = (
-        [p.name for p in free],
-        np.array([p.at_bound and p.name not in natural for p in free], bool),
-    )
-    close = distinct_rivals(parameters, rivals)
-    status = judged(
-        names,
-        [p.default_bounds for p in free],
-        np.array([p.value for p in free]),
-        np.array([p.stderr for p in free]),
-        resting,
-        converged=converged,
-        misfit=misfit,
-        ambiguous=bool(close),
-        binding=binding,
-    )
-
-    def named(which: np.ndarray) -> str:
-        return ", ".join(name for name, holds in zip(names, which, strict=True) if holds) or "none"
-
-    for question, answer in (
-        ("did the solver converge?", "yes" if converged else "no"),
-        ("does the scene not explain the data?", "yes" if misfit else "no"),
-        ("which parameters of the sample have no finite error?", named(status.unseen)),
-        (f"how many rivals lie within Δχ² {RIVAL:g} and outside the errors?", len(close)),
-        ("which parameters lie on a bound?", named(resting)),
-        ("which of these bounds matter?", named(status.at_bound)),
-    ):
-        log.info("status: %s %s", question, answer)
-    return ORDER[status.position]
 
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:

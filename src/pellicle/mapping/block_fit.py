@@ -5,11 +5,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from pellicle.data.cube import Cube
-from pellicle.mapping.pixels.fit import PixelModel
-from pellicle.mapping.pixels.results import PixelFits
+from pellicle.fitting.batch.data import BatchFits
+from pellicle.mapping.pixels import PixelModel
 from pellicle.mapping.store import MapStore, Where
 
-Fitter = Callable[[PixelModel, Cube, Where], PixelFits]
+Fitter = Callable[[PixelModel, Cube, Where], BatchFits]
 
 
 class Job(NamedTuple):

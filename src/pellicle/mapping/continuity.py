@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.forward_model.plan import Row
-from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
 from pellicle.mapping.unwrapping import Field, Neighbourhood, field_of, grow, neighbourhood
 
 if TYPE_CHECKING:

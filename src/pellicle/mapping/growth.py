@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES
+from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset

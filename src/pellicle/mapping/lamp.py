@@ -24,10 +24,10 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.data.photographs import parse_regions
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.batch.data import BatchMinima, batch_data
+from pellicle.fitting.batch.search import minima
 from pellicle.fitting.status import RIVAL
-from pellicle.mapping.pixels.data import PixelMinima, pixel_data
-from pellicle.mapping.pixels.fit import prepare
-from pellicle.mapping.pixels.search import minima
+from pellicle.mapping.pixels import prepare
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import free_leaves
 from pellicle.scene.instrument import SLOW_SCALE, Drift, Instrument
@@ -208,7 +208,7 @@ def _joint(cube: Cube, scene: Scene) -> LampCurve:
                 sites = {name: values.reshape(shape) for name, values in block.items()}
                 in_memory = replace(cube, arrays=sites, dims=("site",), coords={}, mask=None)
                 search, last = prepare(in_memory, trial).search, trial
-            data = pixel_data(block, search.problem.views[0].noise)
+            data = batch_data(block, search.problem.views[0].noise)
             answers = minima(search, data)
             weight = data.weight if "sigma" in block else (data.weight > 0).astype(float)
             good = _usable(answers, weight, data.values, cube.path or "cube")
@@ -242,7 +242,7 @@ def _sample(cube: Cube) -> dict[str, np.ndarray]:
     return {name: values[known] for name, values in block.items()}
 
 
-def _usable(answers: PixelMinima, weight: np.ndarray, values: np.ndarray, path: str) -> np.ndarray:
+def _usable(answers: BatchMinima, weight: np.ndarray, values: np.ndarray, path: str) -> np.ndarray:
     """Pixels whose fit has settled and is as close as the others', and as far as possible without a rival.
 
     Raises DataError for too few of them.
@@ -266,7 +266,7 @@ def _usable(answers: PixelMinima, weight: np.ndarray, values: np.ndarray, path: 
 
 
 def _step(
-    answers: PixelMinima,
+    answers: BatchMinima,
     weight: np.ndarray,
     values: np.ndarray,
     good: np.ndarray,

@@ -18,14 +18,13 @@ from pellicle.data.cube import Cube
 from pellicle.data.fingerprint import fingerprint
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import ORDERS
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
 from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixels import fit as pixel_fit
-from pellicle.mapping.pixels.data import ORDERS
-from pellicle.mapping.pixels.fit import PixelModel
+from pellicle.mapping.pixels import PixelModel, fit_pixels, prepare
 from pellicle.mapping.store import BYTES, FORMAT, begin, held
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
@@ -109,19 +108,19 @@ def run_map(
     - `preview`: the cube has every so many of the pixels in each direction.
     - `recipe`: the text of it, which is kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
-    - `fit`: the function that fits a block, `pixels.fit.fit_pixels` by default.
+    - `fit`: the function that fits a block, `pixels.fit_pixels` by default.
 
-    **Raises:** as `pixels.fit.prepare` and `store.begin` do; DataError where a block is lost with every
+    **Raises:** as `pixels.prepare` and `store.begin` do; DataError where a block is lost with every
     worker that fits it. After KeyboardInterrupt the finished blocks are in the store.
     """
     if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
-    model = pixel_fit.prepare(cube, scene)
+    model = prepare(cube, scene)
     about, who = attributes(cube, model, recipe, preview), identity(cube, scene)
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
     with held(store.path):
-        run = _fit_blocks(Job(model, cube, store, fit or pixel_fit.fit_pixels), workers, scheduler, progress)
+        run = _fit_blocks(Job(model, cube, store, fit or fit_pixels), workers, scheduler, progress)
     return Map(path, run._replace(seconds=time.monotonic() - began))
 
 

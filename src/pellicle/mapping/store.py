@@ -25,8 +25,8 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.errors import UsageError, install_command
 from pellicle.files import not_written
+from pellicle.fitting.batch.data import CODES, NO_DATA, STATUSES, BatchFits
 from pellicle.fitting.parameter import Parameter
-from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES, PixelFits
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -75,7 +75,7 @@ class Variable:
     """
 
     name: str
-    of: Callable[[PixelFits], np.ndarray]
+    of: Callable[[BatchFits], np.ndarray]
     attributes: dict[str, Any]
     dtype: str = "float32"
     orders: bool = False
@@ -184,7 +184,7 @@ class MapStore:
     blocks: Blocks
     parameters: tuple[Parameter, ...]
 
-    def write(self, place: tuple[int, ...], fits: PixelFits) -> None:
+    def write(self, place: tuple[int, ...], fits: BatchFits) -> None:
         """Write the fits of the block at a place of the grid, and mark it as finished.
 
         **Raises:** DataError for a full disk, UsageError where the store cannot be written.

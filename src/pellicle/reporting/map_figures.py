@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.files import write_text
+from pellicle.fitting.batch.data import CODES, NO_DATA
 from pellicle.mapping.map_result import Map
-from pellicle.mapping.pixels.results import CODES, NO_DATA
 from pellicle.reporting.folders import PAGE, REPORT
 from pellicle.reporting.json_record import write_result
 from pellicle.reporting.map_panels import (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pellicle.mapping.pixels.results import CODES, NO_DATA, STATUSES
+from pellicle.fitting.batch.data import CODES, NO_DATA, STATUSES
 from pellicle.reporting.drawable import labelled
 from pellicle.reporting.map_places import MapAxes
 from pellicle.reporting.map_summary import DECIDED, MapSummary, is_decided, parameter_name, thinned, unit_of

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.fitting.result import Status
 from pellicle.mapping.continuity import evidence, row
 from pellicle.mapping.growth import RATES, TIME, growth
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixels.results import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
 from pellicle.mapping.store import variable_name
 from pellicle.reporting.map_places import MapAxes, map_axes, place
 

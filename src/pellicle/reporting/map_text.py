@@ -9,9 +9,9 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from pellicle.fitting.batch.data import BY_NEIGHBOURS, NO_DATA
 from pellicle.fitting.result import Status
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixels.results import BY_NEIGHBOURS, NO_DATA
 from pellicle.reporting.fit_text import ADVICE
 from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise

@@ -337,9 +337,9 @@ class Signal(ABC):
         """Number of channels in a frame in which nothing is measured; they are the last."""
         return 0
 
-    def rms(self, residual: Float[np.ndarray, "points columns"]) -> float:
-        """Return the rms of residuals of the columns."""
-        return float(np.sqrt(np.mean(residual**2)))
+    def rms(self, residual: Float[np.ndarray, "*lanes points columns"]) -> Any:
+        """Return the rms (*lanes) of residuals of the columns."""
+        return np.sqrt(np.mean(residual**2, axis=(-2, -1)))
 
     def offsets(self, columns: Float[np.ndarray, "*lanes points columns"], allowed: Any) -> list[Offset]:
         """Return the errors that a `pellicle.Uncertainty` allows the instrument, at simulated

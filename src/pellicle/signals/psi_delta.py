@@ -62,8 +62,9 @@ class Ratios(base.Signal):
 
         return waves.drawn_angles(rows, self.folded)
 
-    def rms(self, residual: np.ndarray) -> float:
-        return sphere.rms_of_psi(self.points(residual), self.independent * len(residual))
+    def rms(self, residual: np.ndarray) -> Any:
+        kept = self.points(residual).reshape(*residual.shape[:-1], -1)
+        return sphere.rms_of_psi(kept, self.independent * residual.shape[-2])
 
     def in_quantities(self, columns: np.ndarray) -> np.ndarray:
         angles = np.stack(sphere.psi_delta(self.points(columns)), axis=-1).reshape(*columns.shape[:-1], -1)

@@ -6,7 +6,7 @@ these, α and β of a rotating analyser, or tan Ψ and cos Δ, which lack only t
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -81,9 +81,9 @@ def angle_changes(
     return of_psi, np.deg2rad(delta) * np.stack([0 * n, -s, c], axis=-1)
 
 
-def rms_of_psi(residual: np.ndarray, directions: int) -> float:
-    """rms in degrees of Ψ of residuals on the sphere: half the distance, in each of its directions."""
-    return float(np.rad2deg(np.sqrt(np.sum(residual**2) / directions)) / 2)
+def rms_of_psi(residual: Float[np.ndarray, "*lanes points columns"], directions: int) -> Any:
+    """rms (*lanes) in degrees of Ψ of residuals on the sphere: half the distance, in each direction."""
+    return np.rad2deg(np.sqrt(np.sum(residual**2, axis=(-2, -1)) / directions)) / 2
 
 
 def scattered(sphere: Float[np.ndarray, "*points 3"], noise: float, seed: int) -> np.ndarray:

@@ -101,9 +101,9 @@ def turned():
     ("tilt", "azimuth", "stderr"),
     [
         (Limits(0.1), Limits(3.0), 3.0),
-        (Limits(0.1, None, 0.3), Limits(3.0), math.inf),  # there may be no tilt: its azimuth means nothing
+        (Limits(0.1, upper=0.3), Limits(3.0), math.inf),  # there may be no tilt: its azimuth means nothing
         (Limits(math.inf), Limits(3.0), math.inf),
-        (Limits(0.1), Limits(math.inf, -20.0, None), math.inf),  # and a whole turn has no sides
+        (Limits(0.1), Limits(math.inf, -20.0), math.inf),  # and a whole turn has no sides
     ],
 )
 def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
@@ -111,7 +111,7 @@ def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,))
     monkeypatch.setattr(module, "search", search_from([0.6, 0.7]))
     of_one_fit = [np.array([pair], float) for pair in zip(tilt, azimuth, strict=True)]
-    monkeypatch.setattr(shared, "limits", lambda around, scans: Limits(*of_one_fit))
+    monkeypatch.setattr(shared, "limits", lambda *arguments: Limits(*of_one_fit))
     result = fit(turned, surface)
     assert result["deviation"].value == pytest.approx(8.0, abs=0.1)
     estimate = result["azimuth"]
@@ -127,7 +127,7 @@ def test_of_a_misfit_no_limits_are_sought(monkeypatch, simulated):
     samples, _ = simulated
     off = dataclasses.replace(samples, values=np.random.default_rng(0).random((120, 1)) * 100)
     monkeypatch.setattr(module, "search", search_from([0.3] * 3))
-    monkeypatch.setattr(shared, "limits", lambda around, scans: pytest.fail("a profile was made"))
+    monkeypatch.setattr(shared, "limits", lambda *arguments: pytest.fail("a profile was made"))
     result, ranked = module.fitted(off, SURFACE, 0.0, quiet)
     assert result.status is Status.MISFIT
     _, errors = linearised(ranked)

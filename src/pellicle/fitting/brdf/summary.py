@@ -96,17 +96,18 @@ class BrdfMeasurements(NamedTuple):
             ]
         return result
 
-    def amended(self, limits: list[Limits]) -> list[Limits]:
+    def amended(self, limits: Limits) -> Limits:
         """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
         coordinates = self.ranked.problem.coordinates
         if coordinates.tilt is None:
             return limits
         deviation, azimuth = coordinates.tilt
-        tilt, turn = limits[deviation], limits[azimuth]
-        upright = tilt.upper is not None or not math.isfinite(tilt.stderr)
-        one_sided = (turn.lower is None) != (turn.upper is None)
-        unknown = upright or (one_sided and not coordinates.folded)
-        return [Limits(math.inf) if unknown and at == azimuth else each for at, each in enumerate(limits)]
+        upright = not np.isnan(limits.upper[deviation]) or not np.isfinite(limits.stderr[deviation])
+        one_sided = np.isnan(limits.lower[azimuth]) != np.isnan(limits.upper[azimuth])
+        if not upright and (coordinates.folded or not one_sided):
+            return limits
+        turn = np.arange(len(limits.stderr)) == azimuth
+        return Limits(*(np.where(turn, x, own) for x, own in zip(Limits(math.inf), limits, strict=True)))
 
 
 def _curve(view: SamplesView, at: Any) -> BrdfCurve:

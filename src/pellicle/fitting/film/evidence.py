@@ -3,18 +3,22 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import Evidence
+from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.film.colour_measurements import colours_evidence
 from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.targets import Target
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import DRIFT_CORRELATION, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import median
 
 LEAST_NOISE = 1e-9
 """Least noise, as a share of the signal's level: rounding in simulated data."""
@@ -34,43 +38,64 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
         values = ranked.problem.seen_by(view, ranked.values)
         if isinstance(view, ColoursView):
             result.append(colours_evidence(view, values, fit.at, spectrum.scene, block))
-            continue
-        keep, shape = view.measured_channels, (view.rows, view.channels, -1)
-        weight = np.asarray(view.data.weight)[: view.points]
-        columns = (block / weight[:, None]).reshape(shape)[:, :keep]
-        residual = np.asarray(view.data.values) - np.asarray(fit.at.model)
-        residual = residual[: view.points].reshape(view.rows, view.channels)[:, :keep]
-        sigma = (1 / weight).reshape(view.rows, view.channels)[:, :keep]
-        counted = np.sqrt(view.data.independent_fraction) / sigma
-        noises, sweeps, least = np.empty(keep), view.sweeps, LEAST_NOISE * float(view.data.level)
-        for group in view.noise_groups:
-            own = [channel for channel in group.channels if channel < keep]
-            noise = float(short_range_noise(residual[:, own], sweeps, least))
-            if not group.known:
-                # the weights have the rms of all residuals: noise is no larger than that
-                noise = min(noise, float(np.median(sigma[:, own])))
-                sigma[:, own] = noise
-            elif not view.noise.drifting:
-                noise = max(noise, float(np.median(sigma[:, own])))
-            noises[own] = noise
-        effects = systematic_effects(view, values, fit.at, spectrum.scene)
-        # all channels in units of the noise of the first
-        unit = noises[0] / noises
-        result.append(
-            Evidence(
-                residual * unit,
-                columns * unit[:, None],
-                sigma * unit,
-                float(noises[0]),
-                counted / unit,
-                [replace(e, change=e.change * unit) for e in effects] if np.any(unit != 1) else effects,
-                view.correlation_length,
-                DRIFT_CORRELATION if view.noise.drifting else 1.0,
-                0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
-                _signals(view) if view.signal.degrees and view.signal.parts else (),
-            )
-        )
+        else:
+            effects = systematic_effects(view, values, fit.at, spectrum.scene)
+            result.append(spectrum_evidence(view, fit.at, block, effects))
     return result
+
+
+def spectrum_evidence(view: SpectrumView, at: Local, block: np.ndarray, effects: list[Effect]) -> Evidence:
+    """Evidence of a spectrum, or of many with leading axes (...), with these `effects`.
+
+    `at` is the best local model, `block` (..., data values, parameters and nuisances) the weighted Jacobian.
+    """
+    keep, lead = view.measured_channels, block.shape[:-2]
+    weight = np.asarray(view.data.weight)[..., : view.points]
+    inverse = (1 / weight).reshape(*lead, view.rows, view.channels)
+    columns = (block / weight[..., None]).reshape(*inverse.shape, -1)[..., :keep, :]
+    residual, sigma = (view.residuals(at) * inverse)[..., :keep], inverse[..., :keep]
+    counted = np.sqrt(view.data.independent_fraction)[..., None, None] / sigma
+    sigma, noises, exact = np.array(sigma), np.empty((*lead, keep)), None
+    least, many = LEAST_NOISE * np.asarray(view.data.level), len(lead) > 0
+
+    def short(channels: list[int], which: Any = ...) -> Any:
+        return short_range_noise(residual[which][..., channels], view.sweeps, least[which])
+
+    for group in view.noise_groups:
+        own = [channel for channel in group.channels if channel < keep]
+        typical = median(sigma[..., own], (-2, -1))
+        given = group.known and not view.noise.drifting
+        if given and many:
+            # only where residuals are large does it matter whether their neighbours differ by more than σ
+            noise, exact = typical, partial(short, own)
+        else:
+            noise = short(own)
+        if not group.known:
+            # the weights have the rms of all residuals: noise is no larger than that
+            noise = np.minimum(noise, typical)
+            sigma[..., own] = noise[..., None, None]
+        elif given:
+            noise = np.maximum(noise, typical)
+        noises[..., own] = noise[..., None]
+    # all channels in units of the noise of the first
+    unit = noises[..., :1] / noises
+    if np.any(unit != 1):
+        effects = [replace(e, change=e.change * unit[..., None, :]) for e in effects]
+        columns = columns * unit[..., None, :, None]
+        residual, sigma, counted = (x * unit[..., None, :] for x in (residual, sigma, counted / unit**2))
+    return Evidence(
+        residual,
+        columns,
+        sigma,
+        noises[..., 0],
+        counted,
+        effects,
+        view.correlation_length,
+        DRIFT_CORRELATION if view.noise.drifting else 1.0,
+        0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
+        _signals(view) if view.signal.degrees and view.signal.parts else (),
+        exact,
+    )
 
 
 def _signals(view: SpectrumView) -> tuple[tuple[int, ...], ...]:

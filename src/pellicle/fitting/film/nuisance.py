@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
+from pellicle.fitting.normal_equations import times
 from pellicle.fitting.positive_definite import nonnegative
 from pellicle.scene.free import remembered
 from pellicle.scene.instrument import Drift, Instrument
@@ -27,7 +28,10 @@ _SLACK = 1e-6
 
 
 class Data(NamedTuple):
-    """A spectrum as the fit sees it, padded to a round length with points of zero weight."""
+    """A spectrum as the fit sees it, padded to a round length with points of zero weight.
+
+    Those of many spectra have leading axes; they may share the positions.
+    """
 
     values: Array
     weight: Array  # 1/σ, 0 for padding
@@ -39,21 +43,21 @@ class Data(NamedTuple):
 
 @dataclass(frozen=True)
 class Coefficient:
-    """One coefficient of the scale or the offset, in physical units."""
+    """One coefficient of the scale or the offset, in physical units; of many spectra arrays (...)."""
 
     name: str
-    value: float
+    value: Any
     basis: np.ndarray  # what it multiplies at each point
-    prior_sd: float
+    prior_sd: Any
     on_signal: bool
     not_negative: bool  # one number that cannot be below zero
 
     @property
-    def pull(self) -> float:
-        """Distance from the mean of its prior, in standard deviations of that."""
+    def pull(self) -> Any:
+        """Distance (...) from the mean of its prior, in standard deviations of that."""
         # the mean of a plain scale is the scale itself
         plain = self.on_signal and bool(np.all(self.basis == 1))
-        return 0.0 if plain else float(self.value / self.prior_sd)
+        return 0.0 if plain else self.value / self.prior_sd
 
 
 class Solved(NamedTuple):
@@ -154,13 +158,14 @@ def offset_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
 def coefficients(
     data: Data, instrument: Instrument, gain: Any, offset: Any, points: int, suffix: str = ""
 ) -> list[Coefficient]:
-    """Scale and offset as Chebyshev coefficients in wavelength, from their curves at the first `points`.
+    """Scale and offset as Chebyshev coefficients in wavelength, from their curves (..., points) at the first
+    `points`.
 
     Priors of the gain are in units of its own mean, those of the offset in units of the signal's level. The
     `suffix` ends the names of one spectrum among several.
     """
     result: list[Coefficient] = []
-    position = np.asarray(data.position)[:points]
+    position = np.asarray(data.position)[..., :points]
     for name, drift, prior, curve in (
         ("scale", instrument.scale, scale_prior, gain),
         ("offset", instrument.offset, offset_prior, offset),
@@ -170,20 +175,22 @@ def coefficients(
         _, sd = prior(drift)
         degree = len(sd) - 1
         basis, inverse = _basis(position, degree)
-        numbers = inverse @ np.asarray(curve)[:points]
-        prior_sd = sd * (abs(numbers[0]) if name == "scale" else float(data.level))
+        numbers = times(inverse, np.asarray(curve)[..., :points])
+        size = np.abs(numbers[..., 0]) if name == "scale" else data.level
         not_negative = name == "offset" and degree == 0
-        for j, (number, column, own_sd) in enumerate(zip(numbers.tolist(), basis, prior_sd, strict=True)):
+        for j, own_sd in enumerate(sd):
             full = f"instrument.{name}" + (f"_{j}" if j else "") + suffix
-            result.append(Coefficient(full, number, column, own_sd, name == "scale", not_negative))
+            about = name == "scale", not_negative
+            result.append(Coefficient(full, numbers[..., j], basis[..., j], own_sd * size, *about))
     return result
 
 
 @remembered
 def _basis(position: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Chebyshev polynomials (degree + 1, points), and the inverse that takes a curve to its coefficients."""
-    basis = np.polynomial.chebyshev.chebvander(position, degree).T
-    return basis, np.linalg.pinv(basis.T)
+    """Chebyshev polynomials (..., points, degree + 1), and the inverse that takes a curve to its
+    coefficients."""
+    basis = np.polynomial.chebyshev.chebvander(position, degree)
+    return basis, np.linalg.pinv(basis)
 
 
 def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[int, int]):

@@ -23,7 +23,7 @@ from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import local_noise, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
-from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene
@@ -79,19 +79,13 @@ class FilmMeasurements:
             for name, value, unit in fixed_numbers(target.scene, target.name)
         ]
 
-    def amended(self, limits: list[Limits]) -> list[Limits]:
-        """Limits with a thickness that drift of scale and offset could imitate bounded from above only."""
+    def amended(self, limits: Limits) -> Limits:
+        """Limits by what a drift of scale and offset could imitate."""
         if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in self.targets):
             return limits
-        ranked = self.ranked
-        least = min(thinnest(v, fit) for v, fit in zip(ranked.problem.views, ranked.fits, strict=True))
-        pairs = zip(ranked.problem.parameters, ranked.values.tolist(), limits, strict=True)
-        return [
-            Limits(math.inf, limit.lower, least)
-            if p.key == "thickness" and math.isfinite(limit.stderr) and value < least
-            else limit
-            for p, value, limit in pairs
-        ]
+        views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
+        least = min(thinnest(view, fit.at.layer) for view, fit in views)
+        return bounded_by_drift(limits, self.ranked, least)
 
 
 def scan_profile(ranked: RankedMinima) -> Profile | None:
@@ -110,11 +104,19 @@ def scan_profile(ranked: RankedMinima) -> Profile | None:
     return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
 
 
-def thinnest(view: SpectrumView, fit: ViewFit) -> float:
-    """The thickness (nm) of which the spectrum spans `FEWEST_FRINGES`."""
+def bounded_by_drift(limits: Limits, ranked: RankedMinima, least: Any) -> Limits:
+    """Limits with thicknesses below the `least` (...) that spans fringes enough bounded from above only."""
+    least, depth = np.asarray(least)[..., None], [p.key == "thickness" for p in ranked.problem.parameters]
+    thin = np.array(depth) & np.isfinite(limits.stderr) & (ranked.values < least)
+    return Limits(np.where(thin, np.inf, limits.stderr), limits.lower, np.where(thin, least, limits.upper))
+
+
+def thinnest(view: SpectrumView, layer: Any) -> Any:
+    """The thickness (nm, (...)) of which a spectrum spans `FEWEST_FRINGES`; `layer` (..., 2 and more, points)
+    has n of the layer first."""
     rows = slice(view.rows)
-    wavelength, n = np.asarray(view.scene.light.wavelength)[rows], np.asarray(fit.at.layer)[0, rows]
-    return float(FEWEST_FRINGES / max(np.ptp(2 * n / wavelength), 1e-12))
+    wavelength, n = np.asarray(view.scene.light.wavelength)[rows], np.asarray(layer)[..., 0, rows]
+    return FEWEST_FRINGES / np.maximum(np.ptp(2 * n / wavelength, axis=-1), 1e-12)
 
 
 def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:

@@ -31,7 +31,7 @@ SCAN_POINTS = 448
 
 @dataclass(frozen=True)
 class SpectrumView:
-    """One spectrum of a problem.
+    """One spectrum of a problem, or many of one scene and grid, whose data have leading axes (...).
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
     the problem. `data` is padded to a round length. `signal` is what was measured, as in `SpectrumForm`.
@@ -85,18 +85,22 @@ class SpectrumView:
         )
 
     @property
-    def independent_fraction(self) -> float:
-        """Effective points per point: correlated errors count less."""
-        return float(self.data.independent_fraction)
+    def independent_fraction(self) -> Any:
+        """Effective points per point (...): correlated errors count less."""
+        return self.data.independent_fraction
 
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return local(self.form, self.scene, self.data, values)
 
     def residuals(self, at: Local) -> np.ndarray:
-        """Weighted residuals (rows, channels)."""
+        """Weighted residuals (..., rows, channels)."""
         weighted = np.asarray((self.data.values - np.asarray(at.model)) * self.data.weight)
-        return weighted[: self.points].reshape(self.rows, self.channels)
+        return self._in_rows(weighted)
+
+    def _in_rows(self, values: np.ndarray) -> np.ndarray:
+        """Data values (..., data values) without padding, (..., rows, channels)."""
+        return values[..., : self.points].reshape(*values.shape[:-1], self.rows, self.channels)
 
     def nuisances(self, at: Local) -> list[Coefficient]:
         """Coefficients of scale and offset, recovered from their curves."""
@@ -113,32 +117,34 @@ class SpectrumView:
 
     def jacobian(self, at: Local) -> np.ndarray:
         """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
-        (points, parameters and coefficients)."""
+        (..., points, parameters and coefficients)."""
         keep = slice(self.points)
-        signal, weight = np.asarray(at.signal)[keep], np.asarray(self.data.weight)[keep, None]
-        steep = np.asarray(at.gain)[keep, None] * np.asarray(at.slope)[keep]
-        flat = [c.basis * (signal if c.on_signal else 1.0) * c.prior_sd for c in self.nuisances(at)]
-        return weight * np.column_stack([steep, *flat])
+        signal, gain, weight = (np.asarray(x)[..., keep] for x in (at.signal, at.gain, self.data.weight))
+        steep = gain[..., None] * np.asarray(at.slope)[..., keep, :]
+        flat = [
+            c.basis * (signal if c.on_signal else 1.0) * np.asarray(c.prior_sd)[..., None]
+            for c in self.nuisances(at)
+        ]
+        columns = [np.broadcast_to(column, weight.shape)[..., None] for column in flat]
+        return weight[..., None] * np.concatenate([steep, *columns], axis=-1)
 
     def correlation_length(self, residuals: np.ndarray) -> Any:
         """Number of points (...) of one channel whose residuals (..., rows, channels) count as one: see
         `correlation_in_sweeps`."""
         return correlation_in_sweeps(residuals[..., : self.measured_channels], self.sweeps)
 
-    def reweighted(self, factor: Any, fraction: float) -> SpectrumView:
-        """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
-        one."""
-        whole = np.ones(len(self.data.weight))
-        whole[: self.points] = np.broadcast_to(factor, (self.rows, self.channels)).reshape(-1)
+    def reweighted(self, factor: Any, fraction: Any) -> SpectrumView:
+        """Weights times `factor` (broadcast to (..., rows, channels)), each point for `fraction` of one."""
+        whole = np.ones(self.data.weight.shape)
+        own = np.broadcast_to(factor, (*whole.shape[:-1], self.rows, self.channels))
+        whole[..., : self.points] = own.reshape(*whole.shape[:-1], -1)
         most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
-        data = self.data._replace(
-            weight=self.data.weight * whole, independent_fraction=np.float64(min(fraction, most))
-        )
-        return replace(self, data=data)
+        data = self.data._replace(weight=self.data.weight * whole)
+        return replace(self, data=data).counting(np.minimum(fraction, most))
 
-    def counting(self, fraction: float) -> SpectrumView:
-        """The view with each point counting for `fraction` of an independent one."""
-        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
+    def counting(self, fraction: Any) -> SpectrumView:
+        """The view with each point counting for `fraction` (...) of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
 
     def thinned(self) -> SpectrumView:
         """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
@@ -189,8 +195,7 @@ class SpectrumView:
     def in_columns(self, values: Any) -> np.ndarray:
         """Data values or a model of them (..., data values) as columns of the signal, such as N, C and S,
         without padding, (..., rows, columns). A depolarisation is the last."""
-        values = np.asarray(values)[..., : self.points]
-        columns = values.reshape(*values.shape[:-1], self.rows, self.channels)
+        columns = self._in_rows(np.asarray(values))
         if self.data.frame is None:
             return columns
         return np.einsum("...pij,...pi->...pj", np.asarray(self.data.frame)[..., : self.rows, :, :], columns)
@@ -202,7 +207,7 @@ class SpectrumView:
             change = np.einsum("...pij,...pj->...pi", frame, change)
         return change[..., : self.measured_channels]
 
-    def rms(self, model: Any) -> float:
-        """rms of the residuals. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere, in each
-        of its two directions."""
+    def rms(self, model: Any) -> Any:
+        """rms (...) of the residuals. For Ψ and Δ it is in degrees of Ψ: half the distance on the sphere, in
+        each of its two directions."""
         return self.signal.rms(self.in_columns(self.data.values - np.asarray(model)))

@@ -1,10 +1,10 @@
-"""Scan of many pixels at once: the misfit that each node of a grid leaves after one linear step.
+"""Scan of many spectra at once: the misfit that each node of a grid leaves after one linear step.
 
 At each node, a thickness with values of the other parameters, the simulated signal and its tangents to all
 free parameters are known beforehand, and with the scale and the offset they span the signals near the node.
-What a pixel leaves of that span is the misfit that a Gauss-Newton step predicts. With weights that all
-pixels have in common the spans of all nodes are one matrix, and the scan of a block of pixels is one product
-of matrices. A step counts up to half the distance to the next node only.
+What a spectrum leaves of that span is the misfit that a Gauss-Newton step predicts. With weights that all
+spectra have in common the spans of all nodes are one matrix, and the scan of a block of spectra is one
+product of matrices. A step counts up to half the distance to the next node only.
 """
 
 from functools import partial
@@ -33,8 +33,8 @@ wavelength in the layer apart, a linear step leaves a third of the fringes' ampl
 _MOST_NUMBERS = 40_000_000
 """Numbers of a table at most, 160 MB: with more the design of the other parameters is coarser."""
 _SINGLE, _SEVERAL = 4, 12
-"""Candidates of each pixel, where the thickness alone is scanned and beside a design of other parameters: the
-nodes of one minimum at several of its rows are all candidates."""
+"""Candidates of each spectrum, where the thickness alone is scanned and beside a design of other parameters:
+the nodes of one minimum at several of its rows are all candidates."""
 _DEPENDENT = 1e-9
 """Length of a column beside others, as a share of its own, below which they span it."""
 _BATCH = 256
@@ -61,19 +61,19 @@ class Lookup(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Static part of the scan: sizes of a `Lookup`, and candidates that it returns for each pixel."""
+    """Static part of the scan: sizes of a `Lookup`, and candidates that it returns for each spectrum."""
 
     designs: int
     depths: int
     gains: int  # terms of the scale, 0 where it is known
     order: tuple[int, ...]  # parameters in the order of the tangents
-    relative: bool  # pixels are scaled to the level of the table
+    relative: bool  # spectra are scaled to the level of the table
     candidates: int
 
 
 class Candidates(NamedTuple):
-    """Best nodes of each pixel after a linear step, best first: (pixels, candidates, ...); and the least
-    deviance near each thickness, (pixels, thickness)."""
+    """Best nodes of each spectrum after a linear step, best first: (spectra, candidates, ...); and the least
+    deviance near each thickness, (spectra, thickness)."""
 
     units: Any
     deviance: Any
@@ -103,8 +103,9 @@ def table(
 ) -> tuple[Lookup, Layout, np.ndarray]:
     """The lookup of a problem's one view, its layout, and the thicknesses of its nodes in nm.
 
-    **Arguments:** `view` without padding and without a frame; `weight` (points,), which all pixels have about
-    in common, of values in units of their level where the scale is free, else of values of this `level`.
+    **Arguments:** `view` without padding and without a frame; `weight` (points,), which all spectra have
+    about in common, of values in units of their level where the scale is free, else of values of this
+    `level`.
     """
     instrument, data, points = view.scene.instrument, view.data, len(weight)
     gain_sd = scale_prior(instrument.scale)[1] if isinstance(instrument.scale, Drift) else np.zeros(0)
@@ -275,7 +276,8 @@ def _orthonormal(vectors: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray,
 
 @partial(kept, many_calls=True)
 def scan(layout: Layout, lookup: Lookup, values: Any, weight_scale: Any) -> Candidates:
-    """Best nodes of pixels (pixels, points), each with weights `weight_scale` (pixels,) times the common."""
+    """Best nodes of spectra (spectra, points), each with weights `weight_scale` (spectra,) times the
+    common."""
     gains, count = layout.gains, len(layout.order)
     shape, nodes = (layout.designs, layout.depths), layout.designs * layout.depths
     distance = values * lookup.weight - lookup.known

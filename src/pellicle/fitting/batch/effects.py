@@ -1,7 +1,6 @@
-"""Systematic effects of many pixels: changes of their data by what a scene takes for granted."""
+"""Systematic effects of many spectra: changes of their data by what a scene takes for granted."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from pellicle.scene.film import Scene
 
 _NODES = 48
 _LANES = 64
-"""Pixels that one call of the compiled program takes: a few tens of signals each."""
+"""Spectra that one call of the compiled program takes: a few tens of signals each."""
 
 
 def nodes(lower: float, upper: float, shortest: float) -> np.ndarray:
@@ -32,12 +31,12 @@ def nodes(lower: float, upper: float, shortest: float) -> np.ndarray:
     return np.linspace(lower, upper, max(int(np.ceil((upper - lower) * 2 * _NODES / shortest)) + 1, 2))
 
 
-class PixelEffects:
+class BatchEffects:
     """The effects to which a scene gives an uncertainty, for spectra of one view.
 
     Which effects there are, and their sizes but for a spread of the thickness, are those at `example`, values
     of the parameters (parameters,). Where a thickness is the only parameter, they are interpolated between
-    `nodes` (nodes,) of it, each of which is simulated when a pixel first needs it.
+    `nodes` (nodes,) of it, each of which is simulated when a spectrum first needs it.
     """
 
     def __init__(
@@ -62,10 +61,10 @@ class PixelEffects:
             self._simulated_at = np.zeros(len(nodes), bool)
 
     def changes(self, view: SpectrumView, at: Local, values: np.ndarray) -> list[Effect]:
-        """Every effect with its change of the data (pixels, rows, measured channels), at `values` (pixels,
-        parameters) of the parameters, where `at` are the models of the pixels.
+        """Every effect with its change of the data (spectra, rows, measured channels), at `values` (spectra,
+        parameters) of the parameters, where `at` are the models of the spectra.
 
-        `view` is that of the pixels: its frame may have an axis of pixels.
+        `view` is that of the spectra: its frame may have an axis of spectra.
         """
         simulated = self._simulated(view, at, values) if self._simulations else []
         return [*simulated, *effects_on_signal(view, at, self._scene)]
@@ -80,7 +79,7 @@ class PixelEffects:
         return [row.effect(change) for row, change in zip(self._rows, of_data, strict=True)]
 
     def _interpolated(self, nodes: np.ndarray, thickness: np.ndarray) -> np.ndarray:
-        """Changes of the signal (pixels, effects, points) from those at the nodes of the table, linearly."""
+        """Changes of the signal (spectra, effects, points) from those at the nodes of the table, linearly."""
         at = np.clip(np.searchsorted(nodes, thickness) - 1, 0, len(nodes) - 2)
         used = np.unique([at, at + 1])
         missing = used[~self._simulated_at[used]]
@@ -94,7 +93,7 @@ class PixelEffects:
         return changes
 
     def _of_signal(self, values: np.ndarray, frames: Any) -> np.ndarray:
-        """Changes of the signal (pixels, effects, points) at `values` (pixels, parameters)."""
+        """Changes of the signal (spectra, effects, points) at `values` (spectra, parameters)."""
         numbers = np.tile(self._start, (len(values), 1))
         numbers[:, : values.shape[1]] = values
         frame = None if frames is None else np.asarray(frames)
@@ -146,9 +145,3 @@ def _simulation(
     for (i, _, weight), key in zip(terms, keys, strict=True):
         weights[i, columns.index(key)] += weight
     return _Simulation(program, [(effects[i], relative) for i, relative in columns], weights)
-
-
-def of_pixels(view: SpectrumView, frame: np.ndarray | None) -> SpectrumView:
-    """The view without padding, and with the frames of pixels (pixels, wavelengths, channels, channels)."""
-    position = np.asarray(view.data.position)[: view.points]
-    return replace(view, data=view.data._replace(position=position, frame=frame))

@@ -1,4 +1,4 @@
-"""Measured values of many pixels as a fit sees them, and the minima that a search finds for them."""
+"""Measured values of many spectra as a fit sees them, the minima of a search, and the results of fits."""
 
 from __future__ import annotations
 
@@ -9,26 +9,32 @@ import numpy as np
 
 from pellicle.fitting import noise
 from pellicle.fitting.problem import Noise
+from pellicle.fitting.result import Status
 from pellicle.fitting.robust_losses import MAD_TO_SIGMA, median
 from pellicle.signals.sphere import ROUGH, ncs, sphere_frame, sphere_sigma
 
+NO_DATA, BY_NEIGHBOURS = "no-data", "by-neighbours"
+STATUSES = (NO_DATA, *(str(status) for status in Status), BY_NEIGHBOURS)
+"""Status words of a spectrum, in the order of their codes: those of `pellicle.fit`, that of a spectrum
+without data, and that of one whose order of interference its neighbours decide."""
+CODES = {word: code for code, word in enumerate(STATUSES)}
 ORDERS = 4
-"""Minima of each pixel that are kept."""
+"""Minima of each spectrum that are kept."""
 _TO_NORMAL = MAD_TO_SIGMA / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""
 
 
-class PixelData(NamedTuple):
-    """Measured values of pixels as a fit sees them, without padding.
+class BatchData(NamedTuple):
+    """Measured values of spectra as a fit sees them, without padding.
 
     Points are data values in the order of the model: of R or T one for each wavelength (and angle), of
     ellipsometry N, C, S (or N and C) for each.
 
-    - `values` (pixels, points): 0 where nothing was measured.
-    - `weight` (pixels, points): 1/σ by the given σ or, where that is absent, by the first guess of
+    - `values` (spectra, points): 0 where nothing was measured.
+    - `weight` (spectra, points): 1/σ by the given σ or, where that is absent, by the first guess of
       `pellicle.fit`; 0 where nothing was measured.
-    - `level` (pixels,): median of the values' size, the unit of an offset.
-    - `frame` (pixels, wavelengths, channels, channels): of N, C, S where Ψ and Δ have errors of their own.
+    - `level` (spectra,): median of the values' size, the unit of an offset.
+    - `frame` (spectra, wavelengths, channels, channels): of N, C, S where Ψ and Δ have errors of their own.
     """
 
     values: np.ndarray
@@ -36,30 +42,30 @@ class PixelData(NamedTuple):
     level: np.ndarray
     frame: np.ndarray | None = None
 
-    def of(self, which: np.ndarray) -> PixelData:
-        """The data of some pixels, by their positions."""
+    def of(self, which: np.ndarray) -> BatchData:
+        """The data of some spectra, by their positions."""
         frame = None if self.frame is None else self.frame[which]
-        return PixelData(self.values[which], self.weight[which], self.level[which], frame)
+        return BatchData(self.values[which], self.weight[which], self.level[which], frame)
 
 
-class PixelMinima(NamedTuple):
-    """The best distinct local minima of each pixel, best first, as arrays (pixels, orders, ...).
+class BatchMinima(NamedTuple):
+    """The best distinct local minima of each spectrum, best first, as arrays (spectra, orders, ...).
 
-    - `values` (pixels, orders, parameters) in the parameters' own units, `units` the same in the unit cube.
-      NaN where a pixel has fewer minima, or no data.
-    - `deviance` (pixels, orders): −2 ln of the marginal likelihood, priors included, as in `pellicle.fit`,
-      with the weights of `PixelData`; infinite where there are fewer minima.
-    - `misfit` (pixels, orders): the part of it that goes with the weights, the sum of squared weighted
+    - `values` (spectra, orders, parameters) in the parameters' own units, `units` the same in the unit cube.
+      NaN where a spectrum has fewer minima, or no data.
+    - `deviance` (spectra, orders): −2 ln of the marginal likelihood, priors included, as in `pellicle.fit`,
+      with the weights of `BatchData`; infinite where there are fewer minima.
+    - `misfit` (spectra, orders): the part of it that goes with the weights, the sum of squared weighted
       residuals of the data. With weights times s the deviance is s² `misfit` + (`deviance` − `misfit`), up to
       how much priors shift the minimum.
-    - `converged` (pixels, orders): whether the solver settled. False too for rivals that are too bad to be
+    - `converged` (spectra, orders): whether the solver settled. False too for rivals that are too bad to be
       polished, whose values and deviances are those that a linear step predicts.
-    - `model` (pixels, points): the best model as measured, with its nuisances.
-    - `profile` (pixels, nodes): least predicted deviance near each node of the scanned `thickness` (nodes,)
-      in nm, above that of the best minimum; (pixels, 0) where no thickness is free.
-    - `signal`, `gain` and `offset` (pixels, points): the simulated signal at the best minimum, and the scale
+    - `model` (spectra, points): the best model as measured, with its nuisances.
+    - `profile` (spectra, nodes): least predicted deviance near each node of the scanned `thickness` (nodes,)
+      in nm, above that of the best minimum; (spectra, 0) where no thickness is free.
+    - `signal`, `gain` and `offset` (spectra, points): the simulated signal at the best minimum, and the scale
       and offset that make the model of it, gain · signal + offset.
-    - `slope` (pixels, points, parameters): ∂ signal / ∂ parameter there, in its own unit.
+    - `slope` (spectra, points, parameters): ∂ signal / ∂ parameter there, in its own unit.
     """
 
     values: np.ndarray
@@ -76,8 +82,29 @@ class PixelMinima(NamedTuple):
     slope: np.ndarray
 
 
-def pixel_data(block: Mapping[str, np.ndarray], source: Noise) -> PixelData:
-    """The data of a block of pixels (`Cube.pixels`), with weights as `pellicle.fit` first gives them.
+class BatchFits(NamedTuple):
+    """Fits of spectra, arrays (spectra, ...) in the order of the problem's parameters.
+
+    `values` and `stderr` (spectra, parameters) are in the parameters' own units; `stderr` is the combined
+    standard uncertainty, as in `pellicle.fit`, infinite where the data do not determine the parameter, and
+    `stderr_noise` that of the noise alone. `minima` (spectra, orders, parameters) are the best minima of each
+    spectrum, its answer first, and `delta_chi2` (spectra, orders) how much worse they are: infinite where
+    there are no more. `status` (spectra,) are codes of `STATUSES`. Numbers of a spectrum without data are
+    NaN.
+    """
+
+    values: np.ndarray
+    stderr: np.ndarray
+    stderr_noise: np.ndarray
+    status: np.ndarray
+    minima: np.ndarray
+    delta_chi2: np.ndarray
+    chi2_reduced: np.ndarray
+    rms: np.ndarray
+
+
+def batch_data(block: Mapping[str, np.ndarray], source: Noise) -> BatchData:
+    """The data of a block of spectra (`Cube.spectra`), with weights as `pellicle.fit` first gives them.
 
     `source` is the noise of the view that explains them.
     """
@@ -95,10 +122,10 @@ def pixel_data(block: Mapping[str, np.ndarray], source: Noise) -> PixelData:
         weight = known / (noise.drifting_sigma(values) if source.drifting else _guess(values))
     size = np.abs(values)
     level = median(size, -1) if whole else _median_of(size, known)
-    return PixelData(np.where(known, values, 0.0), weight, np.maximum(level, 1e-12))
+    return BatchData(np.where(known, values, 0.0), weight, np.maximum(level, 1e-12))
 
 
-def _on_sphere(arrays: Mapping[str, np.ndarray], known: np.ndarray) -> PixelData:
+def _on_sphere(arrays: Mapping[str, np.ndarray], known: np.ndarray) -> BatchData:
     """Ψ and Δ as N, C, S, in a frame where their errors are given."""
     psi, delta, points = arrays["values"], arrays["delta"], (len(known), -1)
     values, sigma, frame = ncs(psi, delta), np.full((*psi.shape, 3), ROUGH), None
@@ -107,7 +134,7 @@ def _on_sphere(arrays: Mapping[str, np.ndarray], known: np.ndarray) -> PixelData
         frame = sphere_frame(psi, delta)
         values = np.einsum("...ij,...j->...i", frame, values)
     weight = known[..., None] / sigma
-    return PixelData(
+    return BatchData(
         (values * known[..., None]).reshape(points), weight.reshape(points), np.ones(len(psi)), frame
     )
 
@@ -130,7 +157,7 @@ def _median_of(size: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _guess(values: np.ndarray) -> np.ndarray:
-    """First guess of an unknown noise, (pixels, 1), which the residuals replace."""
+    """First guess of an unknown noise, (spectra, 1), which the residuals replace."""
     rough = median(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]), -1)
     guess = np.maximum(0.01 * np.ptp(values, axis=1), _TO_NORMAL * rough)
     return np.maximum(guess, 1e-12)[:, None]

@@ -10,15 +10,14 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError
+from pellicle.fitting.batch.data import BatchFits, batch_data
+from pellicle.fitting.batch.errors import BatchErrors
+from pellicle.fitting.batch.search import BatchSearch, minima, prepared
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Measured
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.mapping.pixels.data import pixel_data
-from pellicle.mapping.pixels.errors import PixelErrors
-from pellicle.mapping.pixels.results import PixelFits
-from pellicle.mapping.pixels.search import PixelSearch, minima, prepared
 from pellicle.scene.film import Scene
 
 _SAMPLE = 9
@@ -35,8 +34,8 @@ class PixelModel:
     scene: Scene
     problem: Problem
     example: Spectrum
-    search: PixelSearch
-    errors: PixelErrors
+    search: BatchSearch
+    errors: BatchErrors
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -54,9 +53,9 @@ def prepare(cube: Cube, scene: Scene) -> PixelModel:
     with jax.enable_x64(True):
         [target] = measurements(example, scene)
         problem = make(target)
-        search = prepared(problem, pixel_data(sample, problem.views[0].noise))
+        search = prepared(problem, batch_data(sample, problem.views[0].noise))
         assert isinstance(target, Measured)
-        errors = PixelErrors(problem, target, cube.calibrated)
+        errors = BatchErrors(problem, target, cube.calibrated)
     return PixelModel(scene, problem, example, search, errors)
 
 
@@ -101,9 +100,9 @@ def spectrum(cube: Cube, pixel: dict[str, np.ndarray]) -> Spectrum:
     )
 
 
-def fit_pixels(model: PixelModel, cube: Cube, where: tuple[slice, ...]) -> PixelFits:
+def fit_pixels(model: PixelModel, cube: Cube, where: tuple[slice, ...]) -> BatchFits:
     """Fit a block of pixels of a cube."""
     block = cube.pixels(where)
     with jax.enable_x64(True):
-        data = pixel_data(block, model.problem.views[0].noise)
+        data = batch_data(block, model.problem.views[0].noise)
         return model.errors.fits(data, minima(model.search, data))

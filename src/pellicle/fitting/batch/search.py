@@ -1,7 +1,7 @@
-"""Search for the minima of many pixels: scan by a table, Gauss-Newton steps with the exact model.
+"""Search for the minima of many spectra: scan by a table, Gauss-Newton steps with the exact model.
 
-The candidates of the scan (`mapping.lookup`) that could be a pixel's answer or its rival are polished with
-the model, the weights and the bounds that `pellicle.fit` has (`mapping.polish`); the others keep what the
+The candidates of the scan (`lookup`) that could be answer of a spectrum or its rival are polished with
+the model, the weights and the bounds that `pellicle.fit` has (`polish`); the others keep what the
 scan predicts.
 """
 
@@ -14,19 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.batch import polish
+from pellicle.fitting.batch.data import ORDERS, BatchData, BatchMinima
+from pellicle.fitting.batch.lookup import Layout, Lookup, scan, table
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.mapping.pixels import polish
-from pellicle.mapping.pixels.data import ORDERS, PixelData, PixelMinima
-from pellicle.mapping.pixels.lookup import Layout, Lookup, scan, table
 from pellicle.programs.cache import in_chunks
 from pellicle.scene.instrument import Drift
 
 log = getLogger(__name__)
 
 _MOST_PRODUCTS = 4_000_000
-"""Numbers of the product of a block of pixels with the table, 16 MB: larger tables have smaller blocks."""
+"""Numbers of the product of a block of spectra with the table, 16 MB: larger tables have smaller blocks."""
 _MOST_PIXELS, _FEWEST_PIXELS = 1024, 64
 _CHANCE, _REACH = 20.0, 1.25
 """Candidates that are polished, chosen as in `fitting.film.search`."""
@@ -39,14 +39,15 @@ _NEAR, _SETTLED = 1e-5, 1e-10
 """Fall of the deviance, in units of the noise, that may be left in a minimum before and after its last step:
 the second is 1e-5 of a standard error."""
 _ROUNDS, _MORE_ROUNDS, _LAST = 4, 40, 4
-"""Rounds of steps for each candidate, of more for the best of a pixel, and most repetitions of its last."""
+"""Rounds of steps for each candidate, of more for the best of a spectrum, and most repetitions of its
+last."""
 
 _REWEIGHTED = 3
 """Times that weights are adapted to the residuals, where priors weigh beside the data."""
 
 
-class PixelSearch(NamedTuple):
-    """A problem's one spectrum as of any pixel, and the table that finds its minima."""
+class BatchSearch(NamedTuple):
+    """A problem's one spectrum as of any spectrum, and the table that finds its minima."""
 
     problem: Problem
     view: SpectrumView
@@ -74,13 +75,13 @@ class PixelSearch(NamedTuple):
 
     @property
     def block(self) -> int:
-        """Pixels that are scanned together."""
+        """Spectra that are scanned together."""
         width = self.lookup.columns.shape[1]
         return int(np.clip(2 ** int(np.log2(_MOST_PRODUCTS / width)), _FEWEST_PIXELS, _MOST_PIXELS))
 
 
-def prepared(problem: Problem, sample: PixelData) -> PixelSearch:
-    """The search of pixels for a problem of one spectrum; `sample` are a few pixels, as all are."""
+def prepared(problem: Problem, sample: BatchData) -> BatchSearch:
+    """The search of spectra for a problem of one spectrum; `sample` are a few spectra, as all are."""
     view: SpectrumView = problem.views[0].unpadded()
     view = replace(view, data=view.data._replace(frame=None))
     instrument, level = view.scene.instrument, float(np.median(sample.level))
@@ -91,41 +92,41 @@ def prepared(problem: Problem, sample: PixelData) -> PixelSearch:
     lookup, layout, thickness = table(problem, view, weight, level)
     common = polish.Common(view.scene, view.data, problem.box)
     dark = 0.0 if isinstance(instrument.offset, Drift) else float(instrument.offset)
-    return PixelSearch(problem, view, common, lookup, layout, thickness, dark)
+    return BatchSearch(problem, view, common, lookup, layout, thickness, dark)
 
 
-def _even_weight(data: PixelData, channels: int) -> np.ndarray:
-    """Weights (pixels, points) of N, C, S themselves where they are given in a frame."""
+def _even_weight(data: BatchData, channels: int) -> np.ndarray:
+    """Weights (spectra, points) of N, C, S themselves where they are given in a frame."""
     if data.frame is None:
         return data.weight
     square = data.weight.reshape(len(data.weight), -1, channels) ** 2
     return np.repeat(np.sqrt(square.mean(axis=2)), channels, axis=1)
 
 
-def minima(search: PixelSearch, data: PixelData) -> PixelMinima:
-    """The best distinct minima of each pixel; to be called with JAX in float64."""
-    pixels, points = data.values.shape
+def minima(search: BatchSearch, data: BatchData) -> BatchMinima:
+    """The best distinct minima of each spectrum; to be called with JAX in float64."""
+    spectra, points = data.values.shape
     count, nodes = len(search.problem.parameters), len(search.thickness)
     valid = np.flatnonzero(np.sum(data.weight > 0, axis=1) >= 2)
-    best = _minima(search, data.of(valid) if len(valid) < pixels else data) if len(valid) else None
-    if best is not None and len(valid) == pixels:
+    best = _minima(search, data.of(valid) if len(valid) < spectra else data) if len(valid) else None
+    if best is not None and len(valid) == spectra:
         return best
-    orders, curve = (pixels, ORDERS), (pixels, points)
-    result = PixelMinima(
+    orders, curve = (spectra, ORDERS), (spectra, points)
+    result = BatchMinima(
         values=np.full((*orders, count), np.nan),
         units=np.full((*orders, count), np.nan),
         deviance=np.full(orders, np.inf),
         misfit=np.full(orders, np.inf),
         converged=np.zeros(orders, bool),
         model=np.full(curve, np.nan),
-        profile=np.full((pixels, nodes), np.nan),
+        profile=np.full((spectra, nodes), np.nan),
         thickness=search.thickness,
         signal=np.full(curve, np.nan),
         gain=np.full(curve, np.nan),
         offset=np.full(curve, np.nan),
         slope=np.full((*curve, count), np.nan),
     )
-    for name, rows in zip(PixelMinima._fields, best or (), strict=False):
+    for name, rows in zip(BatchMinima._fields, best or (), strict=False):
         if name != "thickness":
             getattr(result, name)[valid] = rows
     return result
@@ -133,11 +134,11 @@ def minima(search: PixelSearch, data: PixelData) -> PixelMinima:
 
 @dataclass
 class _Points:
-    """Points of pixels on their way to minima: `units` (pixels, candidates, parameters), with the deviance,
-    its part that goes with the weights, and the fall to come (pixels, candidates)."""
+    """Points of spectra on their way to minima: `units` (spectra, candidates, parameters), with the deviance,
+    its part that goes with the weights, and the fall to come (spectra, candidates)."""
 
-    search: PixelSearch
-    data: PixelData
+    search: BatchSearch
+    data: BatchData
     units: np.ndarray
     deviance: np.ndarray
     misfit: np.ndarray
@@ -145,7 +146,7 @@ class _Points:
 
     @classmethod
     def unpolished(
-        cls, search: PixelSearch, data: PixelData, units: np.ndarray, deviance: np.ndarray
+        cls, search: BatchSearch, data: BatchData, units: np.ndarray, deviance: np.ndarray
     ) -> _Points:
         """Points of a known deviance."""
         return cls(
@@ -153,7 +154,7 @@ class _Points:
         )
 
     def polish(self, where: np.ndarray, rounds: int, best: np.ndarray, *, coarse: bool = True) -> None:
-        """Polish the points `where`, as far as their distance to the `best` (pixels,) asks if `coarse`."""
+        """Polish the points `where`, as far as their distance to the `best` (spectra,) asks if `coarse`."""
         at, which = np.nonzero(where)
         settled = polish.settle(
             *(self.search.static, self.search.common, self.data, at, self.units[at, which]),
@@ -165,9 +166,9 @@ class _Points:
             mine[at, which] = own
 
     def end(self, lowest: np.ndarray) -> polish.Best:
-        """The last steps of the `lowest` points (pixels,), and the model there."""
-        static, common, pixels = self.search.static, self.search.common, np.arange(len(lowest))
-        best = polish.in_rows(polish.at_best, static, common, self.data, self.units[pixels, lowest])
+        """The last steps of the `lowest` points (spectra,), and the model there."""
+        static, common, spectra = self.search.static, self.search.common, np.arange(len(lowest))
+        best = polish.in_rows(polish.at_best, static, common, self.data, self.units[spectra, lowest])
         for _ in range(_LAST):
             left = np.flatnonzero(best.promise > _SETTLED * self.search.noise(best.deviance))
             if not len(left):
@@ -175,15 +176,15 @@ class _Points:
             again = polish.in_rows(polish.at_best, static, common, self.data.of(left), best.units[left])
             for mine, own in zip(best, again, strict=True):
                 mine[left] = own
-        self.units[pixels, lowest], self.deviance[pixels, lowest] = best.units, best.deviance
-        self.misfit[pixels, lowest], self.promise[pixels, lowest] = best.misfit, best.promise
+        self.units[spectra, lowest], self.deviance[spectra, lowest] = best.units, best.deviance
+        self.misfit[spectra, lowest], self.promise[spectra, lowest] = best.misfit, best.promise
         return best
 
 
 class _Candidates(NamedTuple):
-    """Candidates of the scan: `units` (pixels, candidates, parameters), their `predicted` deviance (pixels,
-    candidates), the `profile` along the thickness (pixels, nodes), the `rounding` error (pixels,) of the
-    predictions, and whether the predictions are of the pixels' own weights (`alike`)."""
+    """Candidates of the scan: `units` (spectra, candidates, parameters), their `predicted` deviance (spectra,
+    candidates), the `profile` along the thickness (spectra, nodes), the `rounding` error (spectra,) of the
+    predictions, and whether the predictions are of the spectra' own weights (`alike`)."""
 
     units: np.ndarray
     predicted: np.ndarray
@@ -192,8 +193,8 @@ class _Candidates(NamedTuple):
     alike: bool
 
 
-def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
-    """Minima of pixels that all have data."""
+def _minima(search: BatchSearch, data: BatchData) -> BatchMinima:
+    """Minima of spectra that all have data."""
     candidates = _candidates(search, data)
     points, tried = _polished(search, data, candidates)
     factor = np.ones(len(data.values))
@@ -209,8 +210,9 @@ def _minima(search: PixelSearch, data: PixelData) -> PixelMinima:
     return _ordered(points, lowest, settled, factor, candidates.profile, at_best)
 
 
-def _polished(search: PixelSearch, data: PixelData, candidates: _Candidates) -> tuple[_Points, np.ndarray]:
-    """The candidates, polished where they could be the best of their pixel or its rival, and which were."""
+def _polished(search: BatchSearch, data: BatchData, candidates: _Candidates) -> tuple[_Points, np.ndarray]:
+    """The candidates, polished where they could be the best of their spectrum or its rival, and which
+    were."""
     units, predicted = candidates.units, candidates.predicted
     several = len(search.problem.parameters) > 1
     optimistic = exact = predicted
@@ -230,22 +232,22 @@ def _polished(search: PixelSearch, data: PixelData, candidates: _Candidates) -> 
 
 
 def _reweighted(
-    points: _Points, tried: np.ndarray, data: PixelData
+    points: _Points, tried: np.ndarray, data: BatchData
 ) -> tuple[_Points, np.ndarray, np.ndarray]:
-    """The points polished again with weights by their residuals, which were, and the factors (pixels,) of the
-    weights."""
-    search, pixels = points.search, np.arange(len(data.values))
-    factor = np.ones(len(pixels))
+    """The points polished again with weights by their residuals, which were, and the factors (spectra,) of
+    the weights."""
+    search, spectra = points.search, np.arange(len(data.values))
+    factor = np.ones(len(spectra))
     for _ in range(_REWEIGHTED):
         lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
-        before = points.units[pixels, lowest]
+        before = points.units[spectra, lowest]
         factor = _weight_factor(points, lowest, data)
         weighted = data._replace(weight=data.weight * factor[:, None])
         exact = _deviance(search, weighted, points.units)
         points = _Points.unpolished(search, weighted, points.units, exact)
-        tried = _polish_all_near(points, exact, exact, np.zeros(len(pixels)))
+        tried = _polish_all_near(points, exact, exact, np.zeros(len(spectra)))
         lowest = np.argmin(np.where(tried, points.deviance, np.inf), axis=1)
-        if np.allclose(points.units[pixels, lowest], before, rtol=0.0, atol=1e-3):
+        if np.allclose(points.units[spectra, lowest], before, rtol=0.0, atol=1e-3):
             break
     return points, tried, factor
 
@@ -257,8 +259,8 @@ def _ordered(
     factor: np.ndarray,
     profile: np.ndarray,
     at_best: polish.Best,
-) -> PixelMinima:
-    """The distinct minima of each pixel, best first, with deviances by its given weights."""
+) -> BatchMinima:
+    """The distinct minima of each spectrum, best first, with deviances by its given weights."""
     search, problem = points.search, points.search.problem
     # along a valley of several parameters, points that have not settled are no minima
     listed = settled if len(problem.parameters) > 1 else np.isfinite(points.deviance)
@@ -269,7 +271,7 @@ def _ordered(
         rest = points.deviance - points.misfit
     misfit = points.misfit / factor[:, None] ** 2
     deviance, misfit = (np.where(absent, np.inf, x[rows, here]) for x in (misfit + rest, misfit))
-    return PixelMinima(
+    return BatchMinima(
         values=np.asarray(problem.values(ordered)),
         units=ordered,
         deviance=deviance,
@@ -285,15 +287,15 @@ def _ordered(
     )
 
 
-def _deviance(search: PixelSearch, data: PixelData, units: np.ndarray) -> np.ndarray:
-    """Deviance (pixels, candidates) at points (pixels, candidates, parameters), infinite where there is
+def _deviance(search: BatchSearch, data: BatchData, units: np.ndarray) -> np.ndarray:
+    """Deviance (spectra, candidates) at points (spectra, candidates, parameters), infinite where there is
     none."""
     deviance = polish.in_rows(polish.explained, search.static, search.common, data, units).deviance
     return np.where(np.isfinite(deviance), deviance, np.inf)
 
 
-def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.ndarray:
-    """Factors (pixels,) of the weights of the `data`, from the residuals of the `lowest` points.
+def _weight_factor(points: _Points, lowest: np.ndarray, data: BatchData) -> np.ndarray:
+    """Factors (spectra,) of the weights of the `data`, from the residuals of the `lowest` points.
 
     As in `fitting.reweighting`: σ that is not given is their rms, and correlated neighbours count as one
     point. Without priors that moves no minimum.
@@ -317,16 +319,16 @@ def _weight_factor(points: _Points, lowest: np.ndarray, data: PixelData) -> np.n
 def _polish_all_near(
     points: _Points, optimistic: np.ndarray, exact: np.ndarray, rounding: np.ndarray
 ) -> np.ndarray:
-    """Polish all candidates that could be the best of their pixel or its rival; returns which they are.
+    """Polish all candidates that could be the best of their spectrum or its rival; returns which they are.
 
     As in `fitting.film.search`, residuals obey the triangle inequality: a candidate is left out where the
-    best is further away than `_REACH` times what polishing has brought in that pixel.
+    best is further away than `_REACH` times what polishing has brought in that spectrum.
     """
-    pixels, search, data = np.arange(len(exact)), points.search, points.data
+    spectra, search, data = np.arange(len(exact)), points.search, points.data
     systematic = np.sum((_SCALE * data.weight * data.values) ** 2, axis=1)
     tried, now = np.zeros(exact.shape, bool), np.zeros(exact.shape, bool)
-    now[pixels, np.argmin(optimistic, axis=1)] = True
-    now[pixels, np.argmin(exact, axis=1)] = True
+    now[spectra, np.argmin(optimistic, axis=1)] = True
+    now[spectra, np.argmin(exact, axis=1)] = True
     best, fall = exact.min(axis=1), np.zeros(len(exact))
     while now.any():
         points.polish(now, _ROUNDS, best)
@@ -341,8 +343,8 @@ def _polish_all_near(
     return tried
 
 
-def _candidates(search: PixelSearch, data: PixelData) -> _Candidates:
-    """The candidates of pixels by the lookup."""
+def _candidates(search: BatchSearch, data: BatchData) -> _Candidates:
+    """The candidates of spectra by the lookup."""
     lookup, channels, count = search.lookup, search.view.channels, len(data.values)
     values, weight = data.values, _even_weight(data, channels)
     values = _filled(values, data.weight, lookup.weight, channels)
@@ -370,7 +372,7 @@ def _candidates(search: PixelSearch, data: PixelData) -> _Candidates:
 
 
 def _filled(values: np.ndarray, weight: np.ndarray, common: np.ndarray, channels: int) -> np.ndarray:
-    """Values with those that a pixel lacks, of those that pixels have in common, by linear interpolation
+    """Values with those that a spectrum lacks, of those that spectra have in common, by linear interpolation
     along each channel."""
     lacking = np.flatnonzero(((weight == 0) & (common > 0)).any(axis=1))
     if not len(lacking):
@@ -396,8 +398,8 @@ def _distinct(
     lowest: np.ndarray,
     listed: np.ndarray,
 ) -> np.ndarray:
-    """Positions of the best distinct minima of each pixel (pixels, `ORDERS`), −1 where there are no more: the
-    `lowest` (pixels,), and the best of the others that are `listed` (pixels, candidates)."""
+    """Positions of the best distinct minima of each spectrum (spectra, `ORDERS`), −1 where there are no more:
+    the `lowest` (spectra,), and the best of the others that are `listed` (spectra, candidates)."""
     rows, count = np.arange(len(units)), units.shape[1]
     resolution = np.stack([p.resolutions_at(x) for p, x in zip(parameters, units.T, strict=True)]).T
     left = np.where(listed, deviance, np.inf)

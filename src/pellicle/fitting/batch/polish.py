@@ -1,4 +1,4 @@
-"""Gauss-Newton steps of many pixels side by side, with the exact model of their scene."""
+"""Gauss-Newton steps of many spectra side by side, with the exact model of their scene."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -7,19 +7,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.fitting.batch.data import BatchData
 from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
-from pellicle.mapping.pixels.data import PixelData
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 
 ROWS = 256
-"""Starts, or pixels, of one call: all calls share a program."""
+"""Starts, or spectra, of one call: all calls share a program."""
 EVALUATIONS = 2
 """Evaluations of one call: for most starts of a scan, two bring the solver so near that the next, which is
 done in any case for the model and its slopes, ends it."""
@@ -31,7 +31,7 @@ Static = tuple[SpectrumForm, Coordinates]
 
 
 class Common(NamedTuple):
-    """Arrays that all pixels share: the scene, data whose values are not used, and the box."""
+    """Arrays that all spectra share: the scene, data whose values are not used, and the box."""
 
     scene: Scene
     data: Data
@@ -39,7 +39,7 @@ class Common(NamedTuple):
 
 
 class Explained(NamedTuple):
-    """Deviances of points (pixels, points)."""
+    """Deviances of points (spectra, points)."""
 
     deviance: Any
 
@@ -57,8 +57,8 @@ class Stepped(NamedTuple):
 
 
 class Best(NamedTuple):
-    """The best minimum of each pixel after one more step, as in `Stepped`; the model (pixels, points) there
-    and its slopes by the parameters in their own units."""
+    """The best minimum of each spectrum after one more step, as in `Stepped`; the model (spectra, points)
+    there and its slopes by the parameters in their own units."""
 
     units: Any
     deviance: Any
@@ -71,12 +71,12 @@ class Best(NamedTuple):
     slope: Any
 
 
-def _of(common: Common, row: PixelData) -> Data:
+def _of(common: Common, row: BatchData) -> Data:
     own = common.data._replace(values=row.values, weight=row.weight, level=row.level)
     return own._replace(frame=row.frame)
 
 
-def _residual(static: Static, common: Common, row: PixelData, unit: Any) -> tuple[Any, Any]:
+def _residual(static: Static, common: Common, row: BatchData, unit: Any) -> tuple[Any, Any]:
     """Weighted residuals at a point of the unit cube; deviance and misfit."""
     form, coordinates = static
     data = _of(common, row)
@@ -94,8 +94,8 @@ def _quadratic(unit: Any, gradient: Any, hessian: Any) -> QuadraticModel:
 
 
 @kept
-def explained(static: Static, common: Common, rows: PixelData, units: Any) -> Explained:
-    """Deviance of points `units` (pixels, points, parameters)."""
+def explained(static: Static, common: Common, rows: BatchData, units: Any) -> Explained:
+    """Deviance of points `units` (spectra, points, parameters)."""
 
     def one(row, unit):
         return _residual(static, common, row, unit)[1][0]
@@ -104,7 +104,7 @@ def explained(static: Static, common: Common, rows: PixelData, units: Any) -> Ex
 
 
 @partial(kept, many_calls=True)
-def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping: Any) -> Stepped:
+def stepped(static: Static, common: Common, rows: BatchData, units: Any, damping: Any) -> Stepped:
     """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
 
     A step that does not lower the misfit is taken back and repeated with more damping.
@@ -139,8 +139,9 @@ def stepped(static: Static, common: Common, rows: PixelData, units: Any, damping
 
 
 @partial(kept, many_calls=True)
-def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best:
-    """One step of pixels from points `units` (pixels, parameters) next to their minima, and the model there.
+def at_best(static: Static, common: Common, rows: BatchData, units: Any) -> Best:
+    """One step of spectra from points `units` (spectra, parameters) next to their minima, and the model
+    there.
 
     The step is so small that the curves are those of the points before it.
     """
@@ -174,7 +175,7 @@ def at_best(static: Static, common: Common, rows: PixelData, units: Any) -> Best
     return jax.vmap(one)(rows, units)
 
 
-def in_rows(program: Any, static: Static, common: Common, rows: PixelData, *points: np.ndarray) -> Any:
+def in_rows(program: Any, static: Static, common: Common, rows: BatchData, *points: np.ndarray) -> Any:
     """Outputs of a `program` of starts, `ROWS` of them at a time; `rows` are the data of each."""
     return in_chunks(lambda own: program(static, common, *own), (rows, *points), ROWS)
 
@@ -182,15 +183,15 @@ def in_rows(program: Any, static: Static, common: Common, rows: PixelData, *poin
 def settle(
     static: Static,
     common: Common,
-    data: PixelData,
-    pixels: np.ndarray,
+    data: BatchData,
+    spectra: np.ndarray,
     units: np.ndarray,
     *,
     rounds: int,
     tolerance: np.ndarray,
     coarse: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Local minima below starts (starts, parameters) of `pixels` (starts,): points, deviance, misfit, and
+    """Local minima below starts (starts, parameters) of `spectra` (starts,): points, deviance, misfit, and
     the fall of the deviance that is still to come, about.
 
     **Arguments:** `rounds` of `EVALUATIONS` at most; `tolerance` (starts,) of the deviance. With `coarse`
@@ -203,7 +204,7 @@ def settle(
     for _ in range(rounds):
         if not len(left):
             break
-        own = data.of(pixels[left])
+        own = data.of(spectra[left])
         polished = in_rows(stepped, static, common, own, units[left], damping[left])
         units[left], deviance[left], misfit[left] = polished.units, polished.deviance, polished.misfit
         promise[left], damping[left] = polished.promise, polished.damping

@@ -1,0 +1,1 @@
+"""Fits of many spectra of one scene and grid: search, errors and status, vectorised over the spectra."""

@@ -1,0 +1,213 @@
+"""Standard errors and status of spectra from their data and minima, by the conclusions of `pellicle.fit`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.batch.data import CODES, NO_DATA, BatchData, BatchFits, BatchMinima
+from pellicle.fitting.batch.effects import BatchEffects, nodes
+from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
+from pellicle.fitting.conclusion import linearised, verdicts
+from pellicle.fitting.discrepancy import DOUBTFUL, discrepancy
+from pellicle.fitting.film.evidence import spectrum_evidence
+from pellicle.fitting.film.form import Local
+from pellicle.fitting.film.parts import accuracy
+from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.summary import bounded_by_drift
+from pellicle.fitting.film.sweeps import sweeps
+from pellicle.fitting.film.targets import Measured, drifts
+from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.misfit import misfit, other_material
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.reweighting import RankedMinima, ranked_by_factor
+from pellicle.fitting.status import ORDER
+from pellicle.scene.free import is_free
+
+BLOCK = 1024
+"""Spectra that are judged at once. With 512 the calls of NumPy cost 1 to 3 µs more for each spectrum; the
+systems of equations of 2048 no longer stay in the cache."""
+
+
+class Group(NamedTuple):
+    """Spectra of which as many points were measured: their indices, the measured rows of each (spectra,
+    rows), None where all are, and the sweeps of those rows."""
+
+    spectra: np.ndarray
+    rows: np.ndarray | None
+    parts: list[np.ndarray]
+
+    def chunks(self, size: int) -> Iterator[Group]:
+        """The group in parts of `size` spectra."""
+        for first in range(0, len(self.spectra), size):
+            own = slice(first, first + size)
+            yield Group(self.spectra[own], None if self.rows is None else self.rows[own], self.parts)
+
+    def measured(self, x: np.ndarray) -> np.ndarray:
+        """Arrays of its spectra (spectra, rows, ...) at their measured rows."""
+        if self.rows is None:
+            return x
+        return np.take_along_axis(x, self.rows.reshape(*self.rows.shape, *[1] * (x.ndim - 2)), axis=1)
+
+
+def groups(view: SpectrumView, weight: np.ndarray, known: np.ndarray) -> list[Group]:
+    """Groups of the spectra that are `known` (spectra,); `weight` (spectra, points) is 0 where nothing was
+    measured. Those of a view of several sweeps have measured the same points."""
+    light = view.scene.light
+    measured: Any = np.all((weight > 0).reshape(-1, view.rows, view.channels), axis=2)
+    known = known & np.any(measured, axis=1)
+    wavelength = np.asarray(light.wavelength)[: view.rows]
+    own = 0.0 if is_free(light.angle) else light.angle  # a free one is the same for all
+    angle = np.broadcast_to(own, np.shape(light.wavelength))[: view.rows]
+    several = len(sweeps(wavelength, angle)) > 1
+    keys = measured if several else measured.sum(axis=1)[:, None]
+    _, which = np.unique(keys[known], axis=0, return_inverse=True)
+    result = []
+    for value in range(which.max(initial=-1) + 1):
+        spectra = np.flatnonzero(known)[which.ravel() == value]
+        count = int(measured[spectra[0]].sum())
+        rows = np.argsort(~measured[spectra], axis=1, kind="stable")[:, :count]
+        parts = sweeps(wavelength[rows[0]], angle[rows[0]])
+        result.append(Group(spectra, None if count == view.rows else rows, parts))
+    return result
+
+
+class BatchErrors:
+    """Errors and status of spectra, as `pellicle.fit` has them of one spectrum.
+
+    Left out is what few spectra need: default bounds are not widened, and a plan is not refined.
+    """
+
+    def __init__(self, problem: Problem, target: Measured, calibrated: bool):
+        self.problem, self.scene, self.calibrated = problem, target.scene, calibrated
+        [self.view] = problem.views
+        lower, upper = np.array([(p.lower, p.upper) for p in problem.parameters]).T
+        depth, table = problem.thickness_axis, None
+        self.grid = np.zeros(0) if depth is None else thickness_nodes(problem)
+        if len(lower) == 1 and depth is not None:
+            table = nodes(lower[0], upper[0], shortest_wavelength(problem))
+        self.effects = BatchEffects(self.view, 0.5 * (lower + upper), self.scene, table)
+
+    def fits(self, data: BatchData, minima: BatchMinima) -> BatchFits:
+        """Errors and status of spectra by their data and minima."""
+        spectra, orders, count = minima.values.shape
+        number, quality = np.full((spectra, count), np.nan), np.full(spectra, np.nan)
+        result = BatchFits(
+            values=number,
+            stderr=number.copy(),
+            stderr_noise=number.copy(),
+            status=np.full(spectra, CODES[NO_DATA], np.uint8),
+            minima=np.full(minima.values.shape, np.nan),
+            delta_chi2=np.full((spectra, orders), np.inf),
+            chi2_reduced=quality,
+            rms=quality.copy(),
+        )
+        known = np.isfinite(minima.deviance[:, 0])
+        for group in groups(self.view, data.weight, known):
+            for part in group.chunks(BLOCK):
+                for column, own in zip(result, self._fits(data, minima, part), strict=True):
+                    column[part.spectra] = own
+        return result
+
+    def _fits(self, data: BatchData, minima: BatchMinima, group: Group) -> BatchFits:
+        whole, every, view, at = self._seen(data, minima, group)
+        who, problem = group.spectra, self.problem._replace(views=(view,))
+        candidates = Minima(minima.units[who], minima.deviance[who], minima.converged[who])
+        ranked = ranked_by_factor(problem, candidates, minima.misfit[who], at)
+        [after], [fit] = ranked.problem.views, ranked.fits
+        jacobian, covariance = linearised(ranked)
+        effects = [
+            replace(effect, change=group.measured(effect.change))
+            for effect in self.effects.changes(whole, every, ranked.values)
+        ]
+        [block] = jacobian.blocks([view.points], [fit.variance])
+        evidence, units = spectrum_evidence(after, at, block, effects), candidates.units[:, 0]
+        systematic = discrepancy([evidence], jacobian, units, contributions=False)
+        [remaining], largest = systematic.remaining, accuracy(view, self.calibrated, view.data.values)
+        wrong = misfit(systematic, remaining, largest)
+        doubtful = np.flatnonzero((remaining.ratio > DOUBTFUL) & ~wrong)
+        if len(doubtful):
+            again = discrepancy([evidence.of(doubtful)], jacobian.of(doubtful), units[doubtful])
+            wrong[doubtful] = other_material(again.contributions) >= 0
+        models = LocalModels(self.problem, whole, ranked)
+        numbers = verdicts(
+            *(ranked, covariance, systematic),
+            lambda _: models.neighbourhood(covariance.covariance),
+            self._flat_sides(minima, who, ranked, models, ~wrong),
+            misfit=wrong,
+            amend=lambda limits: self._amended(limits, ranked, models),
+        )
+        return BatchFits(
+            values=ranked.values,
+            stderr=numbers.limits.stderr,
+            stderr_noise=numbers.noise.stderr,
+            status=np.array([CODES[str(status)] for status in ORDER], np.uint8)[numbers.status.position],
+            minima=minima.values[who],
+            delta_chi2=numbers.delta_chi2,
+            chi2_reduced=ranked.chi2_reduced,
+            rms=view.rms(at.model),
+        )
+
+    def _seen(
+        self, data: BatchData, minima: BatchMinima, group: Group
+    ) -> tuple[SpectrumView, Local, SpectrumView, Local]:
+        """The view of the spectra of a group with its best models at all points, and at those measured."""
+        view, own = self.view, data.of(group.spectra)
+        arrays = view.data._replace(
+            values=own.values,
+            weight=own.weight,
+            position=np.asarray(view.data.position)[: view.points],
+            level=own.level,
+            frame=own.frame,
+        )
+        whole = replace(view, data=arrays)
+        curves = (getattr(minima, name)[group.spectra] for name in Local._fields[:5])
+        every = Local(*curves, np.zeros(0), np.zeros(0))
+        if group.rows is None:
+            return whole, every, replace(whole, sweeps=group.parts), every
+
+        def measured(x: np.ndarray) -> np.ndarray:
+            rows = x.reshape(len(own.values), view.rows, -1, *x.shape[2:])
+            return group.measured(rows).reshape(len(x), -1, *x.shape[2:])
+
+        position = np.broadcast_to(arrays.position, own.values.shape)
+        few = arrays._replace(
+            values=measured(own.values), weight=measured(own.weight), position=measured(position)
+        )
+        if own.frame is not None:
+            few = few._replace(frame=group.measured(own.frame))
+        seen = replace(whole, data=few, points=few.values.shape[1], sweeps=group.parts)
+        return whole, every, seen, Local(*(measured(x) for x in every[:5]), *every[5:])
+
+    def _flat_sides(
+        self,
+        minima: BatchMinima,
+        who: np.ndarray,
+        ranked: RankedMinima,
+        models: LocalModels,
+        usable: np.ndarray,
+    ) -> dict[int, np.ndarray]:
+        """On which sides (spectra, 2) of the best thickness the misfit never rises, or only to a plateau."""
+        depth = self.problem.thickness_axis
+        if depth is None or minima.profile.shape[1] < 2:
+            return {}
+        scan = _resampled(self.grid, minima.thickness, minima.profile[who])
+        return {depth: models.flat_sides(depth, self.grid, scan, usable)}
+
+    def _amended(self, limits: Any, ranked: RankedMinima, models: LocalModels) -> Any:
+        """Limits by what a drift of scale and offset could imitate."""
+        single = len(self.scene.layers) == 1 and self.problem.thickness_axis is not None
+        return (
+            bounded_by_drift(limits, ranked, models.thinnest()) if drifts(self.scene) and single else limits
+        )
+
+
+def _resampled(grid: np.ndarray, thickness: np.ndarray, profile: np.ndarray) -> np.ndarray:
+    """A scan (spectra, nodes) against thickness at the values of another grid, linearly."""
+    at = np.clip(np.searchsorted(thickness, grid) - 1, 0, len(thickness) - 2)
+    share = np.clip((grid - thickness[at]) / (thickness[at + 1] - thickness[at]), 0.0, 1.0)
+    return profile[:, at] * (1 - share) + profile[:, at + 1] * share
