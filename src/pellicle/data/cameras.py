@@ -89,8 +89,22 @@ def sight(camera: Camera, space: str) -> Sight:
     coding = camera_encoding(camera.gamma)
     if camera.chart is None:
         return Sight(observers.srgb_sensor(eye), None, coding, (*notes, "R, G, B: channels of linear sRGB"))
-    matrix, told = _by_chart(camera.chart, coding, eye.white)
-    return Sight(eye, matrix, coding, (*notes, *told))
+    chart = read_chart(camera.chart)
+    linear = coding.decoded(chart.rgb)
+    slope = np.diagonal(coding.rise(linear), axis1=-2, axis2=-1)  # ∂ coded / ∂ linear of each channel
+    sigma = None if chart.sigma is None else chart.sigma / slope
+    fitted = fit_matrix(linear, chart.xyz, sigma, camera.chart)
+    recorded = linear @ np.linalg.inv(fitted.matrix).T
+    one, other = (np.asarray(lab(x, eye.white)) for x in (recorded, chart.xyz))
+    try:
+        name, difference = "ΔE2000", delta_e2000(one, other)
+    except ImportError:  # without the extra `colour`
+        name, difference = "ΔE*ab", np.asarray(delta_e76(one, other))
+    misfit = (
+        f"chart {camera.chart}: {len(linear)} patches, misfit {name} {difference.mean():.2g} on average and"
+        f" {difference.max():.2g} at most"
+    )
+    return Sight(eye, fitted, coding, (*notes, misfit, *chart.notes))
 
 
 def _sensor(camera: Camera) -> observers.Sensor:
@@ -152,25 +166,6 @@ def band_sensor(
     sensitivities = None if known else str(folder / name)
     eye = _sensor(Camera(observer, illuminant or "D65", lamp, sensitivities))
     return observers.srgb_sensor(eye) if name == SRGB else eye
-
-
-def _by_chart(path: str, coding: Encoding, white: np.ndarray) -> tuple[CameraMatrix, tuple[str, ...]]:
-    """Matrix of a camera by a chart, with a sentence on the misfit of its patches."""
-    chart = read_chart(path)
-    linear = coding.decoded(chart.rgb)
-    slope = np.diagonal(coding.rise(linear), axis1=-2, axis2=-1)  # ∂ coded / ∂ linear of each channel
-    sigma = None if chart.sigma is None else chart.sigma / slope
-    fitted = fit_matrix(linear, chart.xyz, sigma, path)
-    one, other = (np.asarray(lab(x, white)) for x in (linear @ np.linalg.inv(fitted.matrix).T, chart.xyz))
-    try:
-        name, difference = "ΔE2000", delta_e2000(one, other)
-    except ImportError:  # without the extra `colour`
-        name, difference = "ΔE*ab", np.asarray(delta_e76(one, other))
-    misfit = (
-        f"chart {path}: {len(linear)} patches, misfit {name} {difference.mean():.2g} on average and"
-        f" {difference.max():.2g} at most"
-    )
-    return fitted, (misfit, *chart.notes)
 
 
 class Chart(NamedTuple):

@@ -98,7 +98,18 @@ class Colours:
             )
         object.__setattr__(self, "sensor", (nm, weights))
         self._check_words()
-        self._check_values()
+        errors = np.ones((1, 3)) if self.sigma is None else self.sigma
+        angle = np.zeros(1) if self.angle is None else self.angle
+        for channel, column, spread in zip(self.channels, self.values.T, errors.T, strict=True):
+            where, of_spread = self.place(channel), self.place(f"the standard deviation of {channel}")
+            refuse_first(column, ~np.isfinite(column), where, f"is not finite; {_REMEDY}")
+            if self.space == "srgb":
+                outside = (column < 0) | (column > 1)
+                refuse_first(column, outside, where, "is not from 0 to 1; divide 8-bit values by 255")
+            wrong = ~(np.isfinite(spread) & (spread > 0))
+            refuse_first(spread, wrong, of_spread, f"is not above zero; {_REMEDY}")
+        beyond = ~((angle >= 0) & (angle <= 90))
+        refuse_first(angle, beyond, self.place("angle"), "is not from 0 to 90 degrees")
 
     def _check_words(self) -> None:
         known = {"space": SPACES, "signal": ("R", "T"), "polarisation": POLARISATIONS}
@@ -112,20 +123,6 @@ class Colours:
         if self.space != "rgb" and (self.camera is not None or self.white_balance == "free"):
             name = "camera" if self.camera is not None else "white_balance"
             raise UsageError(f'`{name}` goes with `space="rgb"`, the channels of a camera, not {self.space}')
-
-    def _check_values(self) -> None:
-        sigma = np.ones((1, 3)) if self.sigma is None else self.sigma
-        angle = np.zeros(1) if self.angle is None else self.angle
-        for channel, values, errors in zip(self.channels, self.values.T, sigma.T, strict=True):
-            where, spread = self.place(channel), self.place(f"the standard deviation of {channel}")
-            refuse_first(values, ~np.isfinite(values), where, f"is not finite; {_REMEDY}")
-            if self.space == "srgb":
-                outside = (values < 0) | (values > 1)
-                refuse_first(values, outside, where, "is not from 0 to 1; divide 8-bit values by 255")
-            wrong = ~(np.isfinite(errors) & (errors > 0))
-            refuse_first(errors, wrong, spread, f"is not above zero; {_REMEDY}")
-        beyond = ~((angle >= 0) & (angle <= 90))
-        refuse_first(angle, beyond, self.place("angle"), "is not from 0 to 90 degrees")
 
     @property
     def channels(self) -> tuple[str, str, str]:

@@ -113,15 +113,12 @@ class Option:
             elif isinstance(one, float | int):
                 inside = self.least < one < self.most if self.exclusive else self.least <= one <= self.most
                 if not inside or not math.isfinite(one):
-                    raise ValueError(f"must {self._limits()}{f' {self.unit}'.rstrip()}, got {one:g}")
+                    limits = f"lie in {self.least:g} to {self.most:g}"
+                    if self.exclusive or self.most == math.inf:
+                        limits = f"be {'above' if self.exclusive else 'at least'} {self.least:g}"
+                        limits += f" and below {self.most:g}" if self.most < math.inf else ""
+                    raise ValueError(f"must {limits}{f' {self.unit}'.rstrip()}, got {one:g}")
         return value
-
-    def _limits(self) -> str:
-        if self.most == math.inf:
-            return f"be {'above' if self.exclusive else 'at least'} {self.least:g}"
-        if self.exclusive:
-            return f"be above {self.least:g} and below {self.most:g}"
-        return f"lie in {self.least:g} to {self.most:g}"
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
         """Check the value of a recipe's key."""

@@ -32,7 +32,20 @@ def read_counts(
     **Raises:** DataError or UsageError as `read_spectrum` does; any finite count is accepted.
     """
     table = _only_table(path)
-    counts = _read(table, _counts_columns(table, columns), wavelength_unit)
+    named = named_columns(table, columns)
+    if named is None:
+        chosen = by_position(table, "counts")
+    else:
+        others = ("wavelength", "sigma", "angle", "azimuth")
+        free = [c for c in named if c.role not in others and c.name not in ("_", "")]
+        sample = [c for c in named if c.role == "sample counts"] or free
+        if len(sample) != 1:
+            raise UsageError(
+                f"{table.path}: expected one column of counts beside the wavelength, found "
+                f'{listed(sample) or "none"}; choose one, as in `columns=["wavelength", "counts"]`'
+            )
+        chosen = beside_wavelength(table, named, sample[0])
+    counts = _read(table, chosen, wavelength_unit)
     return counts if range is None else counts.cut(*range)
 
 
@@ -66,26 +79,6 @@ def _only_table(path: str | os.PathLike[str]) -> Table:
     if others:
         raise UsageError(f"{path}: has {len(others) + 1} spectra where raw counts of one are expected")
     return table
-
-
-def _counts_columns(table: Table, columns: str | Sequence[str] | None) -> Selection:
-    """Choose the columns of raw counts: those of the sample, or the one column beside the wavelength."""
-    named = named_columns(table, columns)
-    if named is None:
-        return by_position(table, "counts")
-    sample = [c for c in named if c.role == "sample counts"]
-    free = [
-        c
-        for c in named
-        if c.role not in ("wavelength", "sigma", "angle", "azimuth") and c.name not in ("_", "")
-    ]
-    counts = sample or free
-    if len(counts) != 1:
-        raise UsageError(
-            f"{table.path}: expected one column of counts beside the wavelength, found "
-            f'{listed(counts) or "none"}; choose one, as in `columns=["wavelength", "counts"]`'
-        )
-    return beside_wavelength(table, named, counts[0])
 
 
 def _read(table: Table, chosen: Selection, wavelength_unit: str | None) -> Spectrum:

@@ -102,7 +102,14 @@ def mean_spectrum(sweeps: Sequence[Spectrum]) -> Spectrum:
         kept = [sweep for i, sweep in enumerate(sweeps) if i not in copies]
         one = kept[0] if len(kept) == 1 else mean_spectrum(kept)
         return dataclasses.replace(one, notes=(*one.notes, note))
-    mean = _mean(sweeps)
+    mean: dict[str, Any] = dict(first.kind.averaged(np.mean(points, axis=0)))
+    for name in ("sigma", "delta_sigma", "depolarisation_sigma"):
+        errors = [error for sweep in sweeps if (error := getattr(sweep, name)) is not None]
+        mean[name] = np.sqrt(np.sum(np.square(errors), axis=0)) / count if len(errors) == count else None
+    shares = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
+    if len(shares) < count:
+        mean["depolarisation_sigma"] = None
+    mean["depolarisation"] = np.mean(shares, axis=0) if len(shares) == count else None
     note = _note(sweeps, float(np.sqrt(np.mean(mean["values"] ** 2))))
     return dataclasses.replace(first, **mean, notes=(*first.notes, note), sweeps=tuple(sweeps))
 
@@ -145,18 +152,3 @@ def _note(sweeps: Sequence[Spectrum], level: float) -> str:
     note = f"{count} sweeps over the same wavelengths, averaged; a point scatters by {size:.2g}{unit}"
     drift = ", for the most part alike at neighbouring points: the sweeps drift"
     return note + drift if alike else note
-
-
-def _mean(sweeps: Sequence[Spectrum]) -> dict[str, Any]:
-    """Values and standard deviations of the mean."""
-    kind, count = sweeps[0].kind, len(sweeps)
-    points = np.mean([kind.coordinates(sweep) for sweep in sweeps], axis=0)
-    averaged: dict[str, Any] = dict(kind.averaged(points))
-    shares = [sweep.depolarisation for sweep in sweeps if sweep.depolarisation is not None]
-    averaged["depolarisation"] = np.mean(shares, axis=0) if len(shares) == count else None
-    for name in ("sigma", "delta_sigma", "depolarisation_sigma"):
-        errors = [error for sweep in sweeps if (error := getattr(sweep, name)) is not None]
-        averaged[name] = np.sqrt(np.sum(np.square(errors), axis=0)) / count if len(errors) == count else None
-    if averaged["depolarisation"] is None:
-        averaged["depolarisation_sigma"] = None
-    return averaged

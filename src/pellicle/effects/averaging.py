@@ -219,7 +219,7 @@ def _lens_rays(scene: Scene) -> tuple[int, int, float]:
     films = [
         Film(ambient, *indices, axis, phase, index, others)
         for medium in media
-        for indices in _indices(medium, at)
+        for indices in _extreme_indices(medium, at)
         for axis in _axes(medium)
     ]
     light = scene.light
@@ -235,7 +235,7 @@ def _lens_rays(scene: Scene) -> tuple[int, int, float]:
     return chosen_rays(films, np.deg2rad(sorted(degrees)), sine, columns, CONE_ERROR)
 
 
-def _indices(medium: Anisotropic, at: np.ndarray) -> set[tuple[float, float]]:
+def _extreme_indices(medium: Anisotropic, at: np.ndarray) -> set[tuple[float, float]]:
     """Pairs of an ordinary and an extraordinary index that differ most."""
     *first, last = principal_media(medium)
     most, least = max(largest_index(m, at) for m in first), min(smallest_index(m, at) for m in first)

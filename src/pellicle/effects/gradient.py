@@ -56,8 +56,13 @@ def gradient(scene: Scene) -> Row:
     def measured(count: int) -> float:
         return _largest((signals(numbers, count), signals(numbers, 2 * count)) for numbers in many)
 
-    least = max(_least_count(numbers) for numbers in few)
-    counts = [n for n in COUNTS if n >= min(least, COUNTS[-1])]
+    at, least = np.asarray(few[0].light.wavelength, dtype=float), 2.0
+    for layer in (layer for numbers in few for layer in _graded_layers(numbers)):
+        # slices that are thin against the wavelength and resolve the profile
+        ends = [real(known_index(x, at)) for x in (layer.material.first, layer.material.second)]
+        phase = 2 * np.pi / at * np.asarray(layer.thickness) * np.maximum(*ends)
+        least = max(least, float(np.max(phase)) / _STEP, layer.material.profile.variations)
+    counts = [n for n in COUNTS if n >= min(int(np.ceil(least)), COUNTS[-1])]
     count, error = COUNTS[-1], np.inf
     for count in counts:
         error = tried(count) if count != counts[-1] else 0.0
@@ -71,15 +76,18 @@ def gradient(scene: Scene) -> Row:
     return Row("gradient", True, f"{what}: {count} slices of sixth order", error, count)
 
 
+def _graded_layers(scene: Scene) -> list[Any]:
+    return [x for x in scene.layers if isinstance(x, Layer) and isinstance(x.material, Graded)]
+
+
 def _passes_zero(scene: Scene) -> bool:
     """True where the real part of the permittivity has both signs in a graded layer."""
     at = np.asarray(scene.light.wavelength, dtype=float)
-    for layer in scene.layers:
-        if isinstance(layer, Layer) and isinstance(layer.material, Graded):
-            index = _layer(layer, 32, at).middle
-            square = real(index) ** 2 - imag(index) ** 2
-            if np.any((np.min(square, axis=0) < 0) & (np.max(square, axis=0) > 0)):
-                return True
+    for layer in _graded_layers(scene):
+        index = _layer(layer, 32, at).middle
+        square = real(index) ** 2 - imag(index) ** 2
+        if np.any((np.min(square, axis=0) < 0) & (np.max(square, axis=0) > 0)):
+            return True
     return False
 
 
@@ -118,17 +126,6 @@ def _at(medium: Any, wavelength: np.ndarray, chosen: np.ndarray) -> Any:
     if isinstance(medium, Scaled):
         return replace(medium, base=_at(medium.base, wavelength, chosen), shape=part(medium.shape))
     return jax.tree_util.tree_map(part, medium) if isinstance(medium, Tabulated) else medium
-
-
-def _least_count(scene: Scene) -> int:
-    """Fewest slices that are thin against the wavelength and resolve the profile."""
-    at, least = np.asarray(scene.light.wavelength, dtype=float), 2.0
-    for layer in scene.layers:
-        if isinstance(layer, Layer) and isinstance(layer.material, Graded):
-            ends = [real(known_index(x, at)) for x in (layer.material.first, layer.material.second)]
-            phase = 2 * np.pi / at * np.asarray(layer.thickness) * np.maximum(*ends)
-            least = max(least, float(np.max(phase)) / _STEP, layer.material.profile.variations)
-    return int(np.ceil(least))
 
 
 def signals(scene: Scene, count: int) -> np.ndarray:

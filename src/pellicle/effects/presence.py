@@ -23,7 +23,7 @@ from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.graded import Graded
-from pellicle.scene.layers import Interface, Quantity, absorbs
+from pellicle.scene.layers import Interface, absorbs
 from pellicle.scene.surface import SurfaceView
 
 
@@ -236,15 +236,6 @@ def back_face(scene: Scene) -> Row:
     share, count = plates[0].back_collected, plates[0].back_reflections
     if isinstance(share, int | float) and share == 0 and not scene.light.kind.transmitted:
         return Row("back-face", False, "no light from the back face is collected (back_collected = 0)")
-    part = _collected(share, count)
-    if len(plates) == 1 and scene.substrate.back is not None:
-        return Row("back-face", True, f"the substrate is a plate; its back face adds incoherently{part}")
-    number = f"{len(plates)} incoherent plates" if len(plates) > 1 else "1 incoherent plate"
-    return Row("back-face", True, f"{number}: the intensities from the faces add up{part}")
-
-
-def _collected(share: Quantity | None, count: int | None) -> str:
-    """The collected part of the light from a back face, in words."""
     words = []
     if isinstance(share, Free):
         words.append("the share that is collected is free")
@@ -252,7 +243,11 @@ def _collected(share: Quantity | None, count: int | None) -> str:
         words.append(f"{100 * share:g} % of it is collected")
     if count is not None:
         words.append(f"up to {count} reflection{'s' * (count > 1)} there count{'s' * (count == 1)}")
-    return f"; {', '.join(words)}" if words else ""
+    part = f"; {', '.join(words)}" if words else ""
+    if len(plates) == 1 and scene.substrate.back is not None:
+        return Row("back-face", True, f"the substrate is a plate; its back face adds incoherently{part}")
+    number = f"{len(plates)} incoherent plates" if len(plates) > 1 else "1 incoherent plate"
+    return Row("back-face", True, f"{number}: the intensities from the faces add up{part}")
 
 
 def dispersion(scene: Scene) -> Row:

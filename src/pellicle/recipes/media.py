@@ -151,7 +151,8 @@ def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
         names = "[theta, phi]" if most == 2 else "[theta, phi] or [theta, phi, psi]"
         raise UsageError(f"axis must be {names} in degrees, each a number or a table of lower and upper")
     angles: Any = [_parameter(name, angle) for name, angle in zip(_ANGLES, axis, strict=False)]
-    return Anisotropic(**{key: _component(key, values[key], folder) for key in keys}, axis=angles)
+    media = {key: _component(key, values[key], folder) for key in keys}
+    return Anisotropic(**media, axis=angles)
 
 
 def _graded(table: schema.GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:

@@ -260,9 +260,19 @@ class SurfaceRecipe:
         table = self.tables.scene.surface
         folder, sensor = Path(self.path).parent, self.sensor
         with _of_recipe(self.path, ValueError, "scene.surface: "):
+            numbers: dict[str, Any] = {}
+            for key, value in (table.model_extra or {}).items():
+                try:
+                    one = _NUMBERS.validate_python(value)
+                except ValidationError:
+                    raise UsageError(
+                        f"{key}: a number, a list of one for each channel, or {{ lower = ..., upper = ... }}"
+                        f" was expected, got {value!r}"
+                    ) from None
+                numbers[key] = one if isinstance(one, list) else number(one, key)
             surface = Surface(
                 table.model,
-                {key: _number(value, key) for key, value in (table.model_extra or {}).items()},
+                numbers,
                 None if table.wavelengths is None else tuple(table.wavelengths),
                 sensor,
                 None if table.film is None else medium(table.film, name="film", folder=folder),
@@ -296,14 +306,3 @@ class SurfaceRecipe:
         """The recipe with these keys of `[data]` replaced."""
         data = self.tables.data.model_copy(update=keys)
         return replace(self, tables=self.tables.model_copy(update={"data": data}))
-
-
-def _number(value: Any, key: str) -> Any:
-    try:
-        table = _NUMBERS.validate_python(value)
-    except ValidationError:
-        raise UsageError(
-            f"{key}: a number, a list of one for each channel, or {{ lower = ..., upper = ... }} was"
-            f" expected, got {value!r}"
-        ) from None
-    return table if isinstance(table, list) else number(table, key)

@@ -165,15 +165,13 @@ def regress_pro(file: TextFile) -> list[Table] | None:
         names.append("analyser_deg")
         rows = [(line, [*cells, f"{abs(analyser):g}"]) for line, cells in rows]
         if analyser <= 0:
-            rows = [(line, [nm, alpha, _negated(beta), a]) for line, (nm, alpha, beta, a) in rows]
+            for _, cells in rows:
+                beta = cells[2]
+                cells[2] = beta[1:] if beta.startswith("-") else f"-{beta.removeprefix('+')}"
     if "AOI" in angles:
         names.append("angle_deg")
         rows = [(line, [*cells, angles["AOI"]]) for line, cells in rows]
     return [export("Regress Pro (ADAP) text", names, rows, notes=notes, decimal=".")]
-
-
-def _negated(cell: str) -> str:
-    return cell[1:] if cell.startswith("-") else f"-{cell.removeprefix('+')}"
 
 
 def film_sense(file: TextFile) -> list[Table] | None:

@@ -69,8 +69,18 @@ def _scans(
     if not end:
         return None
     below = [line for line, _ in body[end:]]
-    scans = [_Scan(_name(group, names), group, _rows(body[:end], group)) for group in groups]
-    scans = [scan for scan in scans if scan.rows]
+    scans = []
+    for group in groups:
+        rows: Rows = []
+        for line, cells in body[:end]:  # one scan may end before the others
+            values = [cells[column.position] if column.position < len(cells) else "" for column in group]
+            if any(values):
+                rows.append((line, values))
+        # the name is the cell over the columns, or that of the value
+        over = [names[column.position] for column in group if column.position < len(names)]
+        title = next((name for name in over if name and not is_number(name, ",")), "")
+        if rows:
+            scans.append(_Scan(re.sub(r"\s*-\s*RawData$", "", title) or group[1].name, group, rows))
     collected = [match[1].strip() for line in below if (match := _COLLECTED.search(line.text))]
     instrument = next((m[1].strip() for line in below if (m := _INSTRUMENT.match(line.text.strip()))), "")
     readable = [scan for scan in scans if any(column.role not in _IGNORED for column in scan.columns[1:])]
@@ -111,23 +121,6 @@ def _rows_end(body: Rows, groups: Sequence[tuple[Column, ...]]) -> int:
     while last >= 0 and last + 1 < len(body) and is_row(body[last + 1][1], 1):
         last += 1
     return last + 1
-
-
-def _rows(body: Rows, group: Sequence[Column]) -> Rows:
-    """The rows of one scan, which may end before those of the others."""
-    rows: Rows = []
-    for line, cells in body:
-        values = [cells[column.position] if column.position < len(cells) else "" for column in group]
-        if any(values):
-            rows.append((line, values))
-    return rows
-
-
-def _name(group: Sequence[Column], names: Sequence[str]) -> str:
-    """Name of a scan: the cell over its columns, or the name of its value."""
-    over = [names[column.position] for column in group if column.position < len(names)]
-    title = next((name for name in over if name and not is_number(name, ",")), "")
-    return re.sub(r"\s*-\s*RawData$", "", title) or group[1].name
 
 
 def stacked_tables(file: TextFile) -> list[Table] | None:

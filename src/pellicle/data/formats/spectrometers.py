@@ -152,7 +152,11 @@ def ocean_optics(file: TextFile) -> list[Table] | None:
         names = ["wavelength (nm)", quantity, *["_"] * (len(rows[0][1]) - 2)][: max(2, len(rows[0][1]))]
     else:
         names = [_JAZ.get(name, quantity if name == _PROCESSED else name) for name in header]
-        names = _without_idle(names, rows, quantity)
+        if quantity in names and "sample counts" in names:
+            # a processed value that only repeats the counts of the sample
+            processed, sample = names.index(quantity), names.index("sample counts")
+            if all(cells[processed : processed + 1] == cells[sample : sample + 1] for _, cells in rows):
+                names[processed] = "_"
     stated = [value for key, value in map(keyword, above) if key.startswith("Number of Pixels")]
     stated_facts = facts(above, **_ocean_settings(above))
     return [export("Ocean Optics text", names, rows, facts=stated_facts, notes=counted(rows, stated))]
@@ -170,15 +174,6 @@ def _ocean_quantity(above: Sequence[Line], path: str) -> str:
     if column.role == "foreign" or column.unit:
         return "irradiance" if column.role == "foreign" else column.name
     return f"{column.role} ({UNSTATED})"
-
-
-def _without_idle(names: list[str], rows: Rows, quantity: str) -> list[str]:
-    """The names without a processed value that only repeats the counts of the sample."""
-    if quantity in names and "sample counts" in names:
-        processed, sample = names.index(quantity), names.index("sample counts")
-        if all(cells[processed : processed + 1] == cells[sample : sample + 1] for _, cells in rows):
-            return [*names[:processed], "_", *names[processed + 1 :]]
-    return names
 
 
 def _ocean_settings(above: Sequence[Line]) -> dict[str, str]:
@@ -272,7 +267,13 @@ def jasco(file: TextFile) -> list[Table] | None:
     header = {key.upper(): " ".join(value for value in values if value) for key, *values in entries}
     if not {"TITLE", "DATA TYPE", "XUNITS"} <= set(header):
         return None
-    rows = _rows_to_section(lines[begin + 1 :], file.comments)
+    below, rows = lines[begin + 1 :], []
+    end = min((c.number for c in file.comments if below and c.number > below[0].number), default=None)
+    for i, line in enumerate(below):  # up to a blank line, a section in brackets or a line of `#`
+        blank = i > 0 and line.number > below[i - 1].number + 1
+        if blank or _SECTION.match(line.text) or (end is not None and line.number > end):
+            break
+        rows.append((line, [cell for cell in all_cells(line.bare) if cell]))
     if not rows:
         raise DataError(f"has no rows below XYDATA on line {lines[begin].number}; export it again")
     if len(all_cells(lines[begin].text)) > 2:
@@ -285,19 +286,6 @@ def jasco(file: TextFile) -> list[Table] | None:
     stated = [(fact, header.get(key, "")) for key, fact in _JASCO_FACTS.items()]
     notes = counted(rows, [header.get("NPOINTS", "")])
     return [export("JASCO text", names, rows, facts=stated, notes=notes)]
-
-
-def _rows_to_section(lines: Sequence[Line], comments: Sequence[Line]) -> Rows:
-    """The rows up to a blank line, a section in brackets or a line of `#`."""
-    below = [comment.number for comment in comments if lines and comment.number > lines[0].number]
-    end = min(below, default=None)
-    rows: Rows = []
-    for i, line in enumerate(lines):
-        blank = i > 0 and line.number > lines[i - 1].number + 1
-        if blank or _SECTION.match(line.text) or (end is not None and line.number > end):
-            break
-        rows.append((line, [cell for cell in all_cells(line.bare) if cell]))
-    return rows
 
 
 def _jasco_quantity(text: str) -> str:

@@ -51,7 +51,11 @@ def read(text: MaterialText) -> MaterialFile:
     Raises DataError, one sentence with file, line, column and remedy.
     """
     table = read_table(text.path)
-    _check_rows(text, table)
+    rows = set(map(int, table.text.lines))
+    begin = min(rows, default=0)
+    strange = next((line for line in text.lines if line.number >= begin and line.number not in rows), None)
+    if strange is not None:
+        raise DataError(f"line {strange.number} is no row of numbers: delete it, or put # before it")
     names = _header(text, table)
     columns = _by_position(text, table) if names is None else _by_name(text, table, names)
     order = list(columns)
@@ -89,15 +93,6 @@ def read(text: MaterialText) -> MaterialFile:
         lambda row, what: f"line {table.text.lines[row]}, {label(what)}",
     )
     return material_file(constants, "table", assumed=assumed)
-
-
-def _check_rows(text: MaterialText, table: Table) -> None:
-    """Raise DataError for a line below the first row that is no row of numbers."""
-    rows = set(map(int, table.text.lines))
-    first = min(rows, default=0)
-    strange = next((line for line in text.lines if line.number >= first and line.number not in rows), None)
-    if strange is not None:
-        raise DataError(f"line {strange.number} is no row of numbers: delete it, or put # before it")
 
 
 def _header(text: MaterialText, table: Table) -> Sequence[str] | None:
