@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import Gain, lazy
+from pellicle.data.cubes.raw_cube import divided, lazy
 from pellicle.data.fingerprint import fingerprint
 
 
@@ -107,7 +108,7 @@ class Cube:
 
     def divided(self, gain: np.ndarray, note: str) -> Cube:
         """The cube divided by a gain (bands,), block by block as it is read, with a note on it."""
-        step = Gain(gain if self.angle is None else gain[:, None])
+        step = partial(divided, gain=gain if self.angle is None else gain[:, None])
         arrays = {
             name: array / gain if len(array.shape) == 1 else lazy(array, self.dims).then(step)
             for name, array in self.arrays.items()

@@ -175,11 +175,8 @@ def _photograph_colours(
         width, height = photograph.size
         either = '`region="x,y,width,height"` or `points="x,y"`'
         raise UsageError(f"{photograph.path}: is a photograph of {width} by {height} pixels: give {either}")
-    regions = (
-        photographs.parse_points(points, photograph)
-        if points is not None
-        else photographs.parse_regions(region or "")
-    )
+    squares = None if points is None else photographs.parse_points(points, photograph)
+    regions = squares or photographs.parse_regions(region or "")
     reference, notes = white_reference(photograph, seen.coding, white)
     angles = None if angle is None else np.asarray(angle, float)
     if angles is not None and angles.ndim and len(angles) != len(regions):

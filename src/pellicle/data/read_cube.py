@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from logging import getLogger
 from pathlib import Path
 from typing import Any
@@ -220,7 +221,7 @@ def _errors(
         return {names[name]: np.full(bands.size, level.value) for name in measured}
     if "delta" in measured:
         raise UsageError(f"`noise` {level} is a share of the signal: give that of psi and delta in degrees")
-    return {"sigma": measured["values"].then(raw_cube.Share(level.value))}
+    return {"sigma": measured["values"].then(partial(raw_cube.share_of, share=level.value))}
 
 
 def _with_fingerprint(

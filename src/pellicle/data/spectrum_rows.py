@@ -86,7 +86,7 @@ class Rows:
         unit = axis_unit(table, chosen.axis.wavelength, unit)
         axis, values = read_axis(table, chosen.axis, chosen.columns, unit)
         columns = {column.role: x for column, x in zip(chosen.columns, values, strict=True)}
-        notes = (*table.notes, *chosen.notes, axis_note(unit))
+        notes = (*table.notes, *chosen.notes, f"wavelength unit: {unit or 'nm, assumed'}")
         return cls(table, np.arange(len(axis.wavelength)), axis, columns, notes)
 
     def cut(self, limits: tuple[float, float] | None) -> Rows:
@@ -154,11 +154,6 @@ def axis_unit(table: Table, column: Column, requested: str | None) -> str | None
             f'`wavelength_unit="{asked}"`; leave that out, or rename the columns with `columns`'
         )
     return column.unit or asked
-
-
-def axis_note(unit: str | None) -> str:
-    """Return a sentence on the unit in which the wavelengths were read."""
-    return f"wavelength unit: {unit}" if unit else "wavelength unit: nm, assumed"
 
 
 def read_axis(

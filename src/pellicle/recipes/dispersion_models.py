@@ -1,7 +1,8 @@
 """Dispersion models by name: their parameters, default bounds and values, and how to build them."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 
@@ -16,8 +17,6 @@ from pellicle.scene.free import Free, is_free
 Parameter: TypeAlias = float | Free
 Values: TypeAlias = Mapping[str, "Parameter | Sequence[Parameter]"]
 """Parameters of a model by name; of a spline one or one per knot, and its `knots` (nm)."""
-
-_Built = TypeVar("_Built", bound=AbstractDispersion | oscillators.AbstractOscillator)
 
 
 class ParameterSpec(NamedTuple):
@@ -148,38 +147,46 @@ def fixed_model(name: str, numbers: Sequence[float], label: str) -> AbstractDisp
     return build_model(name, dict(zip(specs, numbers, strict=False)))
 
 
+@contextmanager
+def usage_errors(label: str = "") -> Iterator[None]:
+    """Turn ValueErrors of dispersions and numbers into UsageErrors with `label` in front."""
+    try:
+        yield
+    except UsageError:
+        raise
+    except ValueError as error:
+        raise UsageError(f"{label}{error}") from None
+
+
+@usage_errors()
 def build_model(name: str, values: Values) -> AbstractDispersion:
     """Build a model of `MODELS` from `values`; other parameters are fixed at their defaults.
 
     Raises UsageError for values that the model forbids.
     """
-    complete = {key: spec.value for key, spec in MODELS[name].items()} | dict(values)
+    given: dict[str, Any] = {key: spec.value for key, spec in MODELS[name].items()} | dict(values)
+    if name in TERMS:
+        return oscillators.Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
+    if name == "constant":
+        require_nonnegative("constant", **given)
+        return Constant(given["n"], None if given["k"] == 0 else given["k"])
     if name == "sellmeier":  # terms beyond the last one given are absent
         last = max((key[1] for key in values), default="1")
-        complete = {key: value for key, value in complete.items() if key[1] <= last}
-    return _checked(lambda: _built(name, complete))
+        given = {x: tuple(given[key] for key in given if key[0] == x and key[1] <= last) for x in "BC"}
+    if name in SPLINES:
+        knots = given.setdefault("knots", KNOTS)
+        if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
+            raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
+        for key in given.keys() & {"n", "k"}:
+            column = given[key]
+            given[key] = tuple(column) if isinstance(column, list | tuple) else (column,) * len(knots)
+    return KINDS[name](**given)
 
 
+@usage_errors()
 def build_oscillator(kind: str, values: Values) -> oscillators.AbstractOscillator:
     """Build one oscillator of a sum. Raises UsageError as `build_model` does."""
-    complete = {key: spec.value for key, spec in TERMS[kind].items()} | dict(values)
-    return _checked(lambda: KINDS[kind](**complete))
-
-
-def sum_of_oscillators(
-    eps_inf: Parameter, terms: Iterable[oscillators.AbstractOscillator]
-) -> AbstractDispersion:
-    """Build a sum of oscillators. Raises UsageError for values that it forbids."""
-    return _checked(lambda: oscillators.Oscillators(eps_inf, tuple(terms)))
-
-
-def check_dispersion(dispersion: AbstractDispersion, label: str) -> AbstractDispersion:
-    """Run the checks of a dispersion again and return it. Raises UsageError with `label` in front."""
-    try:
-        _check_parts(dispersion)
-    except ValueError as error:
-        raise UsageError(f"{label}: {error}") from None
-    return dispersion
+    return KINDS[kind](**{key: spec.value for key, spec in TERMS[kind].items()} | dict(values))
 
 
 def free_by_default(at: ParameterLocation, number: Parameter) -> Free | None:
@@ -222,37 +229,7 @@ KINDS: dict[str, type[Any]] = {
 """The class of each model, and of each oscillator in `TERMS`."""
 
 
-def _built(name: str, values: Values) -> AbstractDispersion:
-    """A model of all its values."""
-    given: dict[str, Any] = dict(values)
-    if name in TERMS:
-        return oscillators.Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
-    if name == "constant":
-        require_nonnegative("constant", **given)
-        return Constant(given["n"], None if given["k"] == 0 else given["k"])
-    if name == "sellmeier":
-        given = {key: tuple(x for word, x in given.items() if word[0] == key) for key in "BC"}
-    if name in SPLINES:
-        knots = given.setdefault("knots", KNOTS)
-        if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
-            raise UsageError(f"{name}: knots must be a list of wavelengths in nm, got {knots!r}")
-        for key in given.keys() & {"n", "k"}:
-            column = given[key]
-            given[key] = tuple(column) if isinstance(column, list | tuple) else (column,) * len(knots)
-    return KINDS[name](**given)
-
-
-def _checked(build: Callable[[], _Built]) -> _Built:
-    """Turn the ValueErrors of a dispersion into UsageErrors."""
-    try:
-        return build()
-    except UsageError:
-        raise
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-
-
-def _check_parts(tree: object) -> None:
+def check_parts(tree: object) -> None:
     """Run the checks of every module of a dispersion, itself included, but of free parameters."""
     if isinstance(tree, tuple):
         parts = [*tree]
@@ -262,4 +239,4 @@ def _check_parts(tree: object) -> None:
     else:
         parts = []
     for part in parts:
-        _check_parts(part)
+        check_parts(part)

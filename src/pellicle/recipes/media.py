@@ -18,6 +18,7 @@ from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant, Shifted
+from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
@@ -195,7 +196,8 @@ def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
         built.append(
             models.build_oscillator(kind, {key: _parameter(key, value) for key, value in numbers.items()})
         )
-    return models.sum_of_oscillators(eps_inf, built)
+    with models.usage_errors():
+        return Oscillators(eps_inf, tuple(built))
 
 
 def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
@@ -212,10 +214,8 @@ def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> Abstract
         raise UsageError(f"{rule}: {' and '.join(missing)} missing; it needs host, inclusion and fraction")
     fraction = _parameter("fraction", values["fraction"])
     host, inclusion = (_component(key, values[key], folder) for key in ("host", "inclusion"))
-    try:
+    with models.usage_errors(f"{rule}: "):
         return MIXTURES[rule](host, inclusion, fraction)
-    except ValueError as error:
-        raise UsageError(f"{rule}: {error}") from None
 
 
 def _check_word(word: str, known: Iterable[str], what: str) -> None:
@@ -273,11 +273,9 @@ def number(value: schema.Number, name: str, minimum: float | None = None) -> flo
     elif value.lower is None or value.upper is None:
         raise UsageError(f"{name}: give lower and upper, or one plain number")
     else:
-        try:
+        with models.usage_errors(f"{name}: "):
             prior = None if value.prior is None else value.prior.prior()
             result = Free(value.lower, value.upper, start=value.value, prior=prior, limits=value.limits)
-        except ValueError as error:
-            raise UsageError(f"{name}: {error}") from None
         lowest = value.lower
     if not math.isfinite(lowest):
         raise UsageError(f"{name} must be a finite number, got {lowest:g}")
@@ -328,7 +326,10 @@ def _free_parameter(
     replaced[position] = Free(*bounds) if bounds else models.free_by_default(at, replaced[position])
     if replaced[position] is None:
         raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
-    return models.check_dispersion(jax.tree_util.tree_unflatten(structure, replaced), f"cannot free {name!r}")
+    changed = jax.tree_util.tree_unflatten(structure, replaced)
+    with models.usage_errors(f"cannot free {name!r}: "):
+        models.check_parts(changed)
+    return changed
 
 
 def _free_index(

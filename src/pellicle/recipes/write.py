@@ -79,15 +79,15 @@ def recipe_text(
         return text
     of_files = []
     for table in tables:
-        plain = {key: x for key, x in table.items() if key != "camera"}
-        keys, seen = _options(plain | table.get("camera", {}), place)
+        given = {**table, **table.get("camera", {})}
+        keys, seen = _options({key: x for key, x in given.items() if key != "camera"}, place)
         of_files.append(keys | {"path": _relative(table["path"], place)} | ({"camera": seen} if seen else {}))
     ambient = written_medium(scene.ambient, "the ambient", place)
     of_scene, of_instrument = parts.uncertainty_keys(scene.uncertainty)
-    sampled = {} if wavelength is None else {"wavelengths": _wavelengths(wavelength)}
+    data = data if wavelength is None else {"wavelengths": _wavelengths(wavelength)} | data
     text = _document(
         {
-            "data": _data(scene) | sampled | data,
+            "data": _data(scene) | data,
             "data.file": of_files,
             "scene": {
                 **({} if ambient == 1.0 else {"ambient": ambient}),

@@ -193,15 +193,12 @@ def choose_variables(
     if variable is None and signal in (None, "psi-delta"):
         pair = {c.role: name for name, c in values.items() if c.role in ("psi", "delta")}
         if len(pair) == 2 and (signal or not any(c.role in ("R", "T") for c in values.values())):
-            radians = [name for name in pair.values() if (written[name] or "").strip().lower()[:3] == "rad"]
-            if radians:
+            if radians := [x for x in pair.values() if (written[x] or "").strip().lower()[:3] == "rad"]:
                 raise DataError(f"{path}: {radians[0]!r} is in radians: convert it to degrees")
-            sigma = {
-                key: _errors_of(pair[role], role, errors, alone=False)
-                for role, key in (("psi", "sigma"), ("delta", "delta_sigma"))
-            }
-            arrays = {"values": pair["psi"], "delta": pair["delta"]}
-            return arrays | {key: name for key, name in sigma.items() if name}, {"signal": "psi-delta"}
+            keys = {"sigma": "psi", "delta_sigma": "delta"}
+            sigma = {key: _errors_of(pair[x], x, errors, alone=False) for key, x in keys.items()}
+            sigma = {key: name for key, name in sigma.items() if name}
+            return {"values": pair["psi"], "delta": pair["delta"], **sigma}, {"signal": "psi-delta"}
     names = [variable] if variable else _measured(values, signal)
     if not names and (half := [name for name, column in roles.items() if column.role in ("psi", "delta")]):
         raise DataError(

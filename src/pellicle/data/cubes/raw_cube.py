@@ -246,29 +246,17 @@ class Scale:
         return 10.0 ** -np.clip(values, -300.0, None) if self.absorbance else values
 
 
-@dataclass(frozen=True)
-class Share:
+def share_of(block: np.ndarray, *_: Any, share: float) -> np.ndarray:
     """Step from values to errors that are a share of them, at least of a hundredth of full scale.
 
     Below that signal the noise of the dark dominates, and a share of it would be too small.
     """
-
-    share: float
-
-    def __call__(self, block: np.ndarray, *_: Any) -> np.ndarray:
-        """Return the standard deviations."""
-        return self.share * np.maximum(np.abs(block), 0.01)
+    return share * np.maximum(np.abs(block), 0.01)
 
 
-@dataclass(frozen=True, eq=False)
-class Gain:
+def divided(block: np.ndarray, *_: Any, gain: np.ndarray) -> np.ndarray:
     """Step that divides by a gain (bands,) or (bands, 1)."""
-
-    gain: np.ndarray
-
-    def __call__(self, block: np.ndarray, *_: Any) -> np.ndarray:
-        """Return the divided block."""
-        return block / self.gain
+    return block / gain
 
 
 def value_scale(

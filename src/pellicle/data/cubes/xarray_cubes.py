@@ -69,8 +69,8 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
     }
     wavelength, unit = _band_axis(dataset, band, asked, path)
     coords, units, dates = _coordinates(dataset, renamed, dims)
-    light = dataset.attrs | main.attrs
-    light = str(light.get("polarisation", light.get("polarization", ""))).lower().replace("zed", "sed")
+    facts = dataset.attrs | main.attrs
+    light = str(facts.get("polarisation", facts.get("polarization", ""))).lower().replace("zed", "sed")
     stated["polarisation"] = stated.get("polarisation") or (light if light in POLARISATIONS else None)
     delta = f", {chosen['delta']!r}" if "delta" in chosen else ""
     return RawCube(
