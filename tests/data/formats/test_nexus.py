@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from pellicle.data.formats import hdf5_reading, isolated
+from pellicle.data.formats import isolated
 from pellicle.data.formats import nexus as nexus_reader
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError
@@ -227,7 +227,7 @@ def test_huge_datasets_are_refused_before_they_are_read(refused):
 
 
 def test_the_number_of_groups_is_bounded(refused, monkeypatch):
-    monkeypatch.setattr(hdf5_reading, "_MOST_GROUPS", 1)
+    monkeypatch.setattr(nexus_reader, "_MOST_GROUPS", 1)
     refused(nexus(nxdata), "more than 1 groups")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.data.cubes.numpy_files import arrays_to_raw, choose_variables
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
-from pellicle.data.formats.hdf5_reading import SIGNATURE
+from pellicle.data.formats.nexus import SIGNATURE
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.text import open_binary

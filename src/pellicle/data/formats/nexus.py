@@ -2,24 +2,38 @@
 
 A group NXdata, or the root of a NetCDF file, has a wavelength, energy or wavenumber and datasets along it.
 NXellipsometry of FAIRmat stores `measured_data[angle, observable, wavelength]` in `data_collection`, where
-`data_type` names the observables. **Source**: https://manual.nexusformat.org and the NXDL of NXellipsometry.
+`data_type` names the observables.
+
+HDF5 is read without leaving the file. External links, external storage and virtual datasets would open other
+files; they are refused, as are datasets and chunks too large for a spectrum, before anything is allocated.
+Soft links are followed part by part.
+
+**Source**: https://manual.nexusformat.org and the NXDL of NXellipsometry.
 """
 
 import io
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
+from math import prod
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.formats import hdf5_reading as hdf5
 from pellicle.data.formats import isolated
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.table import Table, array_columns
 from pellicle.errors import DataError, install_command
 from pellicle.signals.registry import KINDS, ONE_COLUMN
 
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+MOST_NUMBERS = 5_000_000
+"""Largest number of values of a dataset that is read, 40 MB."""
+_MOST_CHUNK = 64 << 20  # bytes that HDF5 allocates for a chunk, whatever the dataset holds
+_MOST_TEXT = 10_000  # bytes
+_MOST_GROUPS = 1000
+_MOST_LINKS = 20  # soft links that point to soft links
+_MOST_DEPTH = 20
 _MEASURED = "measured_data"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
 """Columns of `measured_data` by its `data_type`."""
@@ -42,7 +56,7 @@ def read(content: bytes) -> list[Table] | None:
 
     Raises DataError where h5py is absent, and for a file without spectra, damaged, or with parts elsewhere.
     """
-    if not content.startswith(hdf5.SIGNATURE):
+    if not content.startswith(SIGNATURE):
         return None
     if find_spec("h5py") is None:
         raise DataError(
@@ -75,15 +89,15 @@ def read_hdf5(content: bytes) -> list[Table]:
 
 
 def _spectra(file: Any) -> Iterator[Table]:
-    members = (hdf5.member(file, name) for name in list(file)[:_MOST_MEMBERS])
-    entry = next((e for e in members if e is not None and hdf5.attribute(e, "NX_class") == "NXentry"), None)
-    texts = [] if entry is None else [(f, hdf5.text(hdf5.member(entry, at))) for f, at in _FACTS]
-    for name, group in hdf5.groups(file):
+    members = (member(file, name) for name in list(file)[:_MOST_MEMBERS])
+    entry = next((e for e in members if e is not None and attribute(e, "NX_class") == "NXentry"), None)
+    texts = [] if entry is None else [(f, text(member(entry, at))) for f, at in _FACTS]
+    for name, group in groups(file):
         if len(group) > _MOST_MEMBERS:
             continue
         if _MEASURED in group:
             columns, notes = _ellipsometry(group, name)
-        elif name == "/" or hdf5.attribute(group, "NX_class") == "NXdata":
+        elif name == "/" or attribute(group, "NX_class") == "NXdata":
             columns, notes = _data(group, name)
         else:
             continue
@@ -113,7 +127,7 @@ def _data(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[str]]:
     axes = [child for child, role in names.items() if role == "wavelength"]
     if not axes or not _SIGNALS & set(names.values()):
         return {}, []
-    stated = hdf5.attribute(group, "axes")
+    stated = attribute(group, "axes")
     axis = stated if stated in axes else axes[0]
     if len(axes) > 1 and stated not in axes:
         raise DataError(f"{name} has the axes {', '.join(axes)} and names none of them; export it as CSV")
@@ -145,14 +159,14 @@ def _data(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[str]]:
 
 def _dataset(group: Any, name: str) -> tuple[np.ndarray | None, str]:
     """Numbers and unit of a dataset."""
-    dataset = hdf5.member(group, name)
-    values = hdf5.numbers(dataset, f"{group.name}/{name}")
-    return values, "" if values is None else hdf5.attribute(dataset, "units")
+    dataset = member(group, name)
+    values = numbers(dataset, f"{group.name}/{name}")
+    return values, "" if values is None else attribute(dataset, "units")
 
 
 def _ellipsometry(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[str]]:
     """The columns of `measured_data` of NXellipsometry, one row for each angle and wavelength."""
-    stated = hdf5.text(hdf5.member(group, "data_type"))
+    stated = text(member(group, "data_type"))
     slices = {child.lower().partition("_")[0] for child in group}
     kind = stated or ("Psi/Delta" if {"psi", "delta"} <= slices else "not stated")
     observables = _OBSERVABLES.get(kind.lower())
@@ -185,10 +199,10 @@ def _angles(group: Any, count: int, points: int) -> dict[str, np.ndarray]:
     entry = group.parent
     for place in ("angle_of_incidence", "instrument/angle_of_incidence"):
         for holder in (group, entry):
-            dataset = hdf5.member(holder, place)
-            angles = hdf5.numbers(dataset, place)
+            dataset = member(holder, place)
+            angles = numbers(dataset, place)
             if angles is not None and angles.size == count:
-                units = hdf5.attribute(dataset, "units") or "not stated"
+                units = attribute(dataset, "units") or "not stated"
                 return {f"angle ({units})": np.repeat(angles.reshape(-1), points)}
     if count > 1:
         raise DataError(
@@ -196,3 +210,93 @@ def _angles(group: Any, count: int, points: int) -> dict[str, np.ndarray]:
             "export them as CSV"
         )
     return {}
+
+
+def groups(file: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the root and every group below it once, with its name; links to elsewhere are not followed.
+
+    Raises DataError for more than 1000 groups.
+    """
+    import h5py
+
+    pending: list[tuple[str, Any]] = [("/", file)]
+    seen: set[Any] = set()
+    while pending:
+        name, group = pending.pop(0)
+        if len(seen) > _MOST_GROUPS:
+            raise DataError(f"has more than {_MOST_GROUPS} groups; export one spectrum as CSV")
+        if group in seen or name.count("/") > _MOST_DEPTH:  # equal groups are one under two names
+            continue
+        seen.add(group)
+        yield name, group
+        for child in group:
+            if isinstance(group.get(child, getlink=True), h5py.HardLink):
+                member = group[child]
+                if isinstance(member, h5py.Group):
+                    pending.append((f"{name.rstrip('/')}/{child}", member))
+
+
+def member(group: Any, name: str, links: int = 0) -> Any:
+    """Return a member by its name or path, None where it is missing.
+
+    Raises DataError for a link to another file, and for links in a circle.
+    """
+    import h5py
+
+    here: Any = group.file if name.startswith("/") else group
+    for part in name.strip("/").split("/"):
+        link = here.get(part, getlink=True) if isinstance(here, h5py.Group) else None
+        if link is None:
+            return None
+        if isinstance(link, h5py.ExternalLink):
+            raise DataError(f"{name} is a link to another file, {link.filename!r}; export the data into one")
+        if isinstance(link, h5py.SoftLink):
+            if links > _MOST_LINKS:
+                raise DataError(f"{name} is a link to itself; export it again")
+            here = member(here, link.path, links + 1)
+        else:
+            here = here[part]
+    return here
+
+
+def numbers(dataset: Any, name: str) -> np.ndarray | None:
+    """Return the values of a dataset of numbers, None for anything else.
+
+    Raises DataError for one that is stored in another file, or too large.
+    """
+    import h5py
+
+    if not isinstance(dataset, h5py.Dataset) or dataset.dtype.kind not in "fiu" or dataset.shape is None:
+        return None
+    if dataset.is_virtual or dataset.external:
+        raise DataError(f"{name} is stored in another dataset or file; export the data into one")
+    chunk = prod(dataset.chunks or (1,)) * dataset.dtype.itemsize
+    if dataset.size is None or dataset.size > MOST_NUMBERS or chunk > _MOST_CHUNK:
+        raise DataError(f"{name} has {dataset.size} values, more than a spectrum; export one spectrum as CSV")
+    return np.asarray(dataset[()], dtype=np.float64)
+
+
+def text(dataset: Any) -> str:
+    """Return the text of a dataset of one short string, else an empty text."""
+    import h5py
+
+    if not isinstance(dataset, h5py.Dataset) or dataset.size != 1 or dataset.is_virtual or dataset.external:
+        return ""
+    if h5py.check_string_dtype(dataset.dtype) is None or dataset.dtype.itemsize > _MOST_TEXT:
+        return ""
+    return _plain(dataset[()])
+
+
+def attribute(thing: Any, name: str) -> str:
+    """Return an attribute that is a short text, else an empty text."""
+    if name not in thing.attrs or thing.attrs.get_id(name).get_storage_size() > _MOST_TEXT:
+        return ""
+    return _plain(thing.attrs[name])
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        value = value.reshape(-1)[0] if value.size == 1 else ""
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    return value[:_MOST_TEXT].strip() if isinstance(value, str) else ""
