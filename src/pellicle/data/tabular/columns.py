@@ -13,6 +13,13 @@ from pellicle.data.tabular.units import angle_unit, signal_unit, wavelength_unit
 from pellicle.errors import UsageError
 from pellicle.signals.registry import KINDS, ONE_COLUMN
 
+
+def _sigmas(*names: str) -> tuple[str, ...]:
+    """Names of the standard deviation of a quantity with these names."""
+    forms = ("sigma_{}", "{}_sigma", "{}_err", "{}_error", "err_{}")
+    return tuple(form.format(name) for name in names for form in forms)
+
+
 NAMES: dict[str, tuple[str, ...]] = {
     "wavelength": (
         *("wavelength", "wavelengths", "wave length", "wave", "wl", "lambda", "lam", "λ"),
@@ -57,20 +64,10 @@ NAMES: dict[str, tuple[str, ...]] = {
     "azimuth": ("azimuth", "sample azimuth", "sample_azimuth", "sample rotation"),
     "psi": ("psi", "ψ"),
     "delta": ("delta", "δ"),
-    "sigma_psi": ("sigma_psi", "psi_sigma", "psi_err", "psi_error", "err_psi"),
-    "sigma_delta": ("sigma_delta", "delta_sigma", "delta_err", "delta_error", "err_delta"),
+    "sigma_psi": _sigmas("psi"),
+    "sigma_delta": _sigmas("delta"),
     "depolarisation": ("depolarisation", "depolarization", "depol"),
-    "sigma_depolarisation": (
-        "sigma_depolarisation",
-        "sigma_depolarization",
-        "sigma_depol",
-        "depolarisation_sigma",
-        "depolarization_sigma",
-        "depol_sigma",
-        "depol_err",
-        "depol_error",
-        "err_depol",
-    ),
+    "sigma_depolarisation": _sigmas("depolarisation", "depolarization", "depol"),
     "N": ("n",),
     "C": ("c",),
     "S": ("s",),
@@ -91,20 +88,16 @@ NAMES: dict[str, tuple[str, ...]] = {
     "sigma_B": ("sigma_b",),
 }
 """Names of each role; a column of any other name is ignored, with a note."""
-_SIGMA_OF = ("sigma_{}", "{}_sigma", "{}_err", "{}_error", "err_{}")
 _PLACES = tuple(f"{i}{j}" for i in range(1, 5) for j in range(1, 5))
 MUELLER = tuple(f"m{place}" for place in _PLACES)
 """Roles of the elements of a Mueller matrix, m11 to m44."""
 NAMES |= {f"m{place}": (f"m{place}", f"mm{place}", f"m_{place}", f"m_{{{place}}}") for place in _PLACES}
-NAMES |= {
-    f"sigma_{element}": tuple(form.format(f"{m}{element[1:]}") for m in ("m", "mm") for form in _SIGMA_OF)
-    for element in MUELLER
-}
+NAMES |= {f"sigma_m{place}": _sigmas(f"m{place}", f"mm{place}") for place in _PLACES}
 RATIO_COLUMNS = tuple(f"{angle}_{ratio}" for ratio in ("ane", "aps", "asp") for angle in ("psi", "delta"))
 """Roles of generalised Ψ and Δ, those of each ratio side by side."""
 for _role in RATIO_COLUMNS:
     NAMES[_role] = (_role, _role.replace("_", " "), "{}({})".format(*_role.split("_")))
-    NAMES[f"sigma_{_role}"] = tuple(form.format(_role) for form in _SIGMA_OF)
+    NAMES[f"sigma_{_role}"] = _sigmas(_role)
 NAMES |= {word: kind.names for word, kind in KINDS.items() if kind.names}
 FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
@@ -134,20 +127,12 @@ _MEASURED = ("measured", "meas", "meas.", "exp", "exp.", "experimental")
 _MODELLED = ("calculated", "calc", "calc.", "modelled", "modeled", "simulated", "fit", "fitted", "model")
 """Words that some programs write in the place of a unit, for the measurement and for their fit to it."""
 _OTHER_UNITS = ("a.u.", "abs", "abs.", "a", "counts", "deg", "°")
+_OF_RATIOS = ("psi", "delta", *RATIO_COLUMNS)
+_ANGLES = ("angle", "azimuth", "analyser", *DIRECTIONS, *_OF_RATIOS, *map("sigma_{}".format, _OF_RATIOS))
 _UNIT_OF = {
     "wavelength": wavelength_unit,
-    "angle": angle_unit,
-    "azimuth": angle_unit,
-    "psi": angle_unit,
-    "delta": angle_unit,
-    "analyser": angle_unit,
-    "sigma_psi": angle_unit,
-    "sigma_delta": angle_unit,
-    **dict.fromkeys(DIRECTIONS, angle_unit),
-    **dict.fromkeys(RATIO_COLUMNS, angle_unit),
-    **dict.fromkeys((f"sigma_{role}" for role in RATIO_COLUMNS), angle_unit),
-    "counts": lambda text: None,
-    "intensity": lambda text: None,
+    **dict.fromkeys(_ANGLES, angle_unit),
+    **dict.fromkeys(("counts", "intensity"), lambda text: None),
 }
 _ALIASES: dict[str, list[tuple[str, str]]] = {}
 """Names and their roles by their first letter, the longest first: each cell of a file is looked up."""
@@ -260,9 +245,9 @@ def recognise_all(names: Sequence[str]) -> tuple[Column, ...]:
 def is_header(names: Sequence[str]) -> bool:
     """Return True if `names` include a wavelength and a signal, or directions, as no free text does."""
     roles = {column.role for column in recognise_all(names)}
-    measured = bool(roles & {*SIGNALS, "intensity", "counts", "psi"})
-    measured = measured or {"N", "C", "S"} <= roles or {"alpha", "beta"} <= roles
-    measured = measured or {"tan_psi", "cos_delta"} <= roles or bool(roles & set(RATIO_COLUMNS))
+    measured = bool(roles & {*SIGNALS, *RATIO_COLUMNS, "intensity", "counts", "psi"})
+    forms = ({"N", "C", "S"}, {"alpha", "beta"}, {"tan_psi", "cos_delta"})
+    measured = measured or any(form <= roles for form in forms)
     return ("wavelength" in roles and measured) or roles.issuperset(DIRECTIONS)
 
 

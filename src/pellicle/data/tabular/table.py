@@ -116,49 +116,38 @@ class TextCells:
 
     def _by_cell(self, positions: Sequence[int], path: str, where: Place) -> list[np.ndarray]:
         """As `numbers`, cell by cell: names the first bad cell, and how many rows have one."""
-        columns: list[list[float]] = [[] for _ in positions]
-
-        def complete(line: Line) -> bool:
-            cells = split(line.bare, self.delimiter)
-            numbers = [cells[position] if position < len(cells) else "" for position in positions]
-            valid = (is_number(x, self.decimal) and np.isfinite(float(x.replace(",", "."))) for x in numbers)
-            return all(valid)
-
-        def faulty_after(row: int) -> int:
-            return sum(not complete(line) for line in self.rows[row + 1 :])
-
+        numbers: list[list[float]] = []
+        faulty: list[tuple[int, int, str]] = []  # row, position and text of the first bad cell of a row
         for row, line in enumerate(self.rows):
             cells = split(line.bare, self.delimiter)
-            if len(cells) > self.width:
+            if len(cells) > self.width and not faulty:
                 hint = "; a decimal comma looks like this" if self.delimiter == "," else ""
                 raise DataError(
                     f"{path}: line {line.number} has {len(cells)} values where {self.width} are expected; "
                     f"correct that line{hint}"
                 )
-            for column, position in zip(columns, positions, strict=True):
-                cell = cells[position] if position < len(cells) else ""
-                if not cell and (error := _SHEET_ERROR.search(line.text.removeprefix(line.bare))):
-                    cell = error[0]
-                column.append(self._number(cell, where(row, position), lambda row=row: faulty_after(row)))
-        return [np.array(column) for column in columns]
-
-    def _number(self, cell: str, where: str, others: Callable[[], int]) -> float:
-        if not cell:
-            fault, remedies = (
-                " is empty",
-                ("fill it in or delete that row", "fill them in or delete those rows"),
+            texts = [cells[position] if position < len(cells) else "" for position in positions]
+            numbers.append(
+                [float(x.replace(",", ".")) if is_number(x, self.decimal) else np.nan for x in texts]
             )
-        elif not is_number(cell, self.decimal):
-            fault = f": expected a number but found {cell!r}"
-            remedies = ("correct or delete that row", "correct or delete those rows")
-        elif np.isfinite(value := float(cell.replace(",", "."))):
-            return value
-        else:
+            wrong = np.flatnonzero(~np.isfinite(numbers[-1]))
+            faulty += [(row, positions[i], texts[i]) for i in wrong[:1]]
+        if not faulty:
+            return [np.array(column) for column in zip(*numbers, strict=True)]
+        row, position, cell = faulty[0]
+        line, remedies = self.rows[row], ("correct or delete that row", "correct or delete those rows")
+        if not cell and (error := _SHEET_ERROR.search(line.text.removeprefix(line.bare))):
+            cell = error[0]
+        fault = f": expected a number but found {cell!r}"
+        if not cell:
+            fault = " is empty"
+            remedies = ("fill it in or delete that row", "fill them in or delete those rows")
+        elif is_number(cell, self.decimal):
             fault = f": {cell} is not a finite number"
             remedies = ("delete that row or put # before it", "delete those rows or put # before them")
-        count = others()
+        count = len(faulty) - 1
         more = f", and {count} more row{'s have' if count > 1 else ' has'} no number" if count else ""
-        raise DataError(f"{where}{fault}{more}; {remedies[count > 0]}")
+        raise DataError(f"{where(row, position)}{fault}{more}; {remedies[count > 0]}")
 
 
 @dataclass(frozen=True, eq=False)
