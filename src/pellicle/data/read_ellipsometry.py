@@ -14,15 +14,7 @@ import numpy as np
 from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Axis, Reading, Rows
-from pellicle.data.tabular.column_selection import (
-    AxisColumns,
-    Selection,
-    error_columns,
-    first_column,
-    only,
-    select,
-    without_header,
-)
+from pellicle.data.tabular import column_selection as selection
 from pellicle.data.tabular.columns import MUELLER, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -48,17 +40,19 @@ _SHARES = ("depolarisation", "sigma_depolarisation")
 
 def ellipsometry_columns(
     table: Table, columns: Sequence[Column] | None, _: Sequence[str] | None = None
-) -> Selection:
+) -> selection.Selection:
     """Choose the columns of Ψ and Δ, in any form. Raises DataError or UsageError."""
     if columns is None and table.width == 3:
         named = (Column(1, "", "psi"), Column(2, "", "delta"))
         note = "no header: column 1 read as the wavelength, column 2 as psi, column 3 as delta"
-        return Selection(SIGNAL, AxisColumns(first_column(table)), named, notes=(note,))
+        return selection.Selection(
+            SIGNAL, selection.AxisColumns(selection.first_column(table)), named, notes=(note,)
+        )
     if columns is None:
-        raise without_header(table, _EXAMPLE)
+        raise selection.without_header(table, _EXAMPLE)
     roles = {column.role for column in columns}
     form = next((form for form in FORMS if roles & set(form)), PSI_DELTA)
-    values = [column for role in form if (column := only(table, columns, role)) is not None]
+    values = [column for role in form if (column := selection.only(table, columns, role)) is not None]
     if len(values) != len(form):
         raise DataError(
             f"{table.path}: psi and delta, N, C and S, alpha and beta, or tan_psi and cos_delta are not all "
@@ -70,9 +64,9 @@ def ellipsometry_columns(
             raise DataError(
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
             )
-    errors = error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
-    analyser = only(table, columns, "analyser") if form == ALPHA_BETA else None
-    share, error = (only(table, columns, role) for role in _SHARES)
+    errors = selection.error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
+    analyser = selection.only(table, columns, "analyser") if form == ALPHA_BETA else None
+    share, error = (selection.only(table, columns, role) for role in _SHARES)
     shares = [column for column in (share, error) if column] if share else []
     notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
     for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False):
@@ -84,12 +78,12 @@ def ellipsometry_columns(
         unit = "in percent" if column.unit == "percent" else "a fraction"
         notes.append(f"{column.name!r} read as {meaning}, {unit}")
     others, meaning = [*shares, analyser], ", ".join(form)
-    return select(
+    return selection.select(
         table, columns, SIGNAL, values, meaning, _EXAMPLE, errors=errors, others=others, notes=notes
     )
 
 
-def read_ellipsometry(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
+def read_ellipsometry(table: Table, chosen: selection.Selection, asked: Reading) -> Spectrum:
     """Read Ψ and Δ of the chosen columns, Δ in 0 to 360. Raises DataError or UsageError."""
     facts, folded = dict(table.declared.facts), asked.folded
     form = tuple(column.role for column in chosen.values)
@@ -142,7 +136,11 @@ def _folding(axis: Axis, psi: np.ndarray, delta: np.ndarray) -> float | None:
 
 
 def _check_arguments(
-    table: Table, chosen: Selection, form: tuple[str, ...], folded: bool | None, analyser: float | None
+    table: Table,
+    chosen: selection.Selection,
+    form: tuple[str, ...],
+    folded: bool | None,
+    analyser: float | None,
 ) -> None:
     """Refuse arguments that do not go with the columns. Raises UsageError."""
     in_file = any(column.role == "analyser" for column in chosen.others)
@@ -165,7 +163,9 @@ def _check_arguments(
         raise UsageError(f"`analyser` must lie between 0 and 90 degrees, got {analyser:g}")
 
 
-def _converted(rows: Rows, chosen: Selection, form: tuple[str, ...], analyser: float | None) -> Angles:
+def _converted(
+    rows: Rows, chosen: selection.Selection, form: tuple[str, ...], analyser: float | None
+) -> Angles:
     """Ψ and Δ in degrees from the columns that were read. Raises DataError."""
     read, places = rows.stacked(form).T, [rows.places(column) for column in chosen.values]
     if form == PSI_DELTA:
@@ -182,7 +182,7 @@ def _converted(rows: Rows, chosen: Selection, form: tuple[str, ...], analyser: f
     return from_alpha_beta(read, angles, places[0], REMEDY)
 
 
-def _check(rows: Rows, chosen: Selection, form: tuple[str, ...], folded: bool) -> None:
+def _check(rows: Rows, chosen: selection.Selection, form: tuple[str, ...], folded: bool) -> None:
     """Refuse Ψ, Δ, depolarisation and errors outside their limits, and radians. Raises DataError."""
     psi, delta = rows.columns["values"], rows.columns["delta"]
     named = chosen.values if form == PSI_DELTA else (chosen.axis.wavelength,) * 2
@@ -222,11 +222,11 @@ _NORMALISED = 1e-3
 
 def mueller_columns(
     table: Table, columns: Sequence[Column] | None, elements: Sequence[str] | None = None
-) -> Selection:
+) -> selection.Selection:
     """Choose the columns of elements, all or those named. Raises DataError or UsageError."""
     if columns is None:
-        raise without_header(table, _ELEMENTS)
-    present = {role: column for role in MUELLER if (column := only(table, columns, role))}
+        raise selection.without_header(table, _ELEMENTS)
+    present = {role: column for role in MUELLER if (column := selection.only(table, columns, role))}
     if elements is not None:
         Mueller(tuple(elements))
         if absent := [name for name in elements if name not in present]:
@@ -244,25 +244,27 @@ def mueller_columns(
                 f"{table.path}: {table.label(column.position)} is in "
                 f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
             )
-    errors = error_columns(table, columns, values, _SOME_OF.format("elements"))
+    errors = selection.error_columns(table, columns, values, _SOME_OF.format("elements"))
     one = any(column.role == "sigma" for column in errors)
     meaning = "the standard deviation of each" if one else "their standard deviations"
     notes, m11 = [f"{listed(errors)} read as {meaning}"] if errors else [], present.get("m11")
     signal, noun = Mueller.word, Mueller.noun
-    return select(table, columns, signal, values, noun, _ELEMENTS, errors=errors, others=[m11], notes=notes)
+    return selection.select(
+        table, columns, signal, values, noun, _ELEMENTS, errors=errors, others=[m11], notes=notes
+    )
 
 
 def generalised_columns(
     table: Table, columns: Sequence[Column] | None, ratios: Sequence[str] | None = None
-) -> Selection:
+) -> selection.Selection:
     """Choose the columns of the ratios, all or those named. Raises DataError or UsageError."""
     if columns is None:
-        raise without_header(table, _RATIOS)
+        raise selection.without_header(table, _RATIOS)
     if ratios is not None:
         Generalised(tuple(ratios))
     pairs: dict[str, tuple[Column, Column]] = {}
     for name in RATIOS:
-        psi, delta = (only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
+        psi, delta = (selection.only(table, columns, f"{angle}_{name}") for angle in ("psi", "delta"))
         if psi and delta:
             pairs[name] = psi, delta
         elif psi or delta:
@@ -286,13 +288,13 @@ def generalised_columns(
                 f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
                 "delta in degrees"
             )
-    errors = error_columns(table, columns, values, _SOME_OF.format("columns"))
+    errors = selection.error_columns(table, columns, values, _SOME_OF.format("columns"))
     notes = [f"{listed(errors)} read as their standard deviations"] if errors else []
     signal, noun = Generalised.word, Generalised.noun
-    return select(table, columns, signal, values, noun, _RATIOS, errors=errors, notes=notes)
+    return selection.select(table, columns, signal, values, noun, _RATIOS, errors=errors, notes=notes)
 
 
-def read_anisotropic(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
+def read_anisotropic(table: Table, chosen: selection.Selection, asked: Reading) -> Spectrum:
     """Read the chosen elements or ratios. Raises DataError or UsageError."""
     rows = Rows.read(table, chosen, asked.wavelength_unit).cut(asked.range)
     notes = [NOISE_REPLACES] if chosen.errors and asked.noise is not None else []
@@ -302,7 +304,7 @@ def read_anisotropic(table: Table, chosen: Selection, asked: Reading) -> Spectru
     return read(rows, chosen, asked.noise, notes)
 
 
-def _mueller(rows: Rows, chosen: Selection, noise: float | None, notes: list[str]) -> Spectrum:
+def _mueller(rows: Rows, chosen: selection.Selection, noise: float | None, notes: list[str]) -> Spectrum:
     """Elements over m11, checked, without those that were not measured."""
     elements = tuple(column.role for column in chosen.values)
     values, sigma = rows.stacked(elements), None
@@ -342,7 +344,7 @@ def _normalised(
     return divided, None if sigma is None else sigma / m11[:, None], "elements divided by m11"
 
 
-def _generalised(rows: Rows, chosen: Selection, noise: float | None, notes: list[str]) -> Spectrum:
+def _generalised(rows: Rows, chosen: selection.Selection, noise: float | None, notes: list[str]) -> Spectrum:
     """Ψ and Δ of each ratio. One σ for all, of a column or the noise, is that of Ψ, and Δ has that of
     `generalised.delta_sigma`."""
     roles, errors = ([column.role for column in columns] for columns in (chosen.values, chosen.errors))

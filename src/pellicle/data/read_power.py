@@ -7,14 +7,7 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import Reading, Rows, axis_unit
-from pellicle.data.tabular.column_selection import (
-    AxisColumns,
-    Selection,
-    first_column,
-    named_columns,
-    only,
-    select,
-)
+from pellicle.data.tabular import column_selection as selection
 from pellicle.data.tabular.columns import (
     COUNTERS,
     COUNTS,
@@ -46,13 +39,13 @@ _LEAST_ABSORBANCE = -300.0
 
 def power_columns(
     table: Table, columns: str | Sequence[str] | None, signal: str | None, polarisation: str | None
-) -> list[Selection]:
+) -> list[selection.Selection]:
     """Find the reflectances and transmittances of a table; arguments as in `read_spectra`.
 
     Several are returned where the arguments do not tell them apart. Raises UsageError or DataError where
     there is none, with the argument that settles it.
     """
-    named = named_columns(table, columns)
+    named = selection.named_columns(table, columns)
     if named is None:
         if signal is None:
             raise UsageError(f"{table.path}: {_ask_without_header(table.width)}")
@@ -62,7 +55,10 @@ def power_columns(
         return [beside_wavelength(table, named, column) for column in chosen]
     # the transmittance that counts of a sample, a reference and possibly the dark make
     of_sample = beside_wavelength(table, named, chosen[0])
-    reference, dark = only(table, named, "reference counts"), only(table, named, "dark counts")
+    reference, dark = (
+        selection.only(table, named, "reference counts"),
+        selection.only(table, named, "dark counts"),
+    )
     assert reference is not None
     formula = "(sample - dark) / (reference - dark)" if dark else "sample / reference"
     notes = (*of_sample.notes, f"transmittance computed from counts: {formula}")
@@ -87,7 +83,7 @@ def _ask_without_header(width: int) -> str:
     )
 
 
-def by_position(table: Table, role: str) -> Selection:
+def by_position(table: Table, role: str) -> selection.Selection:
     """Select the columns of a table without a header: wavelength, signal, sigma. Raises UsageError."""
     width = table.width
     if width > 4:
@@ -101,18 +97,20 @@ def by_position(table: Table, role: str) -> Selection:
         notes.append("column 3 read as sigma, the standard deviation of the signal")
     if width > 3:
         notes.append("column 4 (by custom the error of the wavelength) ignored")
-    axis = AxisColumns(first_column(table))
-    return Selection(role, axis, (Column(1, "", role),), errors, notes=tuple(notes))
+    axis = selection.AxisColumns(selection.first_column(table))
+    return selection.Selection(role, axis, (Column(1, "", role),), errors, notes=tuple(notes))
 
 
-def beside_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> Selection:
+def beside_wavelength(table: Table, columns: Sequence[Column], signal: Column) -> selection.Selection:
     """Select one signal with its sigma. Raises DataError as `select` does."""
     if signal.role in COUNTS:  # the others are not ignored
         columns = [c for c in columns if c.role not in COUNTS or c is signal]
-    sigma = only(table, columns, "sigma")
+    sigma = selection.only(table, columns, "sigma")
     errors = [sigma] if sigma else []
     notes = [f"{listed(errors)} read as the standard deviation of the signal"] if errors else []
-    return select(table, columns, signal.role, [signal], "the signal", _EXAMPLE, errors=errors, notes=notes)
+    return selection.select(
+        table, columns, signal.role, [signal], "the signal", _EXAMPLE, errors=errors, notes=notes
+    )
 
 
 def _signals(
@@ -149,7 +147,7 @@ def _signals(
 
 def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None) -> list[Column]:
     """An intensity, or columns whose names state no quantity, where the caller states it."""
-    intensity = only(table, columns, "intensity")
+    intensity = selection.only(table, columns, "intensity")
     if intensity and signal is None:
         raise UsageError(
             f"{table.path}: {listed([intensity])} is uncalibrated; state the signal with {_EITHER_SIGNAL}"
@@ -179,7 +177,7 @@ def _unnamed_signals(table: Table, columns: Sequence[Column], signal: str | None
         )
     if signal is not None and unnamed and "wavelength" in roles:
         return [replace(c, role=signal) for c in unnamed]
-    sample = only(table, columns, "sample counts")
+    sample = selection.only(table, columns, "sample counts")
     if sample and "reference counts" in roles and signal == "T":
         return [sample]
     if sample and "reference counts" in roles and not processed:
@@ -215,7 +213,7 @@ def _no_signal(
     )
 
 
-def read_power(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
+def read_power(table: Table, chosen: selection.Selection, asked: Reading) -> Spectrum:
     """Read a reflectance or transmittance, cut to the range before its values are checked.
 
     Raises DataError or UsageError.
@@ -242,7 +240,7 @@ def read_power(table: Table, chosen: Selection, asked: Reading) -> Spectrum:
     return rows.spectrum((), rows.columns, signal=kind, polarisation=polarisation, calibrated=calibrated)
 
 
-def read_signal(table: Table, chosen: Selection, unit: str | None) -> Rows:
+def read_signal(table: Table, chosen: selection.Selection, unit: str | None) -> Rows:
     """Read `values` and, if there is one, their `sigma`, against an axis in the `unit` that the user gives.
 
     A quotient of counts is infinite where the reference has none. Raises as `Rows.read` does.
@@ -289,7 +287,7 @@ class Scale:
         return f"signal unit: {self.signal}" + ("" if self.stated else ", assumed")
 
 
-def signal_scale(table: Table, chosen: Selection, requested: str | None) -> Scale:
+def signal_scale(table: Table, chosen: selection.Selection, requested: str | None) -> Scale:
     """Return the scale from the column's name or from `requested`. It is never guessed from values.
 
     Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
@@ -315,7 +313,7 @@ def signal_scale(table: Table, chosen: Selection, requested: str | None) -> Scal
     return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)
 
 
-def _check(rows: Rows, chosen: Selection, signal: str, calibrated: bool, unit_stated: bool) -> None:
+def _check(rows: Rows, chosen: selection.Selection, signal: str, calibrated: bool, unit_stated: bool) -> None:
     """Check σ and the values of these rows, naming line and column. Raises DataError."""
     table, values, sigma = rows.table, rows.columns["values"], rows.columns.get("sigma")
     for column in chosen.errors:

@@ -2,8 +2,9 @@
 
 import csv
 import io
+import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -109,11 +110,9 @@ def _shortened(names: Sequence[str]) -> str:
 
 def _columns(file: Path) -> dict[str, tuple[int, str]]:
     """Column and unit of file, x, y and name of a table; empty for a file that is no table of positions."""
-    with open_binary(file) as opened:
-        head = opened.read(_MOST_HEADER)
-    line = next((x for x in decoded(head).splitlines() if x.strip() and not x.startswith("#")), "")
     columns: dict[str, tuple[int, str]] = {}
-    for i, cell in enumerate(_cells(line)):
+    _, header = next(_numbered_cells(file, _MOST_HEADER), (0, []))
+    for i, cell in enumerate(header):
         plain = cell.strip().strip('"').lower()
         if plain in _FILES:
             columns.setdefault("file", (i, ""))
@@ -122,21 +121,22 @@ def _columns(file: Path) -> dict[str, tuple[int, str]]:
     return columns if {"file", "x", "y"} <= set(columns) else {}
 
 
-def _cells(line: str) -> Sequence[str]:
-    delimiter = next((c for c in ("\t", ";", ",") if c in line), ",")
-    return next(csv.reader(io.StringIO(line), delimiter=delimiter), [])
+def _numbered_cells(file: Path, most: int = -1) -> Iterator[tuple[int, Sequence[str]]]:
+    """Number and cells of each line of a text that is neither blank nor a comment."""
+    with open_binary(file) as opened:
+        text = decoded(opened.read(most))
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.startswith("#"):
+            delimiter = next((mark for mark in "\t;," if mark in line), ",")
+            yield number, next(csv.reader(io.StringIO(line), delimiter=delimiter), [])
 
 
 def _rows(table: Path) -> tuple[list[str], dict[str, list[float | str]], dict[str, str], list[str]]:
     """Files and positions of a table, units of the positions, and notes."""
     columns = _columns(table)
-    with open_binary(table) as file:
-        lines = decoded(file.read()).splitlines()
-    kept = [(i, x) for i, x in enumerate(lines, 1) if x.strip() and not x.startswith("#")][1:]
     names: list[str] = []
     where: dict[str, list[float | str]] = {key: [] for key in columns if key != "file"}
-    for number, line in kept:
-        cells = _cells(line)
+    for number, cells in itertools.islice(_numbered_cells(table), 1, None):
         if len(cells) <= max(i for i, _ in columns.values()):
             raise DataError(f"{table}: line {number} has {len(cells)} cells, too few: complete or delete it")
         names.append(cells[columns["file"][0]].strip())

@@ -124,17 +124,6 @@ class RglBrdf:
         scale = self._scale(x, y, theta, phi) / np.where(above, o[2], 1.0)
         return np.where(above[:, None], values * scale[:, None], 0.0)
 
-    def at_nodes(self, azimuth: int, theta: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return `i` (3,), `o` (3, N), the factor (N,) of `values` to the BRDF, and the nodes (N,).
-
-        The nodes are those inside the unit square: those on its edge repeat directions.
-        """
-        rows, columns = self.values.shape[3:]
-        y, x = (part.ravel() for part in np.mgrid[1 : rows - 1, 1 : columns - 1])
-        here = np.full((1, x.size), azimuth * self.theta_i.size + theta)
-        half_vectors = self.warp.sample(Corners(here, np.ones(here.shape)), x / (columns - 1), y / (rows - 1))
-        return *self.directions(azimuth, theta, *half_vectors), y * columns + x
-
     def directions(
         self, azimuth: int, theta: int, x: np.ndarray, y: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -237,8 +226,15 @@ def _valid_nodes(brdf: RglBrdf, channels: np.ndarray, lowest: float) -> tuple[np
     """Directions and values of the valid nodes, (6 + channels, nodes), with cosines above `lowest`; and the
     number of nodes beyond it and of other invalid ones."""
     pieces, beyond, invalid = [], 0, 0
+    rows, columns = brdf.values.shape[3:]
+    # nodes inside the unit square: those on its edge repeat directions
+    y, x = (part.ravel() for part in np.mgrid[1 : rows - 1, 1 : columns - 1])
+    nodes = y * columns + x
     for azimuth, theta in np.ndindex(brdf.values.shape[:2]):
-        i, o, factor, nodes = brdf.at_nodes(azimuth, theta)
+        here = np.full((1, x.size), azimuth * brdf.theta_i.size + theta)
+        around = Corners(here, np.ones(here.shape))
+        half_vectors = brdf.warp.sample(around, x / (columns - 1), y / (rows - 1))
+        i, o, factor = brdf.directions(azimuth, theta, *half_vectors)
         stored = brdf.values[azimuth, theta].reshape(brdf.values.shape[2], -1)[:, nodes]
         values = channels @ stored.astype(float) * factor
         above = (o[2] > lowest) & (i[2] > lowest)

@@ -206,15 +206,7 @@ def procspec(content: bytes) -> list[Table] | None:
             if not members or len(archive.infolist()) > _MOST_MEMBERS:
                 return None
             documents = [_unpacked(archive, info) for info in members]
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        NotImplementedError,
-        RuntimeError,
-        OSError,
-        ValueError,
-    ) as e:
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError) as e:
         if isinstance(e, DataError):
             raise
         if not _ANYWHERE.search(content):

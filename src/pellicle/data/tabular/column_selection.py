@@ -26,16 +26,6 @@ class AxisColumns(NamedTuple):
     angle: Column | None = None
     azimuth: Column | None = None
 
-    @property
-    def notes(self) -> list[str]:
-        """Sentences on the angle and the azimuth."""
-        sentences = (
-            [f"{listed([self.angle])} read as the angle of incidence in degrees"] if self.angle else []
-        )
-        if self.azimuth:
-            sentences.append(f"{listed([self.azimuth])} read as the azimuth of the sample in degrees")
-        return sentences
-
 
 @dataclass(frozen=True)
 class Selection:
@@ -78,10 +68,11 @@ def select(
     further = tuple(column for column in others if column)
     read = {column.position for column in (*axis, *values, *errors, *further) if column}
     ignored = [c for c in columns if c.position not in read and c.name not in ("_", "")]
+    turns = (axis.angle, "angle of incidence"), (axis.azimuth, "azimuth of the sample")
     described = (
         f"{listed([axis.wavelength])} read as the wavelength, {listed(values)} as {meaning}",
         *notes,
-        *axis.notes,
+        *(f"{listed([column])} read as the {what} in degrees" for column, what in turns if column),
         *([f"ignored: {listed(ignored)}"] if ignored else []),
     )
     return Selection(signal, axis, tuple(values), tuple(errors), further, described)
