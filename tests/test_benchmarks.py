@@ -82,6 +82,7 @@ def peers(modules_of):
         yield modules
 
 
+@pytest.mark.slow  # computes for 3 s
 def test_reference_values_agree_with_pellicle(peers):
     """Two programs and two formulas; at a critical substrate the square root amplifies rounding."""
     cases, ours, table = peers["cases"], peers["adapters.pellicle_any"], peers["table"]

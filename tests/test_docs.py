@@ -270,6 +270,7 @@ LONG_BLOCKS = (
     "docs/howto/loops.md",
     "docs/howto/maps.md",
     "docs/howto/mueller.md",
+    "docs/howto/posterior.md",
     "docs/howto/repeats.md",
     "docs/howto/uncertainty.md",
     "docs/reference/colour.md",

@@ -119,7 +119,7 @@ def by_tmm(spectrum: pl.Spectrum) -> float:
     return float(min(fits, key=lambda fit: fit.cost).x[0])
 
 
-@pytest.mark.parametrize("name", ["15-1-1.dat", "19-1-1.dat"])
+@pytest.mark.parametrize("name", ["15-1-1.dat", pytest.param("19-1-1.dat", marks=pytest.mark.slow)])
 def test_polymer_brushes_on_oxidised_silicon(name):
     """Real Ψ and Δ at eight angles: the thickness is that of another program, far within its error."""
     spectrum = read_spectrum(ELLIPSOMETRY / name)

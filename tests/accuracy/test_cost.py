@@ -34,6 +34,7 @@ def test_a_data_set_is_its_truth_and_noise(several):
         assert data.start == 0.5
 
 
+@pytest.mark.slow  # compiles fits
 def test_a_solver_that_misses_is_told(several):
     def far(data):
         return np.clip(data.truth + np.where(data.truth < 0.5, 0.2, -0.2), 0, 1)

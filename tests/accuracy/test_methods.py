@@ -161,6 +161,7 @@ def test_aligned_axes_are_at_the_next_right_angles():
     assert "no optic axis is tilted" in str(BY_NAME["aligned axes"].apply(aligned()))
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_mean_of_the_depth_has_the_mean_permittivity():
     case = graded()
     mean = reflectance(case.draws, np.sqrt(0.5 * (1.5**2 + 2.0**2)), 1.5, 60.0)

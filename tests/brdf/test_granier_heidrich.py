@@ -84,6 +84,7 @@ def test_diffuse_reflectance_is_the_average_of_schlick(n):
     assert float(gh.diffuse_reflectance(n) + gh.diffuse_transmittance(n)) == pytest.approx(1, rel=1e-14)
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_diffuse_part_is_eq_16():
     n, T = SURFACE["n"], 80 / 21 * SURFACE["n"] / (1 + SURFACE["n"]) ** 2
     expected = 1 + 2 * np.cos(4 * np.pi * n * 71.0 / WAVELENGTHS) * np.sqrt(T * (1 - T))

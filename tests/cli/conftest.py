@@ -80,10 +80,10 @@ def scene() -> tuple[str, ...]:
 
 @pytest.fixture
 def scene_recipe(write) -> Callable[..., Any]:
-    """Writes the recipe of this scene, or of other media, with these lines under [data] and at its end."""
+    """Writes the recipe of this scene, or of other media, with more lines in its tables and at its end."""
 
-    def recipe(data="", name="film.toml", material="1.46", substrate="3.9+0.02j", end=""):
+    def recipe(data="", name="film.toml", material="1.46", substrate="3.9+0.02j", end="", scene=""):
         layer = f"[[scene.layer]]\nmaterial = {material}\nthickness = {{ lower = 10, upper = 800 }}\n"
-        return write(f"[data]\n{data}\n[scene]\nsubstrate = '{substrate}'\n{layer}{end}", name)
+        return write(f"[data]\n{data}\n[scene]\nsubstrate = '{substrate}'\n{scene}\n{layer}{end}", name)
 
     return recipe

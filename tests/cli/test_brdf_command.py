@@ -9,8 +9,9 @@ from pellicle.api import fits as verbs
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.effects.surface_plan import exact
 from pellicle.fitting.curves import BrdfCurve
-from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Part, Rival, Status
+from pellicle.fitting.result import Baseline, Estimate, LayerTest, Part, Rival, Status
 from pellicle.scene.surface import surface_view
+from tests.made_fits import made_fit
 
 RECIPE = """
 [data]
@@ -45,36 +46,18 @@ def fits(monkeypatch):
     def fit(samples, surface, **options):
         calls.append({"samples": samples, "surface": surface, **options})
         several = isinstance(samples, list)
-        parts = tuple(
-            Part(
-                name=Path(each.path).stem if several else "",
-                data=each,
-                curve=BrdfCurve(np.zeros_like(each.values), each.values),
-                plan=exact(surface_view(surface, each)),
-                rms=1.0,
-                chi2_reduced=1.1,
-                effective_points=80.0,
-                sigma_from="residuals" if each.sigma is None else "given",
-            )
-            for each in (samples if several else [samples])
-        )
-        return Fit(
-            parts=parts,
+        parts = []
+        for each in samples if several else [samples]:
+            curve, plan = BrdfCurve(0 * each.values, each.values), exact(surface_view(surface, each))
+            parts.append(Part(Path(each.path).stem if several else "", each, curve, plan, 1.0, 1.1, 80.0))
+        thickness = Estimate("thickness", 300.0, np.inf, "nm", 10.0, 700.0, True)
+        return made_fit(
+            *parts,
+            parameters=(thickness, Estimate("n", 1.5, 0.0, "", 1.5, 1.5, False)),
             status=Status.NOT_IDENTIFIABLE,
             verdict="No evidence of a layer.",
-            parameters={
-                "thickness": Estimate("thickness", 300.0, np.inf, "nm", 10.0, 700.0, True),
-                "n": Estimate("n", 1.5, 0.0, "", 1.5, 1.5, False),
-            },
             rivals=(Rival({"thickness": 120.0}, 9.0),),
-            chi2_reduced=1.1,
-            rms=1.0,
-            effective_points=80.0,
-            correlation_names=("thickness",),
-            correlation=np.eye(1),
             warnings=("a warning",),
-            profile=None,
-            seconds=0.1,
             scene=surface,
             layer_test=LayerTest(False, 1.9, (Baseline("two lobes", 2.0),), options["residual"] or "linear"),
         )

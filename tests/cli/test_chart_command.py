@@ -7,6 +7,7 @@ import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour
 from pellicle.errors import UsageError
 from pellicle.simulation.colours import interference_colours
+from tests.film_recipes import film_recipe
 
 NM, DEGREES = np.linspace(0.0, 600.0, 7), np.array([0.0, 30.0, 60.0])
 FREE = pl.Free(0, 600)
@@ -44,9 +45,13 @@ def test_what_has_no_colour():
         interference_colours(pl.Scene(pl.Layer(1.46, FREE), "Si", light=pl.Light(signal="psi-delta")), NM, NM)
 
 
-def test_the_command_draws_it(pellicle, tmp_path):
-    recipe, out = tmp_path / "oxide.toml", tmp_path / "oxide.png"
-    recipe.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
+@pytest.fixture
+def recipe(write):
+    return write(film_recipe("", 'material = "SiO2"\nthickness = 300', substrate='"Si"'), "oxide.toml")
+
+
+def test_the_command_draws_it(pellicle, recipe, tmp_path):
+    out = tmp_path / "oxide.png"
     ran = pellicle("chart", recipe, "--out", out)
     assert (ran.code, ran.out) == (0, "")
     assert out.read_bytes().startswith(b"\x89PNG")
@@ -61,31 +66,27 @@ def test_the_command_draws_it(pellicle, tmp_path):
         pellicle("chart", recipe, *flags).refused(3 if "illuminant" in words else 2, words)
 
 
-def test_views_that_a_recipe_does_not_have(pellicle, tmp_path):
-    film, surface = tmp_path / "film.toml", tmp_path / "surface.toml"
-    film.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
-    surface.write_text('[scene.surface]\nmodel = "microfacet-film"\n[data]\nsignal = "brdf"\n')
-    for recipe, flags, words in (
+def test_views_that_a_recipe_does_not_have(pellicle, recipe, write, tmp_path):
+    surface = write('[scene.surface]\nmodel = "microfacet-film"\n[data]\nsignal = "brdf"\n', "surface.toml")
+    for path, flags, words in (
         (surface, ("--view", "balls"), "are for films"),
-        (film, ("--view", "bubble"), "must be above 0"),
-        (film, ("--view", "bubble", "--thickness", "50:500"), "same medium on both sides"),
-        (film, ("--view", "balls", "--invert", "a.csv"), "--invert belongs to a chart"),
-        (film, ("--view", "methods", "--illuminant", "A"), "under D65"),
+        (recipe, ("--view", "bubble"), "must be above 0"),
+        (recipe, ("--view", "bubble", "--thickness", "50:500"), "same medium on both sides"),
+        (recipe, ("--view", "balls", "--invert", "a.csv"), "--invert belongs to a chart"),
+        (recipe, ("--view", "methods", "--illuminant", "A"), "under D65"),
     ):
-        pellicle("chart", recipe, "--out", tmp_path / "a.png", *flags).refused(2, words)
+        pellicle("chart", path, "--out", tmp_path / "a.png", *flags).refused(2, words)
 
 
 @pytest.mark.slow
-def test_inverse_of_a_chart(pellicle, tmp_path):
+def test_inverse_of_a_chart(pellicle, recipe, tmp_path):
     """Every likely thickness has the colour of its row, by the film's own colours; probabilities add up."""
-    recipe, out, table = tmp_path / "oxide.toml", tmp_path / "oxide.png", tmp_path / "inverse.csv"
-    recipe.write_text('[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 300\n')
+    out, table = tmp_path / "oxide.png", tmp_path / "inverse.csv"
     ran = pellicle("chart", recipe, "--out", out, "--thickness", "0:250", "--invert", table)
     assert (ran.code, ran.out) == (0, "")
     assert "% of the colours have more than one" in ran.err
     rows = [line.split(",") for line in table.read_text().splitlines() if not line.startswith("#")]
-    assert rows[0][:5] == ["hex", "red", "green", "blue", "thickness_nm"]
-    assert rows[0][5:] == ["stderr_nm", "probability", "delta_e"]
+    assert rows[0] == ["hex", "red", "green", "blue", "thickness_nm", "stderr_nm", "probability", "delta_e"]
     columns = (slice(1, 4), 4, 6, 7)
     rgb, nm, probability, delta_e = (np.array([r[i] for r in rows[1:]], float) for i in columns)
     own = film_colour(nm, pl.material("SiO2"), pl.material("Si"), method="uniform-64")

@@ -8,21 +8,14 @@ from PIL import Image
 
 import pellicle as pl
 from pellicle.data.colours import write_colours
+from tests.film_recipes import film_recipe
 
 FILM = ("--layer", "1.46", "--substrate", "3.9", "--thickness", "10:500")
-RECIPE = """
-[data]
-signal = "srgb"
-angle = [0, 45]
-noise = 0.006
-
-[camera]
-illuminant = "A"
-
-[scene]
-substrate = 3.9
-layer = [{ material = 1.46, thickness = { lower = 10, upper = 500, value = 310 } }]
-"""
+RECIPE = film_recipe(
+    'signal = "srgb"\nangle = [0, 45]\nnoise = 0.006\n[camera]\nilluminant = "A"',
+    "material = 1.46\nthickness = { lower = 10, upper = 500, value = 310 }",
+    substrate="3.9",
+)
 
 
 @pytest.fixture

@@ -34,6 +34,7 @@ def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_
     assert row.split()[:4] == ["*", "b.toml", "0.0", "0.0"]
 
 
+@pytest.mark.slow  # compiles a film of Cauchy
 def test_data_that_do_not(pellicle, scene_recipe, spectrum_file):
     """The film is 1.46: a free index gains next to nothing, and costs ln n."""
     path = spectrum_file()

@@ -1,11 +1,18 @@
-"""`pellicle fit`: the result on stdout, talk on stderr, exit codes, folders, several files, Ctrl-C."""
+"""`pellicle fit`: result on stdout, talk on stderr, exit codes, folders, flags, and what repeats a fit."""
 
 import csv
 import hashlib
+import math
+import re
+import tomllib
 
+import numpy as np
 import pytest
 
 from pellicle.api import fits
+from pellicle.cli.flags import SceneFlags
+from pellicle.data.options import FileOptions
+from pellicle.errors import UsageError
 
 RESULT_KEYS = {"schema", "data", "status", "verdict", "parameters", "rivals", "chi2_reduced", "rms"}
 RESULT_KEYS |= {"correlation", "budget", "plan", "warnings", "versions", "seconds"}
@@ -139,3 +146,139 @@ def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene
     other.refused(2, "--loss must be one of least-squares, huber, student-t, not 'cauchy'")
     both = pellicle("fit", path, *scene, "--loss", "huber", "--posterior")
     both.refused(2, "leave the loss out, or the posterior")
+
+
+def substrate(signal: str = "R", **flags):
+    given = SceneFlags(layer="SiO2", substrate="BK7", **flags)
+    return given.scene(FileOptions(signal=signal)).substrate
+
+
+def test_a_share_and_a_number_of_reflections():
+    assert substrate(back="air", back_collected="0.4").back_collected == 0.4
+    free = substrate(back="air", back_collected="free", back_reflections=2)
+    assert (free.back_collected.lower, free.back_collected.upper, free.back_reflections) == (0, 1, 2)
+    assert substrate(back="air", back_collected="0.2:0.8").back_collected.upper == 0.8
+
+
+@pytest.mark.parametrize("word", ["rough", "taped"])
+def test_a_back_that_returns_nothing(word):
+    assert substrate(back=word).back_collected == 0.0
+    with pytest.raises(UsageError, match="its transmittance is not simulated"):
+        substrate("T", back=word)
+    with pytest.raises(UsageError, match="leave out `back_collected`"):
+        substrate(back=word, back_collected="0.5")
+
+
+def test_a_share_needs_a_back():
+    with pytest.raises(UsageError, match="`back_collected` needs the medium behind the plate"):
+        substrate(back_collected="0.5")
+
+
+@pytest.fixture
+def thickness(pellicle, spectrum_file):
+    """Fits a spectrum with these flags, and returns the thickness and the names of the budget."""
+    file = spectrum_file()
+
+    def thickness(*flags):
+        (found,) = pellicle("fit", file, *flags, "--json").objects
+        assert found["status"] == "converged"
+        return found["parameters"]["thickness"], [row["effect"] for row in found["budget"]]
+
+    return thickness
+
+
+def test_usual_uncertainties_are_those_without_the_flag(thickness, scene):
+    plain, rows = thickness(*scene)
+    assert (plain, rows) == thickness(*scene, "--uncertainty", "usual")
+    assert {"wavelength shift", "index of the layer", "index of the substrate", "scale"} <= set(rows)
+
+
+def test_none_leaves_the_noise(thickness, scene):
+    plain, _ = thickness(*scene)
+    bare, rows = thickness(*scene, "--uncertainty", "none")
+    assert rows == []
+    assert bare["stderr"] == pytest.approx(bare["stderr_noise"], rel=1e-3)
+    assert (bare["value"], bare["stderr_noise"]) == (plain["value"], plain["stderr_noise"])
+
+
+@pytest.mark.slow
+def test_an_index_of_a_recipe_counts_as_one_that_is_fitted(thickness, scene_recipe):
+    """With a prior as wide; the value stays that of the given index, and its error includes the distance."""
+    n = "{ lower = 1.3, upper = 1.6, value = 1.46, prior = { mean = 1.46, sd = 0.0146 } }"
+    materials = "1.46\nindex_uncertainty = 0.01", f"{{ model = 'constant', n = {n} }}"
+    alone = {"data": "noise = 0.002", "scene": "uncertainty = 'none'"}
+    ways = (thickness("--recipe", scene_recipe(material=x, **alone)) for x in materials)
+    (found, one), (fitted, none) = ways
+    assert (one, none) == (["index of the layer"], [])
+    together = math.hypot(fitted["stderr"], fitted["value"] - found["value"])
+    assert found["stderr_noise"] < 0.5 * found["stderr"]
+    assert found["stderr"] == pytest.approx(together, rel=0.02)
+
+
+def test_another_word_is_refused(pellicle, spectrum_file, scene):
+    ran = pellicle("fit", spectrum_file(), *scene, "--uncertainty", "some")
+    ran.refused(2, "--uncertainty must be usual or none", "'some'")
+
+
+def test_every_step_of_a_fit_is_told(pellicle, spectrum_file, scene):
+    ran = pellicle("fit", spectrum_file(), *scene, "--verbose")
+    sentences = re.findall(r"^ *\d+\.\d\d s  (.*)$", ran.err, re.MULTILINE)
+    heads = [re.split(r":| of ", sentence)[0] for sentence in sentences if "oxide.csv" not in sentence]
+    names = ("scene", "free", "data", "plan", "scan", "polished", "weights", "status", "time")
+    assert tuple(dict.fromkeys(heads)) == names
+    assert "oxide.csv: 100 rows used: R from 400 to 796 nm" in ran.err
+    assert "scene: from air (exactly 1): index 1.46, 10 to 800 nm, on index 3.9 + 0.02i" in sentences
+    assert "free: thickness between 10 and 800 nm" in sentences
+    assert any("no noise is given" in sentence for sentence in sentences)
+    # 790 nm in steps of at most 400 nm / 1.46 / 8
+    assert any(s.startswith("scan: 25 values of thickness, 32.9 nm apart") for s in sentences)
+    assert "status: converged" in sentences
+    quiet = pellicle("fit", spectrum_file("again.csv"), *scene)
+    assert quiet.code == ran.code == 0
+    assert not re.search(r"^ *\d+\.\d\d s", quiet.err, re.MULTILINE)
+
+
+def test_why_a_fit_is_no_answer(pellicle, spectrum_file):
+    flags = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "10:250")
+    ran = pellicle("fit", spectrum_file(), *flags, "-v")
+    assert ran.code == 2  # there is no short form
+    ran = pellicle("fit", spectrum_file(), *flags, "--noise", "0.002", "--verbose", code=4)
+    assert "status: does the scene not explain the data? yes" in ran.err
+    assert "its noise is given" in ran.err
+
+
+def numbers(record):
+    return {name: np.array([x["value"], x["stderr"]], float) for name, x in record["parameters"].items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ("--range", "450:750", "--noise", "0.004", "--loss", "huber", "--tolerance", "1e-4"),
+        ("--free", "n", "--bandwidth", "free", "--scale", "free", "--uncertainty", "none"),
+    ],
+)
+def test_of_flags(pellicle, spectrum_file, scene, tmp_path, flags):
+    out = tmp_path / "out"
+    first = pellicle("fit", spectrum_file(), *scene, *flags, "--json", "--out", out)
+    again = pellicle("fit", "--recipe", out / "recipe.toml", "--json")
+    assert again.code == first.code
+    for name, pair in numbers(first.objects[0]).items():
+        np.testing.assert_allclose(numbers(again.objects[0])[name], pair, rtol=1e-9)
+    assert again.objects[0]["warnings"] == first.objects[0]["warnings"]
+
+
+@pytest.mark.slow
+def test_of_a_recipe_with_files_and_flags(pellicle, spectrum_file, scene_recipe, tmp_path):
+    one, other = spectrum_file("one.csv"), spectrum_file("other.csv", seed=1)
+    files = f"path = '{one}'\ninstrument = {{ scale = 'free' }}", f"path = '{other}'\nnoise = 0.01"
+    data = "".join(["joint = true", *(f"\n[[data.file]]\n{file}" for file in files)])
+    recipe, out = scene_recipe(data, material="'SiO2'", substrate="Si"), tmp_path / "out"
+    first = pellicle("fit", "--recipe", recipe, "--range", "450:750", "--json", "--out", out)
+    again = pellicle("fit", "--recipe", out / "recipe.toml", "--json")
+    assert again.objects[0]["parameters"].keys() == first.objects[0]["parameters"].keys()
+    for name, pair in numbers(first.objects[0]).items():
+        np.testing.assert_allclose(numbers(again.objects[0])[name], pair, rtol=1e-9)
+    tables = tomllib.loads((out / "recipe.toml").read_text())["data"]["file"]
+    assert [table["range"] for table in tables] == [[450, 750]] * 2

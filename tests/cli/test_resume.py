@@ -106,7 +106,7 @@ def test_what_changed_is_fitted_again(batch, fitted, scene, tmp_path):
 
 @pytest.mark.slow
 def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
-    # in this process: test_jobs.py starts others
+    # in this process: test_session.py starts others
     monkeypatch.setattr("pellicle.cli.session.in_order", lambda function, tasks, jobs: map(function, tasks))
     fitted.stop["b"] = ValueError("b is bad")
     first = batch("--jobs", "2")

@@ -77,6 +77,7 @@ def test_a_chain_that_is_too_short_exits_5_without_an_interval(pellicle, spectru
     assert found["status"] == "converged"
 
 
+@pytest.mark.slow  # a chain of its own
 def test_fit_samples_on_demand(pellicle, spectrum_file, scene):
     ran = pellicle("fit", spectrum_file(), *scene, "--posterior", "--json", code=0)
     assert ran.objects[0]["posterior"]["trusted"] is True

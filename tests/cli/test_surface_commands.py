@@ -8,17 +8,21 @@ import pytest
 from pellicle.data.read_brdf import read_brdf_samples
 from tests.directions import unit
 
-RECIPE = """
-[data]
-signal = "brdf"
-[scene.surface]
-model = "blinn-phong-film"
-thickness = { value = 0, lower = 0, upper = 700 }
-n = 1.5
-base_n = 2.0
-exponent = 4
-diffuse = 0.05
-"""
+SEEN = 'files = ["seen.csv"]'
+FILM = "thickness = { lower = 200, upper = 300 }\n"
+BARE = "thickness = { value = 0, lower = 0, upper = 700 }\nn = 1.5\nbase_n = 2\nexponent = 4\ndiffuse = 0.05"
+
+
+@pytest.fixture
+def recipe(write):
+    """Writes a recipe of a surface, and samples at viewing angles from 0 to 79 degrees in these steps."""
+
+    def recipe(model="blinn-phong-film", numbers=BARE, data='signal = "brdf"', step=10):
+        rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, step))
+        write("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows, "seen.csv")
+        return write(f'[data]\n{data}\n[scene.surface]\nmodel = "{model}"\n{numbers}', "bare.toml")
+
+    return recipe
 
 
 def by_hand(d):
@@ -31,9 +35,8 @@ def by_hand(d):
     return h[:, 2] ** 4 * fresnel + 0.05
 
 
-def test_the_command_writes_what_the_surface_sends_back(pellicle, tmp_path):
-    (tmp_path / "bare.toml").write_text(RECIPE)
-    ran = pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / "bare.csv")
+def test_the_command_writes_what_the_surface_sends_back(pellicle, recipe, tmp_path):
+    ran = pellicle("simulate", recipe(), "--out", tmp_path / "bare.csv")
     assert (ran.code, ran.out) == (0, "")
     assert "1000 spread over the lobe" in ran.err
     text = (tmp_path / "bare.csv").read_text().splitlines()
@@ -45,35 +48,19 @@ def test_the_command_writes_what_the_surface_sends_back(pellicle, tmp_path):
     np.testing.assert_allclose(found.values, np.tile(by_hand(found)[:, None], 3), rtol=1e-9)
 
 
-def test_noise_and_the_directions_of_a_file(pellicle, tmp_path):
-    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(80))
-    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
-    more = '"brdf"\nfiles = ["seen.csv"]\nnoise = 0.02\n'
-    (tmp_path / "bare.toml").write_text(RECIPE.replace('"brdf"\n', more))
-    pellicle("simulate", tmp_path / "bare.toml", "--out", tmp_path / "a.csv", code=0)
+def test_noise_and_the_directions_of_a_file(pellicle, recipe, tmp_path):
+    path = recipe(data=f'signal = "brdf"\n{SEEN}\nnoise = 0.02', step=1)
+    pellicle("simulate", path, "--out", tmp_path / "a.csv", code=0)
     made = read_brdf_samples(tmp_path / "a.csv")
     np.testing.assert_array_equal(made.theta_o, np.arange(80.0))
     assert np.all(made.sigma == 0.02)
     assert 0.017 < np.std(made.values - by_hand(made)[:, None]) < 0.023
 
 
-PAINT = """
-[data]
-files = ["seen.csv"]
-[scene.surface]
-model = "granier-heidrich-full"
-thickness = { lower = 200, upper = 300 }
-deviation = 1e-4
-diffuse = 0.2
-"""
-
-
 @pytest.mark.slow
-def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
-    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
-    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
-    (tmp_path / "paint.toml").write_text(PAINT)
-    (record,) = pellicle("plan", tmp_path / "paint.toml", "--tolerance", 1e-3, "--json").objects
+def test_a_plan_names_the_effects_of_a_surface(pellicle, recipe):
+    path = recipe("granier-heidrich-full", f"{FILM}deviation = 1e-4\ndiffuse = 0.2", SEEN)
+    (record,) = pellicle("plan", path, "--tolerance", 1e-3, "--json").objects
     assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)
     found = {row["effect"]: row for row in record["effects"]}
     names = ("spectral-sampling", "bands", "roughness", "deviation", "diffuse", "coherence", "precision")
@@ -81,28 +68,15 @@ def test_a_plan_names_the_effects_of_a_surface(pellicle, tmp_path):
     assert sum(row["error_bound"] for row in found.values()) == record["error_bound"] <= 1e-3
     assert not found["deviation"]["on"]
     assert 0 < found["deviation"]["error_without"] < 1e-3 < found["diffuse"]["error_without"]
-    (tmp_path / "paint.toml").write_text(PAINT.replace("0.2", "0\nspecular = 0"))
-    pellicle("plan", tmp_path / "paint.toml").refused(2, "nothing to compute")
-
-
-DIFFUSE = """
-[data]
-files = ["seen.csv"]
-[scene.surface]
-model = "granier-heidrich-diffuse"
-thickness = { lower = 200, upper = 300 }
-"""
+    recipe("granier-heidrich-full", f"{FILM}diffuse = 0\nspecular = 0", SEEN)
+    pellicle("plan", path).refused(2, "nothing to compute")
 
 
 @pytest.mark.slow
-def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
-    rows = "".join(f"30,0,{t},180,0.1,0.2,0.3\n" for t in range(0, 80, 10))
-    (tmp_path / "seen.csv").write_text("theta_i,phi_i,theta_o,phi_o,R,G,B\n" + rows)
-    (tmp_path / "base.toml").write_text(DIFFUSE)
-    (record,) = pellicle(
-        "cost", tmp_path / "base.toml", "--json", "--out", tmp_path / "cost", "--tolerance", 1e-5, code=0
-    ).objects
-    assert record == json.loads((tmp_path / "cost" / "result.json").read_text())
+def test_what_accuracy_costs_for_a_surface(pellicle, recipe, tmp_path):
+    path, out = recipe("granier-heidrich-diffuse", FILM, SEEN), tmp_path / "cost"
+    (record,) = pellicle("cost", path, "--json", "--out", out, "--tolerance", 1e-5, code=0).objects
+    assert record == json.loads((out / "result.json").read_text())
     assert (record["schema"], record["unit"], record["tolerance"]) == ("pellicle.cost/1", "relative", 1e-5)
     found = {rung["name"]: rung for rung in record["rungs"]}
     assert {"float64", "float32", "planned", "without interference", "one wavelength"} == found.keys()
@@ -112,17 +86,16 @@ def test_what_accuracy_costs_for_a_surface(pellicle, tmp_path):
     assert all(rung["seconds"] > 0 for rung in found.values())
     assert record["left_out"]["no diffuse part"] == "nothing else is left of the BRDF"
     assert "three wavelengths only" in record["no_colours"]
-    assert (tmp_path / "cost" / "cost.png").read_bytes().startswith(b"\x89PNG")
-    assert "No colours:" in (tmp_path / "cost" / "report.txt").read_text()
-    assert len((tmp_path / "cost" / "cost.csv").read_text().splitlines()) == 1 + len(found)
+    assert (out / "cost.png").read_bytes().startswith(b"\x89PNG")
+    assert "No colours:" in (out / "report.txt").read_text()
+    assert len((out / "cost.csv").read_text().splitlines()) == 1 + len(found)
 
 
-def test_what_cannot_be_asked_of_a_surface(pellicle, tmp_path):
-    (tmp_path / "bare.toml").write_text(RECIPE)
+def test_what_cannot_be_asked_of_a_surface(pellicle, recipe, tmp_path):
     for command, flags, said in (
         ("cost", ("--reference", "mpmath"), "--reference is for films"),
         ("cost", ("--tolerance", 0), "--tolerance must be above zero"),
         ("plan", ("--tolerance", -1), "--tolerance must be above zero"),
         ("simulate", ("--out", tmp_path / "x.csv", "--noise", -1), "--noise must be a standard deviation"),
     ):
-        pellicle(command, tmp_path / "bare.toml", *flags).refused(2, said)
+        pellicle(command, recipe(), *flags).refused(2, said)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pellicle.data.read_spectrum import read_spectrum
@@ -36,6 +36,7 @@ def path(tmp_path_factory):
     return tmp_path_factory.mktemp("spectra") / "film.csv"
 
 
+@settings(max_examples=50)
 @given(
     spectrum=spectra(),
     separator=st.sampled_from([",", ";", "\t", " ", "  ", ", "]),
@@ -69,6 +70,7 @@ def test_round_trip(path, spectrum, separator, unit, percent, falling, header, c
     np.testing.assert_array_equal(read.lines, expected[::-1] if falling else expected)
 
 
+@settings(max_examples=50)
 @given(
     content=st.one_of(
         st.binary(max_size=80), st.text('0123456789.,;\t \n-+eER#>%"()nmTaf', max_size=80).map(str.encode)
@@ -100,6 +102,7 @@ ROLES = {
 }
 
 
+@settings(max_examples=50)
 @given(name=st.text(max_size=30))
 def test_any_name_is_a_column_or_other(name):
     column = recognise(name)

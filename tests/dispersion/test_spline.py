@@ -86,6 +86,7 @@ def test_linear_in_the_coefficients_and_smooth_in_wavelength(kind):
     np.testing.assert_allclose(along, derivative(lambda w: index(k, w), at, 1e-2), atol=1e-7)
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_precision_follows_the_wavelength():
     for model, close in ((Spline(KNOTS, N, K), 1e-6), (KramersKronigSpline(KNOTS, K), 2e-4)):
         single = jax.jit(model)(AT.astype(np.float32))

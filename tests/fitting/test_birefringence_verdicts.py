@@ -6,8 +6,9 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
-from pellicle.fitting.result import Estimate, Fit, Part, Status
+from pellicle.fitting.result import Estimate, Part
 from pellicle.forward_model.plan import Plan, Row
+from tests.made_fits import made_fit
 
 
 def candidate(
@@ -26,10 +27,8 @@ def candidate(
     plan = Plan((Row("anisotropy", delta is not None, "", count=size),), "psi-delta", "unpolarised")
     curve = Curve(nm, zero, zero + 1, zero, zero, zero, zero, zero, principal=principal)
     part = Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0)
-    parameters = {word: Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free)}
-    empty = np.zeros((0, 0))
-    fit = Fit((part,), Status.CONVERGED, "", parameters, (), 1.0, 0.0, 2.0, (), empty, (), None, 0.0)
-    return Candidate(name, fit, 1 + len(free), 0.0, 0.0, bic)
+    parameters = (Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free))
+    return Candidate(name, made_fit(part, parameters=parameters), 1 + len(free), 0.0, 0.0, bic)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_each_start_reaches_the_minimum_of_its_own_data(three):
     np.testing.assert_allclose(three.aux, three.cost, atol=1e-12)
 
 
-@pytest.mark.parametrize("lanes", [1, 4, 16])
+@pytest.mark.parametrize("lanes", [*(pytest.param(n, marks=pytest.mark.slow) for n in (1, 4)), 16])
 def test_the_number_of_lanes_does_not_matter(three, lanes):
     """16 lanes have more room than there are starts."""
     other = run(lanes)

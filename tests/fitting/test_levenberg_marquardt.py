@@ -128,6 +128,7 @@ def test_what_has_not_converged_is_reported(films):
     assert not least_squares(lambda y: residual(y, data), start, rtol=1e-12, steps=2)[1]
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_float32_stays_float32(films, solved):
     """Under x64, where Optimistix's own solver fails on float32."""
     y, _, _ = solved

@@ -69,6 +69,7 @@ def test_an_index_with_one_open_side(film, measured):
     assert f"n is at least {fit['n'].lower_limit:.2g} (95 %)" in fit.warnings
 
 
+@pytest.mark.slow  # compiles for 6 s
 def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     """Both ends of the thickness, its index fitted again by SciPy, where χ² is 3.84 above the best; and the
     misfit beside the best."""

@@ -11,6 +11,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting.curves import Curve
 from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter
 from pellicle.fitting.result import Estimate, Fit, Part, Rival, Status
+from tests.made_fits import made_fit
 
 
 def parameter(values, noise: Any = 1.0, common=0.0):
@@ -25,11 +26,9 @@ def fit(value, noise=0.2, path="", status=Status.CONVERGED, stderr=None, rivals=
     curve = Curve(nm, data, data, data, nm, nm, nm, nm)
     whole = noise if stderr is None else stderr
     estimate = Estimate("thickness", value, whole, "nm", 10, 3000, True, stderr_noise=noise)
-    parameters = {"thickness": estimate} | others
     plan = pl.plan(pl.Scene(pl.Layer(1.46, 100.0), 3.9))
     part = Part("", pl.Spectrum(nm, data, "R", path=path), curve, plan, 0.0, 1.0, 5.0)
-    empty = np.zeros((0, 0))
-    return Fit((part,), status, "", parameters, rivals, 1.0, 0.0, 5.0, (), empty, (), None, 0.0)
+    return made_fit(part, parameters=(estimate, *others.values()), status=status, rivals=rivals)
 
 
 TEMPERATURES = (

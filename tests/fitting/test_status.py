@@ -12,6 +12,7 @@ from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.status import ORDER, describe, distinct_rivals, expanded, judged, verdict
 
 GOLD = {"thickness": pl.Free(1, 1000), "material": "Au"}
+THICK = GOLD | {"thickness": pl.Free(1000, 4000)}
 OPAQUE = "opaque: thickness is at least"
 # what is measured, its thickness, what is fitted, whether the solver settles: status, words of the verdict
 REAL = {
@@ -23,6 +24,8 @@ REAL = {
     ),
     "wrong index": ({}, 430.0, {"material": 1.6}, True, Status.MISFIT, "on average"),
     "opaque": (GOLD, 500.0, GOLD, True, Status.NOT_IDENTIFIABLE, OPAQUE),
+    # not even the thinnest that the bounds allow lets light through
+    "nothing seen": (GOLD, 500.0, THICK, True, Status.NOT_IDENTIFIABLE, "anything between 1000 and 4000 nm"),
     # a plateau has no point to settle at
     "opaque, unsettled": (GOLD, 500.0, GOLD, False, Status.NOT_IDENTIFIABLE, OPAQUE),
     "unsettled": ({}, 430.0, {}, False, Status.NOT_CONVERGED, "should not be used"),

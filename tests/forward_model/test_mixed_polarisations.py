@@ -145,7 +145,8 @@ def test_slope_is_that_of_differences():
         )
 
 
-@pytest.mark.parametrize("theta", [0, pytest.param(90, marks=SLOW)])
+@SLOW
+@pytest.mark.parametrize("theta", [0, 90])
 def test_aligned_absorbing_film_on_a_plate(theta):
     """Ψ and Δ contain the phase between s and p of the light that crossed the film."""
     film = pl.Anisotropic(ORDINARY, EXTRAORDINARY, axis=(theta, 0))

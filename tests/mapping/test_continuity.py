@@ -80,6 +80,7 @@ def test_ambiguous_stripes_of_a_wedge_get_the_true_order(wedge):
     assert "against a Δχ² of up to " in str(found)
 
 
+@pytest.mark.slow  # two seconds of neighbours
 def test_all_numbers_of_a_pixel_are_those_of_its_minimum(wedge):
     truth, unsure = wedge
     before = constructed(truth, unsure)

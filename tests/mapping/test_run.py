@@ -45,6 +45,7 @@ def test_a_worker_that_dies_loses_nothing(workers, cube, scene, fake_fits, tmp_p
     assert made.dataset.attrs["path"] != whole.dataset.attrs["path"]
 
 
+@pytest.mark.slow  # starts worker processes
 @pytest.mark.usefixtures("small_blocks")
 def test_workers_read_a_cube_on_disk_themselves(workers, cube, scene, fake_fits, same_files, tmp_path):
     values = tmp_path / "cube.npy"
@@ -71,6 +72,7 @@ def test_a_large_cube_in_memory_is_sent_by_blocks(
         same_files(here.path, there.path)
 
 
+@pytest.mark.slow  # starts worker processes
 def test_an_error_of_a_fit_comes_back_as_it_is(workers, cube, scene, fake_fits, tmp_path):
     with pytest.raises(UsageError, match="no such pixel"):
         run_map(cube, scene, tmp_path / "map.zarr", scheduler=workers, fit=fake_fits.refusing)

@@ -79,6 +79,7 @@ def test_transparent_stacks(stacks):
     np.testing.assert_allclose(np.sum(np.abs(jones) ** 2, axis=1) + T, 1, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow  # compiles for 6 s
 def test_isotropic_media_are_those_of_the_2x2_method(stacks):
     n, turns, k, n0, angle = stacks
     n = n[[0, 0, 2, 3, 3, 3, 6, 6]]
@@ -93,6 +94,7 @@ def test_isotropic_media_are_those_of_the_2x2_method(stacks):
     np.testing.assert_allclose(jones[:, 1, 0], 0, atol=1e-12)
 
 
+@pytest.mark.slow  # the program of the test before
 def test_reciprocity(stacks):
     """With the plane of incidence turned by 180° light retraces its path: r_ps and −r_sp change places."""
     n, turns, k, n0, angle = stacks

@@ -22,7 +22,7 @@ SCALE = 1.25
 
 @pytest.fixture(scope="module", autouse=True)
 def _unsolved():
-    """A scale in place of the solution, which takes seconds; test_cycles_formula.py has that."""
+    """A scale in place of the solution, which takes seconds; test_formulas.py has that."""
     with pytest.MonkeyPatch.context() as patch:
         unsolved = lambda *film: physical(*film)._replace(scale=SCALE)  # noqa: E731
         patch.setattr("pellicle.rendering.export.effective", unsolved)

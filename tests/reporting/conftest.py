@@ -13,6 +13,7 @@ from pellicle.fitting.curves import BrdfCurve, Curve
 from pellicle.fitting.result import Estimate, Fit, LayerTest, Part, Profile, Rival, Status
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.scene.surface import Surface, surface_view
+from tests.made_fits import made_fit
 
 
 @pytest.fixture
@@ -27,43 +28,22 @@ def fit() -> Fit:
     noise = 0.002 * np.sin(nm)
     above = np.zeros((5, 5))
     above[np.triu_indices(5, 1)] = [0.62, 0.49, -0.97, 0.1, 0.2, 0.3, 0.0, -0.88, 0.93, 0.4]
-    return Fit(
-        parts=(
-            Part(
-                name="",
-                data=Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32),
-                curve=Curve(
-                    wavelength=nm,
-                    data=model + noise,
-                    sigma=np.full(41, 0.002),
-                    model=model,
-                    n=np.full(41, 1.33),
-                    k=np.zeros(41),
-                    n_stderr=np.full(41, 0.0012),
-                    k_stderr=np.zeros(41),
-                ),
-                plan=Plan(rows, "R", "unpolarised"),
-                rms=0.00141,
-                chi2_reduced=1.02,
-                effective_points=12.0,
-            ),
-        ),
+    zero = np.zeros(41)
+    curve = Curve(nm, model + noise, zero + 0.002, model, zero + 1.33, zero, zero + 0.0012, zero)
+    data = Spectrum(nm, model + noise, "R", path="/data/film.csv", sha256="ab" * 32)
+    nuisances = ("scale", 4.5, 0.4), ("scale_1", 1.5, 0.6), ("offset", 0.3, 0.02)
+    return made_fit(
+        Part("", data, curve, Plan(rows, "R", "unpolarised"), 0.00141, 1.02, 12.0),
         status=Status.AMBIGUOUS,
         verdict="The data do not determine thickness: 486.28 nm fits best, but 242.87 nm fits nearly"
         " as well.",
-        parameters={
-            "thickness": Estimate("thickness", 486.28, 3.6, "nm", 10.0, 3000.0, True),
-            "A": Estimate("A", 1.324, 0.0012, "", 1.2, 2.8, True),
-            "instrument.scale": Estimate("instrument.scale", 4.5, 0.4, "", -math.inf, math.inf, True),
-            "instrument.scale_1": Estimate("instrument.scale_1", 1.5, 0.6, "", -math.inf, math.inf, True),
-            "instrument.offset": Estimate("instrument.offset", 0.3, 0.02, "", -math.inf, math.inf, True),
-            "B": Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
-        },
+        parameters=(
+            Estimate("thickness", 486.28, 3.6, "nm", 10.0, 3000.0, True),
+            Estimate("A", 1.324, 0.0012, "", 1.2, 2.8, True),
+            *(Estimate(f"instrument.{x}", *xs, "", -math.inf, math.inf, True) for x, *xs in nuisances),
+            Estimate("B", 3102.06, 0.0, "nm^2", 3102.06, 3102.06, False),
+        ),
         rivals=(Rival({"A": 1.33, "thickness": 242.87}, 0.69), Rival({"A": 1.4, "thickness": 963.57}, 14.2)),
-        chi2_reduced=1.02,
-        rms=0.00141,
-        effective_points=12.0,
-        correlation_names=("thickness", "A", "instrument.scale", "instrument.scale_1", "instrument.offset"),
         correlation=above + above.T + np.eye(5),
         warnings=("SiO2 has no data for k: it is taken as transparent, which its source does not say.",),
         profile=Profile(np.linspace(10.0, 3000.0, 60), np.linspace(5.0, 400.0, 60)),
@@ -125,20 +105,4 @@ def brdf_fit() -> Fit:
     curve = BrdfCurve(samples.values + 0.1, np.full((3, 1), -2.0))
     plan = exact(surface_view(surface, samples))
     part = Part("", samples, curve, plan, rms=1.0, chi2_reduced=1.0, effective_points=3.0)
-    return Fit(
-        parts=(part,),
-        status=Status.MISFIT,
-        verdict="",
-        parameters={},
-        rivals=(),
-        chi2_reduced=1.0,
-        rms=1.0,
-        effective_points=3.0,
-        correlation_names=(),
-        correlation=np.zeros((0, 0)),
-        warnings=(),
-        profile=None,
-        seconds=0.0,
-        scene=surface,
-        layer_test=LayerTest(False, 1.0, (), "linear"),
-    )
+    return made_fit(part, status=Status.MISFIT, scene=surface, layer_test=LayerTest(False, 1.0, (), "linear"))

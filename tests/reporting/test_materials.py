@@ -50,7 +50,7 @@ def test_a_file_is_described_as_it_was_understood(write):
     assert "read as nm" in describe(str(path))
 
 
-@pytest.mark.parametrize(("name", "suffix"), [("HgS", ".png"), ("SiO2", ".pdf"), ("CuO/Brimhall", ".svg")])
+@pytest.mark.parametrize(("name", "suffix"), [("HgS", ".png"), ("CuO/Brimhall", ".svg")])
 def test_a_figure_is_written_whole_and_alone(tmp_path, name, suffix):
     path = figure(name, tmp_path / f"nk{suffix}")
     assert path.stat().st_size > 5000

@@ -28,6 +28,7 @@ def test_the_background_shows_through_what_the_sphere_leaves():
     assert limb == pytest.approx(0.25 * inside + 0.75 * 0.2)
 
 
+@pytest.mark.slow  # renders spheres
 def test_figures_are_written(tmp_path, monkeypatch):
     film = pl.Scene(pl.Layer(1.33, 100.0), 1.0)
     objects(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", "balls", (50.0, 100.0), size=9)

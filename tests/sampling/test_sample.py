@@ -66,6 +66,7 @@ def test_a_prior_weighs_the_minima(bands, film, grid, prior, log_prior):
     assert thin == pytest.approx(weight[GRID < 540].sum(), abs=0.04)
 
 
+@pytest.mark.slow  # compiles for 4 s
 def test_a_half_normal_prior_presses_towards_zero(film):
     """Data that say nothing leave the prior: half a normal distribution."""
     blind = pl.Spectrum(BANDS, np.full(5, 0.3), "R", sigma=np.full(5, 100.0))
@@ -74,6 +75,7 @@ def test_a_half_normal_prior_presses_towards_zero(film):
     assert found.q975 == pytest.approx(50.0 * 2.2414, rel=0.1)
 
 
+@pytest.mark.slow  # two chains
 def test_the_same_seed_gives_the_same_chain(bands, film, bimodal):
     again = pl.sample(bands(), film())
     np.testing.assert_array_equal(again.draws, bimodal.draws)

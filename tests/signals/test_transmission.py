@@ -40,6 +40,7 @@ def test_values_of_tmm():
     assert simulated.transmission
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_the_jones_matrix_of_a_layer_that_turns_nothing():
     """The 4×4 method, which a birefringent layer takes, and `pellicle.jones` agree with the 2×2 method."""
     tilted = pl.Anisotropic(1.7, 1.6, axis=(40.0, 30.0))
@@ -72,6 +73,7 @@ def test_a_plate_adds_its_orders():
     assert 0 < simulated.depolarisation.min() < simulated.depolarisation.max() < 0.2
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_the_fit_finds_the_thickness():
     fit = pl.fit(pl.simulate(scene(), NM, noise=0.02, seed=1), scene())
     found = fit.parameters["thickness"]

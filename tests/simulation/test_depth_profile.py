@@ -26,6 +26,7 @@ def both(request):
     return request.param, pl.depth_profile(scene, 550.0, NM)
 
 
+@pytest.mark.slow  # compiles for 3 s
 def test_a_film_of_another_thickness_compiles_nothing(caplog):
     first = pl.depth_profile(pl.Scene(pl.Layer(2.1 + 0.1j, 80.0), 1.5), 550.0, NM)
     with jax.log_compiles():

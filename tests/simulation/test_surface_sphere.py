@@ -99,6 +99,7 @@ def test_pixels_of_a_diffuse_layer():
     assert np.max(np.abs(rgb - expected)) > 0.05  # three wavelengths have another colour
 
 
+@pytest.mark.slow  # compiles for 2 s
 def test_the_side_away_from_the_lamp_is_dark():
     lamp = one_lamp(90.0, 10.0).boxes[0]._replace(azimuth=0.0)
     image = render(UNEVEN, Environment((lamp,) * len(BOXES), 0.0, 0.0, 0.0, 0.0), SIZE).linear.sum(axis=-1)

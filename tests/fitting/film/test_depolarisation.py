@@ -197,6 +197,7 @@ def test_noise_of_a_simulated_depolarisation():
         pl.simulate(pl.Scene(pl.Layer(1.46, 100.0), "Si"), depolarisation_noise=0.0)
 
 
+@pytest.mark.slow  # compiles a fit for 9 s
 def test_effects_depolarise(ranked, measured):
     """A bandwidth that the scene leaves out, against a simulation that has it: of its own size, times the
     root mean square of a half-normal prior on the variance."""

@@ -42,6 +42,7 @@ def fit() -> pl.Fit:
     return pl.fit(measured(), scene())
 
 
+@pytest.mark.slow  # fits of Mueller elements compile for 5 s
 def test_the_thickness_is_found_and_each_element_has_its_own_noise(fit):
     thickness, [part] = fit["thickness"], fit.parts
     assert fit.status == "converged"
@@ -53,6 +54,7 @@ def test_the_thickness_is_found_and_each_element_has_its_own_noise(fit):
     assert fit.rms == pytest.approx(np.sqrt(np.mean(NOISE**2)), rel=0.15)
 
 
+@pytest.mark.slow  # the same fit
 def test_records(fit, write):
     record = to_json(fit)["data"]
     assert (record["signal"], record["points"]) == ("mueller", 128)
@@ -64,18 +66,21 @@ def test_records(fit, write):
     np.testing.assert_allclose(back.sigma, fit.parts[0].curve.sigma, rtol=1e-9)
 
 
+@pytest.mark.slow  # the same fit
 def test_the_figure_has_a_panel_for_each_element(fit):
     panels = draw(fit).axes[:16]
     assert [i for i, panel in enumerate(panels) if len(panel.lines)] == [1, 5, 10, 11, 14]
     np.testing.assert_allclose(panels[1].lines[0].get_ydata(), fit.parts[0].data.values[:, 0])
 
 
+@pytest.mark.slow  # the same fit
 def test_a_wrong_index_is_a_misfit_and_compare_says_so(fit):
     wrong = pl.fit(measured(), scene(1.8))
     assert wrong.status == "misfit"
     assert compare({"right": fit, "wrong": wrong}).best.name == "right"
 
 
+@pytest.mark.slow  # the same fit
 def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():
     data = measured()
     signs = np.array([1, 1, 1, -1, -1])
@@ -86,6 +91,7 @@ def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():
     assert float(thickness) == pytest.approx(THICKNESS, abs=0.05)
 
 
+@pytest.mark.slow  # the same fit
 def test_a_given_sigma_for_each_element_is_absolute(fit):
     given = pl.fit(replace(measured(), sigma=np.tile(NOISE, (128, 1))), scene())
     assert given.parts[0].sigma_from == "given"

@@ -1,5 +1,6 @@
-"""`--jobs`: fits of several files in worker processes."""
+"""Ctrl-C, SIGTERM, and fits of several files in worker processes."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -10,7 +11,45 @@ from pathlib import Path
 
 import pytest
 
-from pellicle.cli.session import in_order
+from pellicle.cli.session import in_order, interruptible
+
+
+class _Callback:
+    """Python ignores what is raised in `__del__`, as in JAX's callback of the garbage collector."""
+
+    def __init__(self):
+        self.itself = self
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000):  # the signal is handled here
+            pass
+
+
+def _interrupted_in_a_callback():
+    _Callback()
+    gc.collect(0)  # the youngest objects; all of them take seconds
+    time.sleep(20)
+
+
+def _terminated():
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(20)
+
+
+def test_ctrl_c_in_a_callback_is_not_lost():
+    before = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        _interrupted_in_a_callback()
+    assert sys.unraisablehook is before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_sigterm_is_as_ctrl_c():
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        _terminated()
+    assert signal.getsignal(signal.SIGTERM) == before
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +128,7 @@ def process(task):
 """
 
 
+@pytest.mark.slow  # starts processes
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_workers_end_with_a_parent_that_is_killed(tmp_path):
     (tmp_path / "sleeper.py").write_text(_SLEEPER)
