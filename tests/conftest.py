@@ -137,6 +137,18 @@ def refusal():
     return refusal
 
 
+@pytest.fixture(scope="session")
+def refuses():
+    """Return `refuses(error, words, call, *arguments)`: a call raises it in a line with `words`."""
+
+    def refuses(error, words, call, *arguments, **named):
+        with pytest.raises(error, match=words) as caught:
+            call(*arguments, **named)
+        assert "\n" not in str(caught.value)
+
+    return refuses
+
+
 @pytest.fixture(scope="module")
 def browser():
     """A headless Chromium, which PELLICLE_BROWSER may name; skips where it or Playwright is absent."""

@@ -41,6 +41,5 @@ def test_plan_takes_a_film_or_a_surface():
         ("cost", FILM, {"directions": DIRECTIONS}, "`directions` has no meaning for a Scene"),
     ],
 )
-def test_arguments_of_the_other_kind_are_refused(verb, scene, arguments, message):
-    with pytest.raises(TypeError, match=message):
-        getattr(pl, verb)(scene, **arguments)
+def test_arguments_of_the_other_kind_are_refused(verb, scene, arguments, message, refuses):
+    refuses(TypeError, message, getattr(pl, verb), scene, **arguments)

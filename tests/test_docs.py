@@ -65,7 +65,7 @@ SLOW = (
     *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
     *each("pellicle chart docs/surfaces/figure_{}.toml", "4 5_low 5_high"),
     "pellicle chart measurements/recipes/gold_on_glass_12nm.toml",
-    "pellicle chart docs/cost/soap_film.toml --view",  # simulation/test_bubble.py: smaller ones
+    "pellicle chart docs/cost/soap_film.toml --view",  # simulation/test_film_sphere.py: smaller ones
     "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png",
     # compile twenty to forty programs, or fit with many solvers for minutes
     "pellicle cost docs/cost/soap_film.toml --out cost",
@@ -82,7 +82,7 @@ ELSEWHERE = (
     "make fits",  # test_fits.py: all of them in make slow
     *("make slow", "make coverage", "python -m pytest"),  # run these tests
     "make properties",  # properties: the same on thousands of scenes
-    "make fuzz",  # data/test_fuzz.py: a short run
+    "make fuzz",  # data/test_properties.py: a short run
     "make verdicts",  # test_verdicts.py: its model, cases and scores
     # install several GB; test_benchmarks.py needs no other package
     *("make peers", "python benchmarks/peers/agreement.py --stacks 1000"),

@@ -52,15 +52,14 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_every_writer_keeps_an_existing_file(tmp_path, name):
+def test_every_writer_keeps_an_existing_file(tmp_path, name, refuses):
     (tmp_path / name).write_text("mine")
-    with pytest.raises(UsageError, match=f"{name}: exists"):
-        WRITERS[name](tmp_path / name)
+    refuses(UsageError, f"{name}: exists", WRITERS[name], tmp_path / name)
     assert (tmp_path / name).read_text() == "mine"
     assert os.listdir(tmp_path) == [name]
 
 
-def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
+def test_a_file_that_appears_meanwhile_is_kept(tmp_path, refuses):
     target = tmp_path / "mine.csv"
 
     def write_while_another_does():
@@ -68,13 +67,12 @@ def test_a_file_that_appears_meanwhile_is_kept(tmp_path):
             temporary.write_text("theirs")
             target.write_text("mine")
 
-    with pytest.raises(UsageError, match="exists"):
-        write_while_another_does()
+    refuses(UsageError, "exists", write_while_another_does)
     assert target.read_text() == "mine"
     assert os.listdir(tmp_path) == ["mine.csv"]
 
 
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, write):
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, write, refuses):
     target = write("old", "figure.png")
 
     def fail_half_way():
@@ -83,17 +81,15 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path, write):
             temporary.write_text("ha")
             raise RuntimeError("half")
 
-    with pytest.raises(RuntimeError, match="half"):
-        fail_half_way()
+    refuses(RuntimeError, "half", fail_half_way)
     assert target.read_text() == "old"
     assert os.listdir(tmp_path) == ["figure.png"]
 
 
-def test_places_that_cannot_be_written(tmp_path):
+def test_places_that_cannot_be_written(tmp_path, refuses):
     with pytest.raises(UsageError, match=r"written \(there is no folder .*nowhere\); make it.*`path`"):
         write_text(tmp_path / "nowhere" / "a.txt", "")
-    with pytest.raises(UsageError, match="is a folder, not a file"):
-        write_text(tmp_path, "", overwrite=True)
+    refuses(UsageError, "is a folder, not a file", write_text, tmp_path, "", overwrite=True)
 
 
 def test_folders_that_are_new_or_empty_or_ours(tmp_path):
@@ -115,10 +111,9 @@ def test_folders_that_are_new_or_empty_or_ours(tmp_path):
         ("out", "mine", "out/deeper", "cannot be made .*"),
     ],
 )
-def test_files_of_others_are_no_folder(tmp_path, name, text, asked, words):
+def test_files_of_others_are_no_folder(tmp_path, name, text, asked, words, refuses):
     (tmp_path / name).write_text(text)
-    with pytest.raises(UsageError, match=words + "`folder`"):
-        new_folder(tmp_path / asked)
+    refuses(UsageError, words + "`folder`", new_folder, tmp_path / asked)
 
 
 def _stray(folder, process, name="figure", machine=None):

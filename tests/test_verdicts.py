@@ -211,7 +211,7 @@ def test_outcomes_and_failures(bench, group, value, status, outcome, failed):
     assert outcome in (None, answer.outcome)
 
 
-def test_table_goals_and_failures(bench):
+def test_table_goals_failures_and_changes(bench, tmp_path):
     scoring = bench["scoring"]
     answers = [
         made_up(bench, name="right", value=100.5),
@@ -236,16 +236,12 @@ def test_table_goals_and_failures(bench):
     assert "off | slit 2: outside; truth 100, answer 110 ± 1 nm (10 %), converged" in listed
     assert "Not usable." in listed
     assert "right |" not in listed
-
-
-def test_csv_and_changes(bench, tmp_path):
-    scoring = bench["scoring"]
-    old = [made_up(bench, group="clean", stderr_noise=0.25), made_up(bench, name="b", value=110.0)]
-    scoring.write_csv(old, tmp_path / "old.csv")
-    assert scoring.read_csv(tmp_path / "old.csv") == old
-    new = [made_up(bench, group="clean"), made_up(bench, name="b"), made_up(bench, name="c")]
-    lines = scoring.changes(new, old).splitlines()
-    assert lines[0].startswith("outside → within 1: b: truth 100, 110 ± 1 (converged) → 100 ± 1")
+    scoring.write_csv(answers, tmp_path / "old.csv")
+    assert scoring.read_csv(tmp_path / "old.csv") == answers
+    clean = made_up(bench, name="clean", group="clean", stderr_noise=1.0)
+    new = [clean, *(made_up(bench, name=x) for x in ("off", "new"))]
+    lines = scoring.changes(new, answers).splitlines()
+    assert lines[0].startswith("outside → within 1: off: truth 100, 110 ± 1 (converged) → 100 ± 1")
     assert lines[1] == "1 of 2 outcomes changed, 1 cases are new"
     assert lines[2] == "clean: stderr_noise is 2.00 times the former one (median)"
 

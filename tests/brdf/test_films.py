@@ -158,6 +158,5 @@ def test_presets_are_complete(name):
     assert set(parameters) == {p.key for p in model(which).parameters}
 
 
-def test_an_unknown_name_suggests_the_nearest():
-    with pytest.raises(ValueError, match="did you mean 'microfacet-film'"):
-        model("microfacet-fil")
+def test_an_unknown_name_suggests_the_nearest(refuses):
+    refuses(ValueError, "did you mean 'microfacet-film'", model, "microfacet-fil")

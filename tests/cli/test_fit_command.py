@@ -161,17 +161,14 @@ def test_a_share_and_a_number_of_reflections():
 
 
 @pytest.mark.parametrize("word", ["rough", "taped"])
-def test_a_back_that_returns_nothing(word):
+def test_a_back_that_returns_nothing(word, refuses):
     assert substrate(back=word).back_collected == 0.0
-    with pytest.raises(UsageError, match="its transmittance is not simulated"):
-        substrate("T", back=word)
-    with pytest.raises(UsageError, match="leave out `back_collected`"):
-        substrate(back=word, back_collected="0.5")
+    refuses(UsageError, "its transmittance is not simulated", substrate, "T", back=word)
+    refuses(UsageError, "leave out `back_collected`", substrate, back=word, back_collected="0.5")
 
 
-def test_a_share_needs_a_back():
-    with pytest.raises(UsageError, match="`back_collected` needs the medium behind the plate"):
-        substrate(back_collected="0.5")
+def test_a_share_needs_a_back(refuses):
+    refuses(UsageError, "`back_collected` needs the medium behind the plate", substrate, back_collected="0.5")
 
 
 @pytest.fixture

@@ -61,7 +61,7 @@ def repeated(pellicle, recipe, out):
     return ran.err
 
 
-@pytest.mark.parametrize(("unit", "scale"), [("", 1), (" (%)", 100)])
+@pytest.mark.parametrize(("unit", "scale"), [("", 1), pytest.param(" (%)", 100, marks=pytest.mark.slow)])
 def test_a_reflectance_relative_to_a_stack_of_known_layers(pellicle, tmp_path, write, unit, scale):
     """At 500 nm it is above 2: the oxide of the reference is antireflecting there."""
     nm = np.linspace(450.0, 850.0, 100)

@@ -85,10 +85,13 @@ def beside(files, write, scene_recipe):
     return lambda own="": scene_recipe(BOTH.format("e.csv") + own, substrate="Si", end=end)
 
 
-def test_ellipsometry_leaves_out_the_scale_of_all_and_has_none_of_its_own(pellicle, beside, asked):
+def test_ellipsometry_leaves_out_the_scale_of_all(pellicle, beside, asked):
     pellicle("fit", "--recipe", beside())
     [(_, scenes)] = asked
     assert [s.instrument.scale for s in scenes] == [Drift(0), 1.0]
+
+
+def test_ellipsometry_has_no_scale_of_its_own(pellicle, beside):
     ran = pellicle("fit", "--recipe", beside("instrument = { scale = 1.1 }"))
     ran.refused(3, "e.csv: ellipsometry has no scale and no offset")
 

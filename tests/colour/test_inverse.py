@@ -136,6 +136,5 @@ def test_an_image_is_its_pixels(table):
         ({"angle": [0.0, 30.0]}, "2, 3"),
     ],
 )
-def test_refusals(table, given, words):
-    with pytest.raises(ValueError, match=words):
-        invert(table, **({"colours": [0.2, 0.3, 0.4]} | given))
+def test_refusals(table, given, words, refuses):
+    refuses(ValueError, words, invert, table, **{"colours": [0.2, 0.3, 0.4]} | given)

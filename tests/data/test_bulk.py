@@ -60,10 +60,9 @@ def test_as_the_reader_of_lines(write, monkeypatch, large, with_pandas, delimite
         (f"\n{NM[300]},", f"\n\n{NM[299]},", "line 303, column 'wavelength_nm': .* repeats .* of line 301"),
     ],
 )
-def test_an_error_far_down_is_named(write, large, old, new, said):
+def test_an_error_far_down_is_named(write, large, old, new, said, refuses):
     path = write(text().replace(old, new, 1))
-    with pytest.raises(DataError, match=said):
-        read_spectrum(path)
+    refuses(DataError, said, read_spectrum, path)
 
 
 def test_a_trailer_and_comments_are_left_to_the_reader_of_lines(write, large):

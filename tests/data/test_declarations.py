@@ -1,7 +1,5 @@
 """What a file declares above its rows: axis, quantity and unit, and several spectra beside each other."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -9,12 +7,6 @@ import pellicle as pl
 from pellicle.data.read_spectrum import read_spectra, read_spectrum
 from pellicle.errors import DataError, UsageError
 from tests.data.tables import assert_read
-
-
-@pytest.fixture
-def refused(refusal):
-    return partial(refusal, read_spectrum)
-
 
 AXES = ["XUNITS=1/CM", "X-Axis: cm-1", "Wavelength unit; 1/cm", '"x unit","cm^-1"']
 
@@ -37,7 +29,7 @@ def test_axis_and_absorbance_of_a_preamble(write, axis, quantity):
     ],
 )
 def test_a_contradiction(write, refused, text, flags, parts):
-    refused(write(text), DataError, *parts, **flags)
+    refused(text, *parts, error=DataError, **flags)
 
 
 def test_log_of_the_inverse_reflectance(write):
@@ -55,7 +47,7 @@ def test_error_of_an_absorbance(write):
 
 @pytest.mark.parametrize("name", ["T (Abs)", "R (abs.)"])
 def test_absolute_or_absorbance(write, refused, name):
-    refused(write(f"nm,{name}\n400,0.1\n500,0.2\n"), DataError, "unit 'abs", '`signal_unit="absorbance"`')
+    refused(f"nm,{name}\n400,0.1\n500,0.2\n", "unit 'abs", '`signal_unit="absorbance"`', error=DataError)
 
 
 WIDE = "Wavelength (nm),film a,film b,film c\n400,10,20,30\n500,11,21,31\n"
@@ -63,8 +55,8 @@ WIDE = "Wavelength (nm),film a,film b,film c\n400,10,20,30\n500,11,21,31\n"
 
 def test_several_samples_beside_each_other(write, refused):
     path = write(WIDE)
-    refused(path, UsageError, "'film a', 'film b', 'film c'", '`spectrum="film a"`', signal="R")
-    refused(path, UsageError, "no spectrum 'film d'", "'film a'", signal="R", spectrum="film d")
+    refused(path, "'film a', 'film b', 'film c'", '`spectrum="film a"`', signal="R", error=UsageError)
+    refused(path, "no spectrum 'film d'", "'film a'", signal="R", spectrum="film d", error=UsageError)
     one = read_spectrum(path, signal="R", signal_unit="percent", spectrum="Film B")
     np.testing.assert_allclose(one.values, [0.2, 0.21])
     every = pl.read_spectra(path, signal="R", signal_unit="percent", spectrum="all")
@@ -74,7 +66,7 @@ def test_several_samples_beside_each_other(write, refused):
 
 def test_ellipsometry_with_reflectances_is_of_one_film(write, refused):
     path = write("nm,psi,delta,Rs,Rp\n400,20,170,0.3,0.1\n500,21,160,0.3,0.1\n")
-    refused(path, UsageError, "psi and delta as well as R", "`signal`")
+    refused(path, "psi and delta as well as R", "`signal`", read=read_spectrum, error=UsageError)
     assert [spectrum.signal for spectrum in read_spectra(path)] == ["psi-delta", "R", "R"]
     assert [spectrum.name for spectrum in read_spectra(path)] == ["psi-delta", "Rs", "Rp"]
     assert read_spectrum(path, signal="psi-delta").delta is not None
@@ -96,14 +88,13 @@ def test_facts(write):
         ("Polarizer: none\nIncident angle: 0\n", 0, "unpolarised"),
     ],
 )
-def test_declared_angle_and_polarisation(write, head, angle, polarisation):
+def test_declared_angle_and_polarisation(write, head, angle, polarisation, refuses):
     path = write(f"{head}nm;R\n400;0,5\n500;0,6\n", "oblique.csv")
     spectrum = read_spectrum(path)
     assert_read(spectrum, polarisation=polarisation, angle=[angle, angle])
     assert any("as the file declares" in note for note in spectrum.notes)
     other = "s" if polarisation == "p" else "p"
-    with pytest.raises(UsageError, match=f"declares {polarisation} light"):
-        read_spectrum(path, polarisation=other)
+    refuses(UsageError, f"declares {polarisation} light", read_spectrum, path, polarisation=other)
 
 
 @pytest.mark.parametrize("line", ["Angle: front", "Polarizer angle: 45", "Polarization: 30", "AOI: 120-140"])

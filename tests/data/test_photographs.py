@@ -108,7 +108,7 @@ def test_what_is_no_photograph_is_refused(tmp_path, refusal, case):
     refusal(read_photograph, write(tmp_path), DataError, reason)
 
 
-def test_regions_and_points(tmp_path):
+def test_regions_and_points(tmp_path, refuses):
     photograph = read_photograph(by_pillow(tmp_path / "a.png"))
     one, two = parse_regions("2,3,4,5; 0,0,1,1")
     assert parse_regions([[2, 3, 4, 5], [0, 0, 1, 1]]) == [one, two]
@@ -116,25 +116,21 @@ def test_regions_and_points(tmp_path):
     np.testing.assert_allclose(one.pixels(photograph), PIXELS[3:8, 2:6].reshape(-1, 3) / 255, atol=1e-7)
     assert parse_points("0,0;10,6", photograph) == [Region(0, 0, 3, 3), Region(8, 4, 5, 5)]
     for wrong in ("1,2,3", "1,2,a,4", "", "1.5,2,3,4"):
-        with pytest.raises(UsageError, match="region"):
-            parse_regions(wrong)
+        refuses(UsageError, "region", parse_regions, wrong)
     for region in (Region(18, 0, 3, 1), Region(-1, 0, 3, 1), Region(0, 0, 0, 1)):
-        with pytest.raises(UsageError, match="`region`"):
-            region.pixels(photograph)
-    with pytest.raises(UsageError, match="20 by 12"):
-        parse_points("20,0", photograph)
+        refuses(UsageError, "`region`", region.pixels, photograph)
+    refuses(UsageError, "20 by 12", parse_points, "20,0", photograph)
 
 
-def test_messages_on_damaged_and_transparent_photographs(tmp_path):
+def test_messages_on_damaged_and_transparent_photographs(tmp_path, refuses):
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\nrubbish")
-    with pytest.raises(DataError, match=r"cannot identify image file\)"):
-        read_photograph(tmp_path / "a.png")
+    refuses(DataError, r"cannot identify image file\)", read_photograph, tmp_path / "a.png")
     clear = np.dstack([PIXELS, np.zeros((12, 20), np.uint8)])
     with pytest.raises(DataError, match="100 % of its pixels are transparent"):
         read_photograph(by_pillow(tmp_path / "b.png", clear))
 
 
-def test_a_strip_follows_its_line(tmp_path):
+def test_a_strip_follows_its_line(tmp_path, refuses):
     row, column = np.mgrid[:30, :40]
     gradient = np.stack([6 * column, 8 * row, 0 * row], axis=-1).astype(np.uint8)
     photograph = read_photograph(by_pillow(tmp_path / "a.png", gradient))
@@ -149,5 +145,4 @@ def test_a_strip_follows_its_line(tmp_path):
     np.testing.assert_allclose(mean[middle, 0], 180 * fraction[middle], atol=6)
     np.testing.assert_allclose(mean[middle, 1], 232 * fraction[middle], atol=8)
     for wrong in ("5,5,5,5", "0,0,40,0", "1,2,3"):
-        with pytest.raises(UsageError, match="strip"):
-            strip(photograph, wrong)
+        refuses(UsageError, "strip", strip, photograph, wrong)

@@ -86,9 +86,8 @@ def test_what_is_damaged_or_unclear_is_refused(write, refusal, text, options, er
     refusal(read_colour_rows, write(text), error, *parts, **options)
 
 
-def test_a_unit_that_is_none(write):
-    with pytest.raises(UsageError, match="signal_unit"):
-        read_colour_rows(write("R,G,B\n0.1,0.2,0.3\n"), unit="od")
+def test_a_unit_that_is_none(write, refuses):
+    refuses(UsageError, "signal_unit", read_colour_rows, write("R,G,B\n0.1,0.2,0.3\n"), unit="od")
 
 
 def test_named_columns_replace_the_header(write):
@@ -257,9 +256,8 @@ def test_a_camera_by_its_chart(tmp_path):
         ({"signal": "srgb"}, UsageError, "R or T"),
     ],
 )
-def test_what_does_not_go_together(camera, options, error, reason):
-    with pytest.raises(error, match=reason):
-        read_colours(camera[0] / "c.csv", **options)
+def test_what_does_not_go_together(camera, options, error, reason, refuses):
+    refuses(error, reason, read_colours, camera[0] / "c.csv", **options)
 
 
 @pytest.mark.parametrize(
@@ -273,6 +271,5 @@ def test_what_does_not_go_together(camera, options, error, reason):
         ({"region": "1,1,2,2", "columns": "R,G,B"}, "leave `columns`"),
     ],
 )
-def test_what_a_photograph_needs(photo, options, reason):
-    with pytest.raises(UsageError, match=reason):
-        read_colours(photo(), **options)
+def test_what_a_photograph_needs(photo, options, reason, refuses):
+    refuses(UsageError, reason, read_colours, photo(), **options)

@@ -123,17 +123,15 @@ def test_sweeps_of_raw_counts(write):
     np.testing.assert_allclose(found.sigma, 0.002 / np.sqrt(2))
 
 
-def test_a_mean_needs_equal_points():
+def test_a_mean_needs_equal_points(refuses):
     one = pl.Spectrum(NM, LEVELS, "R")
-    with pytest.raises(UsageError, match="two sweeps or more"):
-        mean_spectrum([one])
+    refuses(UsageError, "two sweeps or more", mean_spectrum, [one])
     for other, name in (
         (pl.Spectrum(NM + 1, LEVELS, "R"), "wavelength"),
         (pl.Spectrum(NM, LEVELS, "T"), "signal"),
         (pl.Spectrum(NM, LEVELS, "R", angle=np.full(NM.size, 30.0)), "angle"),
     ):
-        with pytest.raises(UsageError, match=f"the same {name}"):
-            mean_spectrum([one, other])
+        refuses(UsageError, f"the same {name}", mean_spectrum, [one, other])
 
 
 def test_sweep_numbers_count_earlier_rows():

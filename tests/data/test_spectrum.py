@@ -157,9 +157,8 @@ def test_a_noise_is_a_number_or_a_share(given, value, relative):
 
 
 @pytest.mark.parametrize("wrong", [0, -1, "-2 %", "two", "%", "nan", "inf", ""])
-def test_a_wrong_noise_is_refused(wrong):
-    with pytest.raises(UsageError, match="--noise must be a standard deviation above zero"):
-        noise_level(wrong, "--noise")
+def test_a_wrong_noise_is_refused(wrong, refuses):
+    refuses(UsageError, "--noise must be a standard deviation above zero", noise_level, wrong, "--noise")
 
 
 def test_a_share_of_the_signal():
@@ -169,10 +168,9 @@ def test_a_share_of_the_signal():
     assert data.relative == (0.1, 0.1, 0.1)
 
 
-def test_a_noise_for_each_channel():
+def test_a_noise_for_each_channel(refuses):
     data = RGB.with_noise(["10 %", 0.5, "1 %"])
     np.testing.assert_allclose(data.sigma[1], [1.0, 0.5, 0.4])
     assert data.relative == (0.1, 0.0, 0.01)
     assert RGB.with_noise(0.5).relative is None
-    with pytest.raises(UsageError, match="2 numbers for 3 channels"):
-        RGB.with_noise([0.1, 0.2])
+    refuses(UsageError, "2 numbers for 3 channels", RGB.with_noise, [0.1, 0.2])

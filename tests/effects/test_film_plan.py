@@ -141,9 +141,8 @@ def test_single_precision_is_single_throughout():
 
 
 @pytest.mark.parametrize("tolerance", [-1e-3, np.nan, np.inf])
-def test_a_tolerance_that_is_none_is_refused(tolerance):
-    with pytest.raises(ValueError, match="the tolerance must be positive"):
-        pl.plan(OVER_GOLD, tolerance)
+def test_a_tolerance_that_is_none_is_refused(tolerance, refuses):
+    refuses(ValueError, "the tolerance must be positive", pl.plan, OVER_GOLD, tolerance)
 
 
 @pytest.mark.slow

@@ -227,12 +227,11 @@ def test_data_without_an_angle_need_one(session):
     assert "a.csv: states no angle of incidence, and the scene has 65°, 70°, 75°" in answer["error"]
 
 
-def test_a_free_angle_cannot_stand_for_several():
+def test_a_free_angle_cannot_stand_for_several(refuses):
     session = Session(pl.Scene(pl.Layer(1.7, 100.0), 3.9, light=pl.Light(angle=pl.Free(60, 70))))
     answer = session.answer("data", {"name": "a.csv", "text": csv(measured((60.0, 65.0), NM))})
     assert "one free angle cannot stand for them" in answer["error"]
-    with pytest.raises(pl.errors.UsageError, match="which is free"):
-        Session(session.view.scene, wavelength=[500.0])
+    refuses(pl.errors.UsageError, "which is free", Session, session.view.scene, wavelength=[500.0])
 
 
 def test_angles_of_each_wavelength():

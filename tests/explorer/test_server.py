@@ -97,7 +97,6 @@ def test_requests_are_posted(client):
 
 
 @pytest.mark.parametrize("port", [80_000, -1])
-def test_a_port_that_cannot_be_opened_is_named(port):
+def test_a_port_that_cannot_be_opened_is_named(port, refuses):
     session = Session(pl.Scene(pl.Layer("SiO2", 100.0), "Si"))
-    with pytest.raises(ValueError, match=f"port {port} cannot be opened"):
-        server.serve(session, port)
+    refuses(ValueError, f"port {port} cannot be opened", server.serve, session, port)

@@ -50,13 +50,11 @@ def test_shared_numbers_are_one_and_errors_combine():
     assert {"brdf-1", "R"} == {part.name for part in fit.parts}
 
 
-def test_data_and_scenes_must_match():
+def test_data_and_scenes_must_match(refuses):
     white = np.full((1, 3), 0.5)
     colours = Colours(white, (np.array([500.0, 600.0]), np.full((2, 3), 0.5)))
     own = apart([spectrum(), samples(), colours], [SCENE, SURFACE, SCENE])
     assert (len(own.films), len(own.samples)) == (2, 1)
-    with pytest.raises(UsageError, match="as many scenes"):
-        apart([spectrum(), samples()], [SURFACE, SCENE])
+    refuses(UsageError, "as many scenes", apart, [spectrum(), samples()], [SURFACE, SCENE])
     other = dataclasses.replace(SURFACE)
-    with pytest.raises(UsageError, match="one Surface"):
-        apart([samples(), samples(), spectrum()], [SURFACE, other, SCENE])
+    refuses(UsageError, "one Surface", apart, [samples(), samples(), spectrum()], [SURFACE, other, SCENE])

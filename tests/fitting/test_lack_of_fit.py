@@ -60,6 +60,7 @@ def test_verdicts(error, drift, words):
     assert words in found.verdict
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_a_fit_reports_it():
     """A fit of sweeps is the fit of their mean, and says how they scatter."""
     scene, truth = (pl.Scene(pl.Layer(1.46, d), "Si") for d in (pl.Free(250, 350), 300.0))

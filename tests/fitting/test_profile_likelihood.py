@@ -96,6 +96,7 @@ def test_an_interval_by_profile_is_that_of_a_scan(film, measured):
     )
 
 
+@pytest.mark.slow  # compiles a scene of its own
 @pytest.mark.parametrize(("rise", "status"), [(7.5, "not-identifiable"), (40.0, "converged")])
 def test_a_plateau_within_reach_of_noise_is_open(film, rise, status):
     """An absorbing film of 250 nm, of which any thicker one differs by `rise` in χ²: among so many

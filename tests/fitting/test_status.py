@@ -32,7 +32,12 @@ REAL = {
 }
 
 
-@pytest.mark.parametrize("name", REAL)
+OWN = pytest.mark.slow(reason="compiles a scene of its own")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=OWN) if x in ("bound of n", "nothing seen") else x for x in REAL]
+)
 def test_a_real_fit_of_each_status(film, measured, monkeypatch, name):
     seen, thickness, fitted, settles, status, words = REAL[name]
     polish = minima.polish

@@ -29,7 +29,10 @@ SCENES = {
     "plate, oblique transmittance": scene(substrate=PLATE, angle=50.0, signal="T"),
     "an angle for each wavelength": scene(angle=np.linspace(0, 60, 9)),
 }
-EVERY_SCENE = pytest.mark.parametrize("name", SCENES)
+QUICK = ("transparent, oblique", "absorbing", "tunnelling layer", "plate, oblique transmittance")
+EVERY_SCENE = pytest.mark.parametrize(
+    "name", [x if x in QUICK else pytest.param(x, marks=pytest.mark.slow) for x in SCENES]
+)
 
 
 def everything(thing):

@@ -53,6 +53,7 @@ def computed():
     return jax.tree.map(np.asarray, both(*arguments))
 
 
+@pytest.mark.slow  # compiles for 20 s; optics/test_gradient.py: closed forms
 @pytest.mark.parametrize("name", TABLE["rows"])
 def test_a_graded_layer_and_its_slopes(name):
     row, position = TABLE["rows"][name], [*TABLE["rows"]].index(name)

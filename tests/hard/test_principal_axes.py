@@ -98,7 +98,7 @@ def test_equal_indices_are_an_isotropic_medium_to_the_last_digits():
         angle, phase = jnp.linspace(0.0, 1.57, 64), jnp.linspace(0.0, 20.0, 64)
         layer, below = Pair(jnp.array(1.8), jnp.array(0.01)), Pair(jnp.array(3.9), jnp.array(0.02))
         equal = [Principal(n, n, n) for n in (layer, below)]
-        for count in (1, 2, 4):
+        for count in (1, 3):
             own = responses(1.0, [equal[0]] * count, equal[1], [phase] * count, angle)
             isotropic = responses(1.0, [layer] * count, below, [phase] * count, angle)
             for a, b in zip(own, isotropic, strict=True):

@@ -219,9 +219,8 @@ def test_sites_of_a_wafer_and_frames_in_time():
     assert right(alone, film[:, 0]).all()
 
 
-def test_maps_without_coordinates_or_minima_are_refused():
+def test_maps_without_coordinates_or_minima_are_refused(refuses):
     sites = constructed(np.full(400, 600.0), np.zeros(400, bool), dims=("site",))
     bare = xr.Dataset({"status": (("y", "x"), np.zeros((2, 2), np.uint8))})
     for dataset, words in ((sites, "coordinates"), (bare, "minima")):
-        with pytest.raises(UsageError, match=words):
-            decided_by_neighbours(dataset)
+        refuses(UsageError, words, decided_by_neighbours, dataset)

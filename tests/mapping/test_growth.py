@@ -116,7 +116,7 @@ def test_units_of_time():
         assert made.item() == pytest.approx(rate)
 
 
-def test_maps_that_have_no_rates_are_refused():
+def test_maps_that_have_no_rates_are_refused(refuses):
     time, value = np.arange(4.0), np.ones((4, 1))
     for dataset, words, options in (
         (series(value, time).isel(time=slice(2)), "three times", {}),
@@ -126,5 +126,4 @@ def test_maps_that_have_no_rates_are_refused():
         (series(value, time).drop_vars("thickness_stderr_noise"), "standard error", {}),
         (series(value, time), "window", {"window": 2}),
     ):
-        with pytest.raises(UsageError, match=words):
-            growth(dataset, **options)
+        refuses(UsageError, words, growth, dataset, **options)

@@ -204,9 +204,8 @@ def test_rivals_are_all_minima_of_the_deviance():
             assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
 
 
-def test_a_cube_without_data_is_refused():
-    with pytest.raises(DataError, match="no pixel has data"):
-        prepare(cube_of(np.full((4, 100), np.nan), None), OXIDE)
+def test_a_cube_without_data_is_refused(refuses):
+    refuses(DataError, "no pixel has data", prepare, cube_of(np.full((4, 100), np.nan), None), OXIDE)
 
 
 def test_effects_share_the_unchanged_signal():

@@ -76,14 +76,13 @@ def test_values_and_attributes_of_every_pixel(mapped, cube):
     assert (made.run.pixels, made.run.earlier) == (45 * 32, 0)
 
 
-def test_netcdf_has_the_same_values_and_flags(mapped, tmp_path):
+def test_netcdf_has_the_same_values_and_flags(mapped, tmp_path, refuses):
     made = mapped()
     made.to_netcdf(tmp_path / "map.nc")
     with xarray.open_dataset(tmp_path / "map.nc", engine="h5netcdf") as copy:
         xarray.testing.assert_equal(copy.load(), made.dataset.compute())
         assert copy.status.attrs["flag_values"].dtype == np.uint8
-    with pytest.raises(UsageError, match="is not overwritten"):
-        made.to_netcdf(tmp_path / "map.nc")
+    refuses(UsageError, "is not overwritten", made.to_netcdf, tmp_path / "map.nc")
 
 
 def test_a_killed_map_goes_on_and_is_equal(mapped, fake_fits, same_files, tmp_path):
@@ -119,18 +118,17 @@ def test_a_block_that_was_being_written_is_written_again(mapped, same_files, mon
     same_files(whole.path, mapped().path)
 
 
-def test_a_finished_map_is_not_fitted_again(mapped, fake_fits):
+def test_a_finished_map_is_not_fitted_again(mapped, fake_fits, refuses):
     mapped()
     again = counted(fake_fits.fit)
     made = mapped(fit=again)
     assert again.blocks == 0
     assert (made.run.pixels, made.run.earlier) == (0, 45 * 32)
-    with pytest.raises(UsageError, match="exists; leave `resume=False` out"):
-        mapped(resume=False)
+    refuses(UsageError, "exists; leave `resume=False` out", mapped, resume=False)
 
 
 @pytest.mark.slow
-def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube):
+def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube, refuses):
     mapped()
     other = dataclasses.replace(cube, arrays={"values": cube.arrays["values"] + 1e-9})
     masked = dataclasses.replace(cube, mask=None)
@@ -139,10 +137,8 @@ def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube):
         "is of another input": {"the_cube": other},
         "is of another scene": {"the_scene": scene},
     }.items():
-        with pytest.raises(UsageError, match=rf"{word}.*`overwrite=True`"):
-            mapped(**changes)
-    with pytest.raises(UsageError, match="another input"):
-        mapped(the_cube=masked)
+        refuses(UsageError, rf"{word}.*`overwrite=True`", mapped, **changes)
+    refuses(UsageError, "another input", mapped, the_cube=masked)
     assert mapped(the_cube=other, overwrite=True).run.pixels == 45 * 32
 
 
@@ -160,7 +156,7 @@ def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
     assert mapped(overwrite=True).finished
 
 
-def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, same_files, monkeypatch):
+def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, same_files, monkeypatch, refuses):
     whole, write, blocks = mapped("whole.zarr"), zarr.Array.__setitem__, itertools.count()
 
     def full(array, where, values):
@@ -169,21 +165,18 @@ def test_a_full_disk_is_one_sentence_and_loses_nothing(mapped, same_files, monke
         write(array, where, values)
 
     monkeypatch.setattr(zarr.Array, "__setitem__", full)
-    with pytest.raises(DataError, match=r"map.zarr: cannot be written \(No space left.*make room"):
-        mapped()
+    refuses(DataError, r"map.zarr: cannot be written \(No space left.*make room", mapped)
     monkeypatch.setattr(zarr.Array, "__setitem__", write)
     same_files(whole.path, mapped().path)
 
 
-def test_files_of_a_user_stay(mapped, tmp_path):
+def test_files_of_a_user_stay(mapped, tmp_path, refuses):
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes/notes.txt").write_text("mine")
     zarr.create_group(tmp_path / "group.zarr", attributes={"title": "mine"})
     for name in ("notes", "group.zarr"):
-        with pytest.raises(UsageError, match="is no map of pellicle"):
-            mapped(name, overwrite=True)
-    with pytest.raises(DataError, match="holds no map"):
-        Map(tmp_path / "group.zarr")
+        refuses(UsageError, "is no map of pellicle", mapped, name, overwrite=True)
+    refuses(DataError, "holds no map", Map, tmp_path / "group.zarr")
 
 
 def test_a_cube_with_a_fingerprint_is_not_read_for_it(mapped, cube):
@@ -213,11 +206,10 @@ def test_sites_of_a_table_have_their_coordinates(mapped, cube):
     made.to_netcdf(made.path.with_name("sites.nc"))
 
 
-def test_without_zarr_the_message_names_the_extra(monkeypatch, tmp_path):
+def test_without_zarr_the_message_names_the_extra(monkeypatch, tmp_path, refuses):
     """`pl.Map` loads without the packages of the extra `maps`, as every public name does."""
     monkeypatch.setitem(sys.modules, "zarr", None)
-    with pytest.raises(UsageError, match=r"need zarr: pip install 'pellicle\[maps\]'"):
-        Map(tmp_path / "map.zarr")
+    refuses(UsageError, r"need zarr: pip install 'pellicle\[maps\]'", Map, tmp_path / "map.zarr")
 
 
 def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):

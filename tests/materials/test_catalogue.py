@@ -223,10 +223,9 @@ def test_chemical_names(words, formula):
 
 
 @pytest.mark.parametrize("name", ["", "   ", "/", "a/b/c/d", "qqqqqq"])
-def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch):
+def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch, refuses):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(DataError, match=r"pellicle materials|is a folder"):
-        material(name)
+    refuses(DataError, r"pellicle materials|is a folder", material, name)
 
 
 class TestWithoutIndicio:
@@ -235,13 +234,11 @@ class TestWithoutIndicio:
         monkeypatch.setattr(catalogue_module.importlib.util, "find_spec", lambda name: None)
 
     @pytest.mark.parametrize("name", ["Te", "Te/Ciesielski", "main/Te/Ciesielski"])
-    def test_the_error_says_what_to_install(self, name):
-        with pytest.raises(UnknownMaterial, match=r"pip install 'pellicle\[catalogue\]'"):
-            material(name)
+    def test_the_error_says_what_to_install(self, name, refuses):
+        refuses(UnknownMaterial, r"pip install 'pellicle\[catalogue\]'", material, name)
 
-    def test_a_misspelt_page_is_still_suggested(self):
-        with pytest.raises(UnknownMaterial, match="Au/Johnson"):
-            material("Au/Jonson")
+    def test_a_misspelt_page_is_still_suggested(self, refuses):
+        refuses(UnknownMaterial, "Au/Johnson", material, "Au/Jonson")
 
 
 class TestWithIndicio:
@@ -266,14 +263,11 @@ class TestWithIndicio:
         nm = np.linspace(500, 1500, 64)
         np.testing.assert_allclose(theirs.dispersion(nm), ours(nm), atol=3e-6)
 
-    def test_a_misspelt_page_is_answered_with_its_neighbour(self):
-        with pytest.raises(UnknownMaterial, match="did you mean Te/Ciesielski"):
-            material("Te/Ciesielsky")
+    def test_a_misspelt_page_is_answered_with_its_neighbour(self, refuses):
+        refuses(UnknownMaterial, "did you mean Te/Ciesielski", material, "Te/Ciesielsky")
 
-    def test_a_book_alone_lists_its_pages(self):
-        with pytest.raises(UnknownMaterial, match="pages of that book are main/Te/"):
-            material("Te")
+    def test_a_book_alone_lists_its_pages(self, refuses):
+        refuses(UnknownMaterial, "pages of that book are main/Te/", material, "Te")
 
-    def test_a_page_of_k_alone_is_refused(self):
-        with pytest.raises(DataError, match="k without n"):
-            material("main/BaF2/Bosomworth-200K")
+    def test_a_page_of_k_alone_is_refused(self, refuses):
+        refuses(DataError, "k without n", material, "main/BaF2/Bosomworth-200K")

@@ -1,7 +1,9 @@
-"""The range check, and finding materials inside larger things."""
+"""The range check, published indices, and finding materials inside larger things."""
 
+import csv
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,9 +47,8 @@ def test_both_parts_are_nan_outside_whatever_the_dispersion():
     assert np.isnan(value.re).tolist() == np.isnan(value.im).tolist() == [True, False, True]
 
 
-def test_a_wavelength_that_is_not_a_number_is_outside():
-    with pytest.raises(ValueError, match="not at nan nm"):
-        material("Si").check_range([math.nan])
+def test_a_wavelength_that_is_not_a_number_is_outside(refuses):
+    refuses(ValueError, "not at nan nm", material("Si").check_range, [math.nan])
 
 
 def test_materials_in_a_tree():
@@ -83,3 +84,19 @@ def test_another_form_of_a_material_is_no_remedy_for_its_range():
     with pytest.raises(DataError) as caught:  # alumina is known from 300 nm
         material("alumina").check_range([280, 500])
     assert "Malitson" not in str(caught.value)
+
+
+ROWS = Path(__file__).with_name("published_indices.csv").read_text("utf-8").splitlines()
+PUBLISHED = list(csv.DictReader(row for row in ROWS if not row.startswith("#")))
+
+
+@pytest.mark.parametrize("row", PUBLISHED, ids=[row["page"] for row in PUBLISHED])
+def test_an_index_agrees_with_a_published_one(row):
+    nm, n, k, tolerance = (float(row[name]) for name in ("wavelength_nm", "n", "k", "tolerance"))
+    assert abs(complex(material(row["page"])(nm)) - complex(n, k)) < tolerance, row["source"]
+
+
+def test_galena_reflects_as_the_mineral():
+    """42.1 % at 589 nm in air: Criddle and Stanley, Quantitative Data File for Ore Minerals."""
+    n = complex(material("PbS")(589.0))
+    assert abs((n - 1) / (n + 1)) ** 2 == pytest.approx(0.421, abs=0.015)

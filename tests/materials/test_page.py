@@ -65,9 +65,8 @@ def test_zero_k_beside_a_formula_is_transparent_but_known():
         ([FORMULA, {"type": "tabulated k", "data": "3.0 0.1\n4.0 0.1\n"}], "do not overlap"),
     ],
 )
-def test_what_is_no_index_is_refused(blocks, words):
-    with pytest.raises(DataError, match=words):
-        contents(page(*blocks))
+def test_what_is_no_index_is_refused(blocks, words, refuses):
+    refuses(DataError, words, contents, page(*blocks))
 
 
 def test_yaml():

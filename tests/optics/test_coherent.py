@@ -72,6 +72,5 @@ def test_agrees_with_tmm(count):
             assert float(response.transmittance(result)) == pytest.approx(truth["T"], rel=1e-11, abs=1e-14)
 
 
-def test_a_thickness_is_required_for_each_layer():
-    with pytest.raises(ValueError, match="one for each of 2 layers"):
-        pl.reflectance(WAVELENGTH, [100.0], [1.46, 2.3], 1.5)
+def test_a_thickness_is_required_for_each_layer(refuses):
+    refuses(ValueError, "one for each of 2 layers", pl.reflectance, WAVELENGTH, [100.0], [1.46, 2.3], 1.5)

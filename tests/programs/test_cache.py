@@ -181,14 +181,13 @@ def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_pr
 
 
 @pytest.mark.parametrize("cached", [True, False])
-def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached):
+def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached, refuses):
     """XLA refuses an option that it does not have."""
     monkeypatch.setattr(program_cache, "compiler_options", lambda: {"xla_of_another_version": True})
     if not cached:
         jax.config.update("jax_compilation_cache_dir", None)
     assert kept(plain_scaled, many_calls=True)(2, np.arange(4.0)).total == 12
-    with pytest.raises(jax.errors.JaxRuntimeError, match="xla_of_another_version"):
-        scaled(2, np.arange(5.0))
+    refuses(jax.errors.JaxRuntimeError, "xla_of_another_version", scaled, 2, np.arange(5.0))
 
 
 @pytest.mark.parametrize("owners", [False, True])

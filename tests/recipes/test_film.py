@@ -1,4 +1,6 @@
-"""Recipes: every form that the contract allows, and one telling sentence for what it does not."""
+"""Recipes: every form that the contract allows, uncertainties too, and one telling sentence for others."""
+
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ import pytest
 from pellicle.dispersion.empirical import Cauchy
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
+from pellicle.scene.layers import Uncertainty
 
 AT = np.array([500.0, 700.0])
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
@@ -206,3 +209,46 @@ def test_calibration_errors_as_parameters(scene, refused):
     assert found.instrument.wavelength_shift.start == 0
     refused(f"{head}{{ lower = 69, upper = 91 }}\n{end}", "must lie in 0 to 90 degrees, got 91")
     refused(f"{head}91\n{end}", "angle")
+
+
+MATERIAL = 'material = "SiO2"\n'
+SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer"]
+INSTRUMENT = [field.name for field in fields(Uncertainty) if field.name not in SAMPLE]
+
+
+@pytest.mark.parametrize("name", INSTRUMENT + SAMPLE)
+def test_an_uncertainty_replaces_the_usual_one(scene, name):
+    """All others stay usual, or none."""
+    line = f"{name}_uncertainty = 0.25\n"
+    if name in INSTRUMENT:
+        text = BASE + "[instrument]\n" + line
+    else:
+        text = BASE.replace("[scene]\n", "[scene]\n" + line)
+    assert scene(text).uncertainty == Uncertainty(**{name: 0.25})
+    nothing = text.replace("[scene]\n", '[scene]\nuncertainty = "none"\n')
+    usual = dict.fromkeys(INSTRUMENT + SAMPLE, 0.0)
+    assert scene(nothing).uncertainty == Uncertainty(**usual | {name: 0.25})
+
+
+def test_uncertainties_of_a_layer_and_the_substrate(scene):
+    text = BASE.replace('"Si"', '{ material = "Si", index_uncertainty = 0.001 }')
+    found = scene(text + "index_uncertainty = 0\n")
+    assert (found.layers[0].index_uncertainty, found.substrate.index_uncertainty) == (0, 0.001)
+    plain = scene(BASE)
+    assert plain.uncertainty == Uncertainty()
+    assert (plain.layers[0].index_uncertainty, plain.substrate.index_uncertainty) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (BASE + "[instrument]\nscale_uncertainty = -0.1\n", ("instrument.scale_uncertainty", "0")),
+        (BASE + "[instrument]\nscale_uncertainty = 'low'\n", ("instrument.scale_uncertainty", "'low'")),
+        (BASE + "[instrument]\nindex_uncertainty = 0.1\n", ("instrument.index_uncertainty",)),
+        (BASE + "index_uncertainty = -1\n", ("index_uncertainty", "0")),
+        (BASE.replace("[scene]\n", '[scene]\nuncertainty = "some"\n'), ("scene.uncertainty", "'some'")),
+        (BASE.replace(MATERIAL, 'between = "linear"\nindex_uncertainty = 0.1\n'), ("not go with between",)),
+    ],
+)
+def test_uncertainties_refused(refused, text, said):
+    refused(text, *said)

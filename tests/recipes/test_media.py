@@ -1,4 +1,4 @@
-"""Words of the command line and of recipes: media, free numbers, and the errors of wrong words."""
+"""Words of the command line and of recipes: media, constant and birefringent ones, and wrong words."""
 
 import re
 from pathlib import Path
@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Cauchy, Constant, Sellmeier, Shifted
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film.parameters import parameters
 from pellicle.recipes import media
 from pellicle.recipes.dispersion_models import MODELS, TERMS, build_model
 from pellicle.recipes.schema import MediumTable
@@ -39,9 +41,8 @@ def test_a_range_is_a_free_thickness_and_a_number_a_fixed_one():
         ("1:inf", "finite"),
     ],
 )
-def test_thickness_refused(text, message):
-    with pytest.raises(UsageError, match=message):
-        media.thickness(text)
+def test_thickness_refused(text, message, refuses):
+    refuses(UsageError, message, media.thickness, text)
 
 
 def test_numbers_are_media():
@@ -145,17 +146,15 @@ def test_freeing_a_table_adds_a_constant():
         ("SiO2", ["n=1.3:1.7"], "added to the index"),
     ],
 )
-def test_media_refused(layer, free, message):
-    with pytest.raises(UsageError, match=message):
-        media.medium(layer, free)
+def test_media_refused(layer, free, message, refuses):
+    refuses(UsageError, message, media.medium, layer, free)
 
 
-def test_scale_and_offset():
+def test_scale_and_offset(refuses):
     assert media.drift("free", "`scale`") == "free"
     assert media.drift("slow", "`scale`") == "slow"
     assert media.drift("0.98", "`scale`") == 0.98
-    with pytest.raises(UsageError, match="`scale` must be a number, not 'loose'"):
-        media.drift("loose", "`scale`")
+    refuses(UsageError, "`scale` must be a number, not 'loose'", media.drift, "loose", "`scale`")
 
 
 def test_free_or_a_number():
@@ -217,3 +216,106 @@ def test_a_shift_of_a_known_index_may_not_go_below_vacuum():
     least = float(np.real(media.medium("SiO2")(np.linspace(250.0, 1700.0, 200))).min())
     assert lower == pytest.approx(1 - least, abs=1e-3)
     assert upper == 2.0
+
+
+FREE = "{ model = 'constant', n = { lower = 1.5, upper = 2 } }"
+TURNED = f"{{ ordinary = 1.5, extraordinary = {FREE}, axis = AXIS }}"
+BIREFRINGENT = "{ ordinary = 1.5, extraordinary = 1.6 }"
+
+
+def test_uniaxial_layer_with_a_free_index_and_a_free_angle(scene_of):
+    own = scene_of(TURNED.replace("AXIS", "[{ lower = 0, upper = 90 }, 20]"))
+    found = [(p.name, p.unit, p.lower, p.upper) for p in parameters(own)]
+    assert found == [("extraordinary.n", "", 1.5, 2.0), ("axis_theta", "deg", 0.0, 90.0)]
+    assert own.layers[0].material.order is None
+
+
+def test_biaxial_layer_of_named_media_along_the_laboratory_axes(scene_of):
+    own = scene_of("{ x = 'SiO2', y = 1.6, z = 1.5, axis = [90, 0, 0] }").layers[0].material
+    assert isinstance(own, Anisotropic)
+    assert own.order == (2, 1, 0)
+    assert own.x.name == "SiO2"
+
+
+@pytest.mark.parametrize(
+    ("material", "message"),
+    [
+        ("{ ordinary = 1.5, extraodinary = 1.6 }", "did you mean 'extraordinary'"),
+        ("{ ordinary = 1.5, extraordinary = 1.6, axs = [0, 0] }", "did you mean 'axis'"),
+        ("{ ordinary = 1.5 }", "lacks extraordinary"),
+        ("{ x = 1.5, y = 1.6 }", "lacks z"),
+        ("{ ordinary = 1.5, extraordinary = 1.6, axis = 30 }", "axis must be"),
+        ("{ ordinary = 1.5, extraordinary = 1.6, axis = [1, 2, 3] }", "axis must be"),
+        ("{ ordinary = 'no such thing', extraordinary = 1.6 }", "unknown material"),
+        (f"{{ mix = 'linear', host = {BIREFRINGENT}, inclusion = 1, fraction = 0.5 }}", "isotropic media"),
+    ],
+)
+def test_what_is_wrong_is_named(scene_of, material, message, refuses):
+    refuses(DataError, message, scene_of, material)
+
+
+@pytest.mark.parametrize("free", ["n", "axis_theta"])
+def test_free_numbers_that_need_bounds_are_refused(scene_of, free, refuses):
+    refuses(
+        DataError,
+        "birefringent layer",
+        scene_of,
+        TURNED.replace("AXIS", "[0, 0]"),
+        f"free = ['{free}']",
+    )
+
+
+LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'
+BASE = f'[scene]\nsubstrate = "Si"\n{LAYER}'
+N, K = "{ lower = 1.5, upper = 2.5 }", "{ lower = 0, upper = 0.5 }"
+CONSTANT = f'{{ model = "constant", n = {N}, k = {K} }}'
+
+CLEAR = f'model = "constant", n = {N}'
+LINEAR = 'mix = "linear", inclusion = 1.0, fraction = 0.1'
+
+
+def film(material: str) -> str:
+    return BASE.replace('"SiO2"', material)
+
+
+def test_a_constant_index_of_a_layer(scene):
+    """n fixed and k free, or both free; missing keys are n = 1.5 and no absorption."""
+    found = lambda text: scene(text).layers[0].material  # noqa: E731
+    assert found(film(f'{{ model = "constant", n = 1.8, k = {K} }}')) == Constant(1.8, Free(0, 0.5))
+    assert found(film(CONSTANT)) == Constant(Free(1.5, 2.5), Free(0, 0.5))
+    assert found(film('{ model = "constant" }')) == Constant(1.5)
+    freed = Constant(Free(1.7, 1.9, start=1.9), Free(0, 1, start=0.25, limits=(0, 20)))
+    assert found(film(CONSTANT) + 'free = ["n=1.7:1.9", "k"]\n') == freed
+
+
+@pytest.mark.parametrize(
+    ("text", "free"),
+    [
+        (BASE.replace('"Si"', CONSTANT), ["thickness", "substrate.n", "substrate.k"]),
+        (BASE.replace('"Si"', f"{{ material = 1.5, back = {CONSTANT} }}"), ["thickness", "back.n", "back.k"]),
+        (BASE.replace("[scene]", f"[scene]\nambient = {{ {CLEAR} }}"), ["thickness", "ambient.n"]),
+        (film(f"{{ host = {CONSTANT}, {LINEAR} }}"), ["host.n", "host.k", "thickness"]),
+    ],
+    ids=["substrate", "back", "ambient", "mixture"],
+)
+def test_a_constant_index_elsewhere(scene, text, free):
+    assert [p.name for p in parameters(scene(text))] == free
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (film(f'{{ model = "constant", k = {K.replace("0,", "-1,")} }}'), "k must not be negative, got -1"),
+        (film('{ model = "constant", n = -1.5 }'), "n must not be negative, got -1.5"),
+        (film('{ model = "constant", m = 1.5 }'), "constant has no parameter 'm'"),
+        (BASE.replace("[scene]", f"[scene]\nambient = {CONSTANT}"), "the ambient must not absorb"),
+    ],
+)
+def test_constant_indices_refused(refused, text, message):
+    refused(text, message)
+
+
+def test_more_free_numbers_than_a_fit_takes(refused):
+    knots = [400.0 + 5 * i for i in range(50)]
+    spline = f'{{ model = "spline", knots = {knots}, n = {N}, k = {K} }}'
+    refused(film(spline), "101 parameters are free, more than the 64 that a fit takes")

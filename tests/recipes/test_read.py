@@ -53,20 +53,17 @@ def test_errors_of_a_surface_name_the_recipe(refused):
     refused(SURFACE.replace("thickness", "thicknes"), "scene.surface: microfacet-film has no 'thicknes'")
 
 
-def test_files_that_are_no_recipe(tmp_path):
-    with pytest.raises(DataError, match="is a folder; give the recipe's TOML file"):
-        pl.read_recipe(tmp_path)
-    with pytest.raises(DataError, match=r"cannot be read \(No such file"):
-        pl.read_recipe(tmp_path / "gone.toml")
+def test_files_that_are_no_recipe(tmp_path, refuses):
+    refuses(DataError, "is a folder; give the recipe's TOML file", pl.read_recipe, tmp_path)
+    refuses(DataError, r"cannot be read \(No such file", pl.read_recipe, tmp_path / "gone.toml")
 
 
-def test_mixtures_nested_too_deeply(write):
+def test_mixtures_nested_too_deeply(write, refuses):
     host = '"air"'
     for _ in range(500):
         host = f'{{ mix = "linear", host = {host}, inclusion = "air", fraction = 0.5 }}'
     path = write(FILM.replace('"SiO2"', host))
-    with pytest.raises(DataError, match=r"nested too deeply"):
-        pl.read_recipe(path).scene()
+    refuses(DataError, "nested too deeply", lambda: pl.read_recipe(path).scene())
 
 
 def test_the_base_of_a_surface_is_fixed(write):
@@ -90,6 +87,5 @@ def test_the_base_of_a_surface_is_fixed(write):
         ("[]", r"data\.angle: .* at least 1 item"),
     ],
 )
-def test_wrong_angles_are_named_without_the_types_that_were_tried(write, angle, said):
-    with pytest.raises(DataError, match=said):
-        pl.read_recipe(write(FILM.replace("[scene]", f"angle = {angle}\n[scene]")))
+def test_wrong_angles_are_named_without_the_types_that_were_tried(write, angle, said, refuses):
+    refuses(DataError, said, pl.read_recipe, write(FILM.replace("[scene]", f"angle = {angle}\n[scene]")))

@@ -63,6 +63,5 @@ def test_a_camera_under_a_lamp(surface):
         ('sensor = "1931"\nwavelengths = [600, 550, 450]', "either wavelengths or a sensor"),
     ],
 )
-def test_what_is_no_sensor(surface, keys, said):
-    with pytest.raises(DataError, match=said):
-        surface(keys)
+def test_what_is_no_sensor(surface, keys, said, refuses):
+    refuses(DataError, said, surface, keys)

@@ -78,10 +78,9 @@ def test_a_metal_has_its_film_and_indices_in_the_script(steel, monkeypatch):
     assert metal.inputs["Thin Film Thickness"].default_value == 40.0 * SCALE
 
 
-def test_an_old_blender_is_refused(steel, monkeypatch):
+def test_an_old_blender_is_refused(steel, monkeypatch, refuses):
     found, _ = script(steel.files[0], monkeypatch, version=(4, 5, 0))
-    with pytest.raises(RuntimeError, match=r"Blender 5\.0"):
-        found["film_material"]()
+    refuses(RuntimeError, r"Blender 5\.0", found["film_material"])
 
 
 def test_a_map_is_an_image_of_16_bits(tmp_path, monkeypatch):

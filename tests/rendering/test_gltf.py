@@ -60,6 +60,7 @@ def test_the_record_has_both_sets(soap):
     assert {"notes": [], **inside} == {key: x for key, x in record.items() if key != "target"}
 
 
+@pytest.mark.slow  # compiles for 5 s; cli/test_export_command.py writes the same sphere
 def test_a_metal_is_drawn_as_it_is(tmp_path):
     made = pl.export(STEEL, to="gltf", path=tmp_path / "steel.gltf", numbers="physical")
     model = pygltflib.GLTF2().load(str(tmp_path / "steel.gltf"))
@@ -85,7 +86,7 @@ def test_the_sphere_faces_outwards():
     assert 0.93 * 4 / 3 * np.pi < volume < 4 / 3 * np.pi
 
 
-def test_what_is_refused(tmp_path):
+def test_what_is_refused(tmp_path, refuses):
     (tmp_path / "there.glb").write_text("")
     np.save(tmp_path / "row.npy", np.zeros(3))
     for options, words in (
@@ -97,8 +98,7 @@ def test_what_is_refused(tmp_path):
         ({"to": "gltf", "path": tmp_path / "a.glb", "thickness_map": [[0.1, 0.3]]}, "in nm, not in µm"),
         ({"to": "gltf", "path": tmp_path / "a.glb", "thickness_map": [["a"]]}, "must have numbers"),
     ):
-        with pytest.raises(UsageError, match=words):
-            pl.export(STEEL, **options)
+        refuses(UsageError, words, pl.export, STEEL, **options)
     with pytest.raises(DataError, match="rows, columns"):
         pl.export(STEEL, to="gltf", path=tmp_path / "a.glb", thickness_map=tmp_path / "row.npy")
     with pytest.raises(DataError, match="cannot be read as a map"):

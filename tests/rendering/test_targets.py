@@ -20,10 +20,9 @@ def test_the_documentation_of_python_names_every_target():
     assert [name for name in TARGETS if f'"{name}"' not in (pl.export.__doc__ or "")] == []
 
 
-def test_an_absent_package_is_named_with_its_extra(monkeypatch):
+def test_an_absent_package_is_named_with_its_extra(monkeypatch, refuses):
     monkeypatch.setattr(targets, "find_spec", lambda name: None)
-    with pytest.raises(UsageError, match=r"pygltflib: pip install .pellicle\[render\]"):
-        target("gltf")
+    refuses(UsageError, r"pygltflib: pip install .pellicle\[render\]", target, "gltf")
 
 
 def test_tables_lack_nothing_that_formulas_lack(tmp_path, monkeypatch):

@@ -92,14 +92,13 @@ def test_parameters_keep_limits_only_where_there_are_any(fit):
     assert parameters["B"]["free"] is False
 
 
-def test_what_is_infinite_or_undefined_is_null(fit):
+def test_what_is_infinite_or_undefined_is_null(fit, refuses):
     record = strictly(one_line(to_json(fit)))
     scale = record["parameters"]["instrument.scale"]
     assert (scale["stderr"], scale["lower"], scale["upper"]) == (None, None, None)
     assert record["chi2_reduced"] is None
     assert record["correlation"] == {"names": ["thickness", "k"], "matrix": [[1.0, None], [None, 1.0]]}
-    with pytest.raises(ValueError, match="JSON"):
-        one_line({"stderr": math.inf})
+    refuses(ValueError, "JSON", one_line, {"stderr": math.inf})
     line = one_line(to_json(replace(fit, verdict="± two\nlines")))
     assert (line.isascii(), "\n" in line) == (True, False)
 
@@ -125,15 +124,14 @@ def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["diary.txt", "figure.png", "fit.csv", "summary.csv"])
-def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name):
+def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name, refuses):
     (tmp_path / name).write_text("mine")
     for write in (
         lambda: write_fit(tmp_path, fit),
         lambda: write_summary(tmp_path / "summary.csv", [to_json(fit)]),
         lambda: folder_per_file(tmp_path, ["a.csv", "b.csv"]),
     ):
-        with pytest.raises(UsageError, match="did not write"):
-            write()
+        refuses(UsageError, "did not write", write)
     assert os.listdir(tmp_path) == [name]
     assert (tmp_path / name).read_text() == "mine"
 

@@ -58,7 +58,6 @@ def test_a_figure_is_written_whole_and_alone(tmp_path, name, suffix):
 
 
 @pytest.mark.parametrize("name", ["nk", "nk.doc", "missing/nk.png"])
-def test_a_figure_that_cannot_be_written_leaves_nothing(tmp_path, name):
-    with pytest.raises(UsageError, match="`path`"):
-        figure("Au", tmp_path / name)
+def test_a_figure_that_cannot_be_written_leaves_nothing(tmp_path, name, refuses):
+    refuses(UsageError, "`path`", figure, "Au", tmp_path / name)
     assert list(tmp_path.iterdir()) == []

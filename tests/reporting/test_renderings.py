@@ -29,15 +29,15 @@ def test_the_background_shows_through_what_the_sphere_leaves():
 
 
 @pytest.mark.slow  # renders spheres
-def test_figures_are_written(tmp_path, monkeypatch):
+def test_figures_are_written(tmp_path, monkeypatch, refuses):
     film = pl.Scene(pl.Layer(1.33, 100.0), 1.0)
     objects(pl.Scene(pl.Layer(2.0, 100.0), 1.5), tmp_path / "balls.png", "balls", (50.0, 100.0), size=9)
     objects(film, tmp_path / "bubbles.png", "bubble", (300.0, 100.0), size=9)
     assert all((tmp_path / name).read_bytes().startswith(PNG) for name in ("balls.png", "bubbles.png"))
     monkeypatch.setattr(renderings, "bubble", lambda *_: pytest.fail("drawn before it is refused"))
-    with pytest.raises(UsageError, match="exists"):
-        objects(film, tmp_path / "bubbles.png", "bubble", (300.0,), size=9)
-    with pytest.raises(UsageError, match="there is no folder"):
-        objects(film, tmp_path / "nowhere" / "bubbles.png", "bubble", (300.0,), size=9)
-    with pytest.raises(UsageError, match=r"\.png"):
-        objects(film, tmp_path / "balls.jpg", "balls", (300.0,), size=9)
+    for name, kind, words in (
+        ("bubbles.png", "bubble", "exists"),
+        ("nowhere/bubbles.png", "bubble", "there is no folder"),
+        ("balls.jpg", "balls", r"\.png"),
+    ):
+        refuses(UsageError, words, objects, film, tmp_path / name, kind, (300.0,), size=9)

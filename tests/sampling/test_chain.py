@@ -75,19 +75,16 @@ def kept(bands, film, tmp_path_factory):
     [({"seed": 4}, {}), ({}, {"upper": 1400.0}), ({}, {"prior": pl.priors.Normal(600.0, 200.0)})],
     ids=["data", "bounds", "prior"],
 )
-def test_a_chain_of_another_problem_is_refused(bands, film, kept, data, scene):
+def test_a_chain_of_another_problem_is_refused(bands, film, kept, data, scene, refuses):
     before = kept.read_bytes()
-    with pytest.raises(DataError, match="is the chain of another problem"):
-        pl.sample(bands(**data), film(**scene), chain=kept)
+    refuses(DataError, "is the chain of another problem", pl.sample, bands(**data), film(**scene), chain=kept)
     assert kept.read_bytes() == before
 
 
-def test_other_walkers_and_what_is_no_chain_are_refused(bands, film, kept, write):
-    with pytest.raises(UsageError, match="is a chain of 32 walkers"):
-        pl.sample(bands(), film(), walkers=40, chain=kept)
+def test_other_walkers_and_what_is_no_chain_are_refused(bands, film, kept, write, refuses):
+    refuses(UsageError, "is a chain of 32 walkers", pl.sample, bands(), film(), walkers=40, chain=kept)
     path = write("notes of mine", "chain.h5")
-    with pytest.raises(DataError, match="is no chain that pellicle wrote"):
-        pl.sample(bands(), film(), chain=path)
+    refuses(DataError, "is no chain that pellicle wrote", pl.sample, bands(), film(), chain=path)
     assert path.read_text() == "notes of mine"
 
 

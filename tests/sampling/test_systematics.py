@@ -111,6 +111,7 @@ def reflectance(nm: np.ndarray, thickness: float, index: float = 1.46) -> np.nda
     return films("s", nm, [1.0, index, 3.9 + 0.02j], [thickness])
 
 
+@pytest.mark.slow  # two posteriors
 @pytest.mark.parametrize("uncertainty", [0.02, 0.0])
 def test_an_uncertain_index_widens_a_posterior_as_it_does_the_error(bands, film, uncertainty):
     """Data without noise, but with its σ: the values need no shift."""

@@ -36,9 +36,8 @@ def test_a_free_number_starts_in_the_middle_unless_told():
         ({"start": math.nan, "lower": 10, "upper": 20}, "the start value nan is outside its bounds"),
     ],
 )
-def test_impossible_bounds_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        pl.Free(**arguments)
+def test_impossible_bounds_are_refused(arguments, message, refuses):
+    refuses(ValueError, message, pl.Free, **arguments)
 
 
 @pytest.mark.parametrize(
@@ -82,9 +81,8 @@ def test_impossible_bounds_are_refused(arguments, message):
         (lambda: scene(ambient=pl.dispersion.Constant(1.33, FREE)), "the ambient must not absorb"),
     ],
 )
-def test_impossible_scenes_are_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+def test_impossible_scenes_are_refused(make, message, refuses):
+    refuses(ValueError, message, make)
 
 
 def test_words_stand_for_linear_nuisances():

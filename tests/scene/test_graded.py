@@ -84,9 +84,8 @@ def test_a_graded_medium_follows_its_mixing_rule():
         (lambda: pl.Scene(pl.Plate(pl.Graded(1.5, 2.0)), 1.5), "material of a pl.Layer"),
     ],
 )
-def test_refusals(make, message):
-    with pytest.raises((ValueError, UsageError), match=message):
-        make()
+def test_refusals(make, message, refuses):
+    refuses((ValueError, UsageError), message, make)
 
 
 def test_every_profile_has_a_name():

@@ -82,8 +82,7 @@ EYE = sensor("1931", "D65")
         ("blinn-phong-film", {"base": "Al"}, "base: blinn-phong-film knows no extinction there"),
     ],
 )
-def test_wrong_numbers_media_and_sensors_are_refused(name, given, message):
-    with pytest.raises(UsageError, match=message):
-        Surface(name, **given)
+def test_wrong_numbers_media_and_sensors_are_refused(name, given, message, refuses):
+    refuses(UsageError, message, Surface, name, **given)
     with pytest.raises(DataError, match="is known from"):  # no data in the bands
         Surface("microfacet-film", wavelengths=(50.0, 60.0, 70.0), base="Si")

@@ -62,22 +62,17 @@ def test_a_bare_reference_and_a_plan_within_a_tolerance():
     assert plan(bare, 1e-3).error_bound <= 1e-3
 
 
-def test_scene_and_data_are_checked():
+def test_scene_and_data_are_checked(refuses):
     without = pl.Scene(pl.Layer(1.46, pl.Free(10, 300)), "Si", light=pl.Light(signal="contrast"))
-    with pytest.raises(UsageError, match=r"contrast needs a reference: .*\[reference\]"):
-        pl.simulate(without, NM)
-    with pytest.raises(UsageError, match="`form`"):
-        pl.Reference("Si", form="difference")
-    with pytest.raises(UsageError, match="a `reference` is known"):
-        pl.Reference("Si", pl.Layer("SiO2", pl.Free(10, 300)))
+    refuses(UsageError, r"contrast needs a reference: .*\[reference\]", pl.simulate, without, NM)
+    refuses(UsageError, "`form`", pl.Reference, "Si", form="difference")
+    refuses(UsageError, "a `reference` is known", pl.Reference, "Si", pl.Layer("SiO2", pl.Free(10, 300)))
     with pytest.raises(DataError, match=r"`values` at 450 nm: -1\.2 is a contrast below -1"):
         pl.Spectrum(NM, np.full(64, -1.2), "contrast")
-    with pytest.raises(DataError, match="above 50 for a contrast"):
-        pl.Spectrum(NM, np.full(64, 120.0), "contrast")
+    refuses(DataError, "above 50 for a contrast", pl.Spectrum, NM, np.full(64, 120.0), "contrast")
     free = pl.Instrument(scale="free")
     scaled = pl.Scene(scene().layers, SILICON, instrument=free, reference=scene().reference)
-    with pytest.raises(UsageError, match="contrast has no scale and no offset"):
-        pl.fit(pl.simulate(scene(), NM), scaled)
+    refuses(UsageError, "contrast has no scale and no offset", pl.fit, pl.simulate(scene(), NM), scaled)
 
 
 def test_files(tmp_path):

@@ -41,7 +41,7 @@ def test_values_of_tmm():
 
 
 @pytest.mark.slow  # compiles for 3 s
-def test_the_jones_matrix_of_a_layer_that_turns_nothing():
+def test_the_jones_matrix_of_a_layer_that_turns_nothing(refuses):
     """The 4×4 method, which a birefringent layer takes, and `pellicle.jones` agree with the 2×2 method."""
     tilted = pl.Anisotropic(1.7, 1.6, axis=(40.0, 30.0))
     layer = pl.Scene(pl.Layer(tilted, 300.0), GLASS, light=LIGHT)
@@ -51,8 +51,7 @@ def test_the_jones_matrix_of_a_layer_that_turns_nothing():
     np.testing.assert_allclose(np.tan(np.deg2rad(simulated.values)), np.abs(rho), rtol=1e-9)
     np.testing.assert_allclose(np.exp(1j * np.deg2rad(simulated.delta)), rho / np.abs(rho), atol=1e-9)
     on_plate = pl.Scene(pl.Layer(tilted, 300.0), pl.Substrate(GLASS, 1.0), light=LIGHT)
-    with pytest.raises(UsageError, match="half space"):
-        pl.simulate(on_plate, NM)
+    refuses(UsageError, "half space", pl.simulate, on_plate, NM)
 
 
 def test_nothing_in_the_way_turns_nothing():
@@ -81,11 +80,9 @@ def test_the_fit_finds_the_thickness():
     assert abs(found.value - 180.0) < 3 * found.stderr
 
 
-def test_words():
-    with pytest.raises(UsageError, match="`transmission` goes with"):
-        pl.Light(signal="R", transmission=True)
-    with pytest.raises(UsageError, match="`transmission` goes with"):
-        pl.Spectrum(NM, np.full(64, 0.2), "R", transmission=True)
+def test_words(refuses):
+    refuses(UsageError, "`transmission` goes with", pl.Light, signal="R", transmission=True)
+    refuses(UsageError, "`transmission` goes with", pl.Spectrum, NM, np.full(64, 0.2), "R", transmission=True)
 
 
 def test_files(tmp_path, write):

@@ -30,7 +30,7 @@ def by_hand(directions, eye, numbers):
     return lobe[:, None] * (spectrum @ (eye.weights / eye.white)) + numbers["diffuse"]
 
 
-@pytest.mark.parametrize("count", [128, 12], ids=["by nodes", "each sample"])
+@pytest.mark.parametrize("count", [pytest.param(128, marks=pytest.mark.slow, id="by nodes"), 12])
 def test_bands_are_integrals_in_steps_of_a_nanometre(count):
     directions = Directions(*(x[:count] for x in DIRECTIONS))
     truth = by_hand(directions, EYE, FILM)

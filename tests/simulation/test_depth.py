@@ -1,5 +1,7 @@
 """Absorptance of layers and field in depth, against the `tmm` package and by conservation of energy."""
 
+from functools import cache, partial
+
 import jax
 import numpy as np
 import pytest
@@ -24,17 +26,14 @@ def media(i=slice(None)):
     return film, {"ambient": AMBIENT[i], "angle": ANGLE[i]}
 
 
-@pytest.fixture(scope="module")
-def computed():
-    """Absorptance, field, R and T of all stacks for s, p and unpolarised light."""
-
-    def all_of(polarisation):
-        film, light = media()
-        light = light | {"polarisation": polarisation}
-        powers = (f(*film, **light) for f in (pl.absorptance, pl.reflectance, pl.transmittance))
-        return (*powers, pl.field(*film, DEPTH, **light))
-
-    return {x: jax.jit(all_of, static_argnums=0)(x) for x in ("s", "p", "unpolarised")}
+@cache
+@partial(jax.jit, static_argnums=0)
+def computed(polarisation):
+    """Absorptance, field, R and T of all stacks for s, p or unpolarised light."""
+    film, light = media()
+    light = light | {"polarisation": polarisation}
+    powers = (f(*film, **light) for f in (pl.absorptance, pl.reflectance, pl.transmittance))
+    return (*powers, pl.field(*film, DEPTH, **light))
 
 
 def reference(i, letter):
@@ -44,8 +43,8 @@ def reference(i, letter):
 
 
 @pytest.mark.parametrize("letter", "sp")
-def test_random_stacks_as_tmm(computed, letter):
-    absorbed, R, _, field = computed[letter]
+def test_random_stacks_as_tmm(letter):
+    absorbed, R, _, field = computed(letter)
     assert absorbed.shape == (LAYERS, COUNT)
     assert field.electric.shape == field.magnetic.shape == (3, 4, COUNT)
     for i in range(COUNT):
@@ -61,11 +60,11 @@ def test_random_stacks_as_tmm(computed, letter):
 
 
 @pytest.mark.slow
-def test_the_magnetic_field_has_the_poynting_vector_of_tmm(computed):
+def test_the_magnetic_field_has_the_poynting_vector_of_tmm():
     """Its part along z, E_x H_y* − E_y H_x*, over the incident n₀ cos θ₀."""
     incident = AMBIENT * np.cos(np.deg2rad(ANGLE))
     for letter in "sp":
-        (Ex, Ey, _), (Hx, Hy, _) = (np.asarray(x) for x in computed[letter][-1][2:])
+        (Ex, Ey, _), (Hx, Hy, _) = (np.asarray(x) for x in computed(letter)[-1][2:])
         power = np.real(Ex * np.conj(Hy) - Ey * np.conj(Hx)) / incident
         for i in range(0, COUNT, 5):
             exact = reference(i, letter)
@@ -74,8 +73,9 @@ def test_the_magnetic_field_has_the_poynting_vector_of_tmm(computed):
                 assert power[j, i] == pytest.approx(at["poyn"], rel=1e-10, abs=1e-12)
 
 
-def test_unpolarised_is_the_mean_with_the_components_of_both(computed):
-    (A_s, *_, s), (A_p, *_, p), (A, *_, both) = (computed[x] for x in ("s", "p", "unpolarised"))
+@pytest.mark.slow  # compiles for seconds
+def test_unpolarised_is_the_mean_with_the_components_of_both():
+    (A_s, *_, s), (A_p, *_, p), (A, *_, both) = map(computed, ("s", "p", "unpolarised"))
     np.testing.assert_allclose(A, 0.5 * (A_s + A_p), rtol=1e-14)
     np.testing.assert_allclose(both.intensity, 0.5 * (s.intensity + p.intensity), rtol=1e-13)
     np.testing.assert_allclose(both.absorbed, 0.5 * (s.absorbed + p.absorbed), rtol=1e-13)
@@ -119,10 +119,7 @@ def test_weak_absorption_is_proportional_to_k_and_has_its_slope():
     assert slope > 1
 
 
-def test_what_is_refused():
-    with pytest.raises(ValueError, match="ambient must not absorb"):
-        pl.absorptance(500.0, 10.0, 2.0, 1.5, ambient=1.3 + 0.1j)
-    with pytest.raises(ValueError, match="one for each of 2 layers"):
-        pl.field(500.0, [10.0], [2.0, 1.5], 1.5, 0.0)
-    with pytest.raises(ValueError, match="`depth` must be a number"):
-        pl.field(500.0, 10.0, 2.0, 1.5, "0:100")
+def test_what_is_refused(refuses):
+    refuses(ValueError, "ambient must not absorb", pl.absorptance, 500.0, 10.0, 2.0, 1.5, ambient=1.3 + 0.1j)
+    refuses(ValueError, "one for each of 2 layers", pl.field, 500.0, [10.0], [2.0, 1.5], 1.5, 0.0)
+    refuses(ValueError, "`depth` must be a number", pl.field, 500.0, 10.0, 2.0, 1.5, "0:100")

@@ -90,9 +90,8 @@ def test_precision_follows_the_input(function, dtype):
 
 @BOTH
 @pytest.mark.parametrize("ambient", [1.33 + 0.1j, np.array([1.33 + 0j]), "Au"])
-def test_an_absorbing_ambient_is_refused(function, ambient):
-    with pytest.raises(ValueError, match="the ambient must not absorb: give it a real index"):
-        call(function, ambient=ambient)
+def test_an_absorbing_ambient_is_refused(function, ambient, refuses):
+    refuses(ValueError, "the ambient must not absorb: give it a real index", call, function, ambient=ambient)
 
 
 def test_an_ambient_of_little_absorption_is_its_real_part():
@@ -131,9 +130,8 @@ def test_water_as_ambient_where_it_is_clear(function):
 
 
 @BOTH
-def test_an_unknown_polarisation_is_refused(function):
-    with pytest.raises(ValueError, match="polarisation` must be one of unpolarised, s, p, not 'TE'"):
-        call(function, "TE")
+def test_an_unknown_polarisation_is_refused(function, refuses):
+    refuses(ValueError, "polarisation` must be one of unpolarised, s, p, not 'TE'", call, function, "TE")
 
 
 @BOTH
@@ -145,13 +143,12 @@ def test_names_are_materials(function):
     assert 0 < float(found[0]) < 1
 
 
-def test_the_index_of_whatever_a_layer_may_be():
+def test_the_index_of_whatever_a_layer_may_be(refuses):
     np.testing.assert_array_equal(pl.refractive_index(np.array([500.0, 600.0]), 1.5 + 0.1j), 1.5 + 0.1j)
     assert pl.refractive_index(np.array([500.0, 600.0]), 1.5).shape == (2,)
     n = pl.refractive_index(550.0, Cauchy(1.5, 3000.0))
     assert complex(n) == pytest.approx(1.5 + 3000 / 550**2)
-    with pytest.raises(ValueError, match="not at 90"):
-        pl.refractive_index(90.0, "Au")
+    refuses(ValueError, "not at 90", pl.refractive_index, 90.0, "Au")
 
 
 @BOTH
@@ -232,7 +229,7 @@ def test_known_media_are_known_under_jit_too(whole):
     np.testing.assert_allclose(signal(100.0), given, rtol=1e-12)
 
 
-def test_principal_indices_of_a_birefringent_medium():
+def test_principal_indices_of_a_birefringent_medium(refuses):
     """Against each medium alone; handbooks give 1.6584 and 1.4864 for calcite."""
     NM = np.array([500.0, 589.3])
     two = pl.Anisotropic(Cauchy(1.5, 3000.0), 1.7 + 0.1j, axis=(40.0, 0.0))(NM)
@@ -240,11 +237,9 @@ def test_principal_indices_of_a_birefringent_medium():
     named = pl.Anisotropic("calcite", "calcite-e")
     np.testing.assert_allclose(pl.refractive_index(589.3, named), [1.6584, 1.4864], atol=5e-4)
     assert pl.Anisotropic(x=1.5, y=1.6, z=1.7)(NM).shape == (2, 3)
-    with pytest.raises(ValueError, match="refractive_index"):
-        named(589.3)
+    refuses(ValueError, "refractive_index", named, 589.3)
     for call in (
         lambda: pl.refractive_index(50.0, named),
         lambda: pl.jones(50.0, 1.0, named, 1.5, angle=9.0),
     ):
-        with pytest.raises(ValueError, match="50"):
-            call()
+        refuses(ValueError, "50", call)

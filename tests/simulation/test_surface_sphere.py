@@ -86,6 +86,7 @@ def test_few_directions_are_within_four_per_cent(steel):
     assert 0 < np.max(np.abs(found - expected)) < 0.04 * expected.max()
 
 
+@pytest.mark.slow  # renders for 3 s
 def test_pixels_of_a_diffuse_layer():
     """Its colour is π ρ, by the model at 351 wavelengths; n is linear between its three channels."""
     n = np.interp(EYE.wavelength, [445.0, 525.0, 645.0], [1.6, 1.45, 1.4])

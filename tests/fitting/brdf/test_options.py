@@ -115,7 +115,7 @@ def test_a_joint_fit_is_that_of_all_samples(two):
         joint.samples  # noqa: B018
 
 
-def test_samples_need_a_surface_and_spectra_a_scene():
+def test_samples_need_a_surface_and_spectra_a_scene(refuses):
     nm = np.linspace(400.0, 700.0, 30)
     spectrum = pl.Spectrum(nm, np.full(30, 0.2), "R")
     for data, scene in (
@@ -123,8 +123,7 @@ def test_samples_need_a_surface_and_spectra_a_scene():
         ([grey_samples(), spectrum], grey()),
         (grey_samples(), pl.Scene(pl.Layer("SiO2", pl.Free(10, 500)), "Si")),
     ):
-        with pytest.raises(UsageError, match="BRDF samples need a Surface"):
-            pl.fit(data, scene)
+        refuses(UsageError, "BRDF samples need a Surface", pl.fit, data, scene)
 
 
 @pytest.mark.slow

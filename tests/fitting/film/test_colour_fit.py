@@ -152,15 +152,14 @@ def test_the_jacobian_is_that_of_finite_differences():
         np.testing.assert_allclose(rows[:, 1] * scale.value / scale.prior_sd, expected, rtol=1e-9)
 
 
-def test_different_colours_at_one_angle_are_refused(write):
+def test_different_colours_at_one_angle_are_refused(write, refuses):
     """A column that was ignored may have the angles."""
     path = write("Winkel,R,G,B\n0,0.5,0.4,0.3\n60,0.3,0.4,0.5\n")
     for data, words in (
         (Colours(np.array([[0.5, 0.4, 0.3], [0.3, 0.4, 0.5]]), SENSOR), "2 colours of one film at one angle"),
         (pl.read_colours(path), r"deviations \(ignored: Winkel\)"),
     ):
-        with pytest.raises(DataError, match=f"{words}.* a column angle_deg"):
-            pl.fit(data, scene())
+        refuses(DataError, f"{words}.* a column angle_deg", pl.fit, data, scene())
 
 
 @pytest.mark.parametrize(
@@ -172,8 +171,7 @@ def test_different_colours_at_one_angle_are_refused(write):
         ({"light": pl.Light(angle=20.0)}, "contradict `angle=20`"),
     ],
 )
-def test_refusals(own, message):
+def test_refusals(own, message, refuses):
     layer = pl.Layer(1.46, pl.Free(50, 700))
     values = np.full((3, 3), 0.5)
-    with pytest.raises(UsageError, match=message):
-        pl.fit(Colours(values, SENSOR, angle=ANGLES), pl.Scene(layer, 3.9, **own))
+    refuses(UsageError, message, pl.fit, Colours(values, SENSOR, angle=ANGLES), pl.Scene(layer, 3.9, **own))

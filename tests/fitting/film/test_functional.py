@@ -90,12 +90,10 @@ def test_other_sigma_weighs_points(spectra):
     assert np.allclose(found.values, expected.values, rtol=1e-6)
 
 
-def test_wrong_shapes_are_refused(spectra):
+def test_wrong_shapes_are_refused(spectra, refuses):
     problem = pl.fitting.prepare(spectra[0], FREE)
-    with pytest.raises(ValueError, match=r"\(120,\), got \(3,\)"):
-        problem.with_data(np.zeros(3))
-    with pytest.raises(ValueError, match="2 parameters"):
-        pl.fitting.solve(problem, [500.0, 1.5])
+    refuses(ValueError, r"\(120,\), got \(3,\)", problem.with_data, np.zeros(3))
+    refuses(ValueError, "2 parameters", pl.fitting.solve, problem, [500.0, 1.5])
     free = pl.Scene(FREE.layers, 3.9, light=pl.Light(angle=70.0, signal="psi-delta"))
     with pytest.raises(UsageError, match="prepare and stack"):
         pl.fitting.prepare(pl.simulate(free, NM), free).with_data(np.zeros(120))

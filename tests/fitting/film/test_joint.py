@@ -109,15 +109,14 @@ def test_a_list_of_one_is_the_spectrum_with_a_name():
     assert listed["thickness"] == one["thickness"]
 
 
-def test_of_one_scene_ellipsometry_leaves_out_the_scale(spectra):
+def test_of_one_scene_ellipsometry_leaves_out_the_scale(spectra, refuses):
     """And alone it is refused: a scale was asked for that it cannot have."""
     scene = pl.Scene(OXIDE.layers, "Si", instrument=pl.Instrument(scale="free", offset=0.01, bandwidth=2.0))
     found = measurements(spectra, scene)
     scaled = [(m.scene.instrument.scale, m.scene.instrument.offset) for m in found]
     assert scaled == [(scene.instrument.scale, 0.01)] * 2 + [(1.0, 0.0)]
     assert [m.scene.instrument.bandwidth for m in found] == [2.0] * 3
-    with pytest.raises(UsageError, match="no scale and no offset"):
-        pl.fit(spectra[2], scene)
+    refuses(UsageError, "no scale and no offset", pl.fit, spectra[2], scene)
 
 
 def test_a_spectrum_of_another_sample_is_a_misfit_that_names_the_file():
@@ -167,9 +166,8 @@ def test_what_tells_spectra_apart():
         ([oxide(), oxide()], [OXIDE, pl.Scene(OXIDE.layers, "BK7")], "same layers, ambient and substrate"),
     ],
 )
-def test_what_is_no_joint_fit(spectra, scenes, said):
-    with pytest.raises(UsageError, match=said):
-        pl.fit(spectra, scenes)
+def test_what_is_no_joint_fit(spectra, scenes, said, refuses):
+    refuses(UsageError, said, pl.fit, spectra, scenes)
 
 
 @pytest.mark.slow

@@ -146,11 +146,10 @@ def test_errors_shrink_to_those_of_the_noise_as_more_is_known():
 
 
 @pytest.mark.parametrize("wrong", [-0.1, float("inf"), float("nan")])
-def test_impossible_uncertainties_are_refused(wrong):
+def test_impossible_uncertainties_are_refused(wrong, refuses):
     with pytest.raises(ValueError, match="the uncertainty of `wavelength` must be finite and not negative"):
         pl.Uncertainty(wavelength=wrong)
-    with pytest.raises(ValueError, match="the uncertainty of `index`"):
-        pl.Layer(1.6, 100.0, index_uncertainty=wrong)
+    refuses(ValueError, "the uncertainty of `index`", pl.Layer, 1.6, 100.0, index_uncertainty=wrong)
 
 
 NINE = np.linspace(400, 800, 9)
