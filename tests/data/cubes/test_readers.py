@@ -1,7 +1,8 @@
-"""Readers of cubes on the same cube: axes in any order, blocks, errors, copies, and damaged files."""
+"""Readers of cubes on the same cube: axes in any order, blocks, errors, copies, damage; NumPy and TIFF."""
 
 import itertools
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import tifffile
 import xarray as xr
 import zarr
 
-from pellicle.errors import DataError
+from pellicle.data.read_cube import is_photograph, read_cube
+from pellicle.errors import DataError, UsageError
 
 NM = np.linspace(400.0, 800.0, 9)
 GIVEN = {"wavelengths": NM}
@@ -163,3 +165,118 @@ def test_damaged_files_are_named(write, words, values, refused, tmp_path):
 @pytest.mark.parametrize("shape", [(0, 5, 9), (4, 0, 9)])
 def test_a_cube_without_pixels(shape, refused):
     refused(np.zeros(shape), "no pixels", f"y {shape[0]}, x {shape[1]}", error=DataError, **GIVEN)
+
+
+def test_sites_and_time(values, tmp_path):
+    np.save(tmp_path / "sites.npy", values.reshape(35, 9))
+    assert read_cube(tmp_path / "sites.npy", wavelengths=NM).dims == ("site",)
+    np.save(tmp_path / "time.npy", np.stack([values, values]))
+    assert read_cube(tmp_path / "time.npy", wavelengths=NM).dims == ("time", "y", "x")
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "400\n450\n500\n550\n600\n650\n700\n750\n800\n",
+        "wavelength_um\n0.4\n0.45\n0.5\n0.55\n0.6\n0.65\n0.7\n0.75\n0.8",
+        "400, 450, 500, 550, 600, 650, 700, 750, 800",
+        "band,wavelength_nm,fwhm\n" + "".join(f"{i},{nm:g},3\n" for i, nm in enumerate(NM)),
+        "Band;Wavelength (nm)\n" + "".join(f"{i};{nm:g}\n" for i, nm in enumerate(NM)),
+        "band;wl (um)\n" + "".join(f"{i};{nm / 1000:.4f}\n".replace(".", ",") for i, nm in enumerate(NM)),
+        "Wavelength (nm)\n" + "".join(f"{nm:.1f}\n".replace(".", ",") for nm in NM),
+    ],
+)
+def test_file_of_wavelengths(values, same, tmp_path, written):
+    (tmp_path / "bands.txt").write_text(written)
+    same(values, wavelengths=tmp_path / "bands.txt")
+
+
+def test_file_of_other_columns(values, refused, tmp_path):
+    (tmp_path / "bands.csv").write_text("band,gain\n1,2\n2,2\n")
+    refused(values, "band, gain", error=UsageError, wavelengths=tmp_path / "bands.csv")
+
+
+@pytest.mark.parametrize("wrong", ["400:800", "400:800:45", "800:400:50", "blue", "400:800:0", ""])
+def test_wrong_lists_of_wavelengths(values, refused, wrong):
+    refused(values, "`wavelengths`", error=UsageError, wavelengths=wrong)
+
+
+def test_refusals(values, refused, tmp_path):
+    np.save(tmp_path / "a.npy", values)
+    refused(tmp_path / "a.npy", "no wavelengths", "7 x 5 x 9", error=UsageError)
+    refused(tmp_path / "a.npy", "4 wavelengths", error=DataError, wavelengths="400,500,600,700")
+    np.save(tmp_path / "flat.npy", values[0, 0])
+    refused(tmp_path / "flat.npy", "no array of pixels", error=DataError, wavelengths=NM)
+    np.save(tmp_path / "objects.npy", np.array([{}]), allow_pickle=True)
+    refused(tmp_path / "objects.npy", "damaged", error=DataError, wavelengths=NM)
+    (tmp_path / "text.md").write_text("# notes\n")
+    refused(tmp_path / "text.md", "is no cube", "zarr, NetCDF, ENVI", error=DataError)
+    refused(tmp_path / "absent.npy", "no such file", error=DataError)
+    refused(tmp_path, "without a table of positions", error=DataError)
+    refused(42, "must be a path", error=UsageError)
+
+
+def test_larger_tiles_than_blocks(same, tmp_path):
+    rng = np.random.default_rng(0)
+    large = rng.random((9, 50, 70)).astype("f4")
+    path = tmp_path / "tiles.tif"
+    tifffile.imwrite(path, large, tile=(16, 32), compression="zlib", photometric="minisblack")
+    cube = same(path, expected=large.transpose(1, 2, 0), wavelengths=NM)
+    block = cube.pixels((slice(15, 40, 3), slice(30, 66)))["values"]
+    np.testing.assert_array_equal(block, large[:, 15:40:3, 30:66].transpose(1, 2, 0).reshape(-1, 9))
+
+
+def test_a_series_in_time(values, tmp_path):
+    series = np.stack([values, values / 2]).transpose(0, 3, 1, 2)
+    tifffile.imwrite(tmp_path / "time.tif", series, imagej=True, metadata={"axes": "TCYX"})
+    cube = read_cube(tmp_path / "time.tif", wavelengths=NM)
+    assert cube.dims == ("time", "y", "x")
+    np.testing.assert_allclose(np.asarray(cube.arrays["values"])[1], values / 2)
+
+
+def test_wavelengths_of_metadata(values, same, tmp_path):
+    stack = values.transpose(2, 0, 1)
+    channel = {"EmissionWavelength": list(NM), "EmissionWavelengthUnit": ["nm"] * 9}
+    described = {"axes": "CYX", "Channel": channel}
+    tifffile.imwrite(tmp_path / "ome.tif", stack, ome=True, photometric="minisblack", metadata=described)
+    same(tmp_path / "ome.tif")
+    labels = {"Labels": [f"band {i}: {nm:g} nm" for i, nm in enumerate(NM)]}
+    tifffile.imwrite(tmp_path / "imagej.tif", stack, imagej=True, metadata=labels)
+    same(tmp_path / "imagej.tif")
+
+
+def test_without_wavelengths(values, refused, tmp_path):
+    path = tmp_path / "stack.tif"
+    tifffile.imwrite(path, values.transpose(2, 0, 1), photometric="minisblack")
+    refused(path, "no wavelengths", "9 x 7 x 5", "`wavelengths", error=UsageError)
+    refused(path, "8 wavelengths", error=DataError, wavelengths="400:750:50")
+
+
+def test_a_photograph_is_no_cube(values, refused, tmp_path):
+    path = tmp_path / "photo.tif"
+    tifffile.imwrite(path, (255 * values[..., :3]).astype("u1"), photometric="rgb")
+    assert is_photograph(path)
+    refused(path, "three channels", '`signal="srgb"`', error=UsageError)
+    tifffile.imwrite(tmp_path / "stack.tif", values.transpose(2, 0, 1), photometric="minisblack")
+    assert not is_photograph(tmp_path / "stack.tif")
+
+
+def test_a_compressed_stack_needs_zarr(values, refused, tmp_path, monkeypatch):
+    tifffile.imwrite(
+        tmp_path / "a.tif", values.transpose(2, 0, 1), compression="zlib", photometric="minisblack"
+    )
+    monkeypatch.setitem(sys.modules, "zarr", None)
+    refused(tmp_path / "a.tif", "need zarr: pip install 'pellicle[maps]'", error=UsageError, wavelengths=NM)
+
+
+def test_a_compression_that_needs_another_package(values, refused, tmp_path):
+    path = tmp_path / "stack.tif"
+    whole = (4000 * values.transpose(2, 0, 1)).astype("u2")
+    tifffile.imwrite(path, whole, compression="zlib", photometric="minisblack")
+    content = bytearray(path.read_bytes())
+    with tifffile.TiffFile(path) as file:
+        places = [page.tags["Compression"].valueoffset for page in file.pages]
+    for at in places:
+        content[at : at + 2] = (34887).to_bytes(2, "little")  # LERC
+    path.write_bytes(content)
+    refused(path, str(path), "without compression", error=DataError, wavelengths=NM, signal_unit=4000)
