@@ -26,7 +26,8 @@ class Parameter:
     `limits` marks default bounds, and is how far they may be widened; None for bounds that the user set.
 
     The rest are hints for a search: whether the parameter is `searched` or starts from `start`, the `group`
-    of parameters that move together, and how many `levels` to try (None: by the width of the bounds).
+    of parameters that move together, how many `levels` to try (None: by the width of the bounds), and whether
+    these go by `decades`.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Parameter:
     searched: bool = True
     group: str = ""
     levels: int | None = None
+    decades: bool = False
 
     def on_ends(self, values: Any) -> tuple[Any, Any]:
         """Test if values (...) lie on the lower and on the upper bound."""

@@ -127,3 +127,22 @@ def test_identifiable_films_are_recovered(film, measured, material, indices, noi
             right.append(abs(fit["thickness"].value - truth) < tolerance)
     assert len(right) > 30
     assert np.mean(right) >= (0.95 if noise > 0.01 else 0.99)
+
+
+@pytest.mark.slow  # compiles a scene of its own
+@pytest.mark.parametrize(
+    ("thickness", "eps_inf", "plasma", "gamma"), [(278.8, 4.257, 1.119, 0.102), (266.2, 3.531, 1.167, 0.149)]
+)
+def test_a_transparent_conductor_is_found_from_default_bounds(thickness, eps_inf, plasma, gamma):
+    """Plasma energies that three even levels from 0 to 15 eV miss."""
+
+    def film(eps_inf, *numbers):
+        return pl.dispersion.Oscillators(eps_inf, (pl.dispersion.Drude(*numbers),))
+
+    free = film(pl.Free(1, 6), pl.Free(0, 15), pl.Free(0.01, 2))
+    true = pl.Scene(pl.Layer(film(eps_inf, plasma, gamma), thickness), "SiO2")
+    seen = pl.simulate(true, np.geomspace(400, 2500, 160), noise=0.002, seed=6)
+    fit = pl.fit(seen, pl.Scene(pl.Layer(free, pl.Free(30, 800)), "SiO2"))
+    assert fit.status is pl.Status.CONVERGED
+    assert fit["Ep"].value == pytest.approx(plasma, rel=0.01)
+    assert fit["thickness"].value == pytest.approx(thickness, rel=0.01)

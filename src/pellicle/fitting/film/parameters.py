@@ -12,6 +12,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
     CodyLorentz,
+    Drude,
     Gaussian,
     Lorentz,
     Oscillators,
@@ -48,6 +49,10 @@ _RESOLUTION = 0.5
 """Thicknesses (nm) closer than this belong to one minimum."""
 _FEW = 3
 """Levels of an oscillator's parameter, of which there are many at once."""
+_DRUDE = {"eps_inf": 6, "Ep": 7}
+"""Levels beside free charges: their reflection edge is where their plasma energy and eps_inf put it together.
+Found of 14 simulated spectra of transparent conductors, 0.8 to 2.3 eV: 12 with 3 even levels, 14 with
+these."""
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -97,6 +102,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     # a search moves the index of a spline as a whole
     group = full.removesuffix(key) + field if owner in (Spline, FreeProfile) else full
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
+    drude = any(isinstance(x, Drude) for x in [location.owner, *getattr(location.owner, "terms", ())])
     return Parameter(
         name=full,
         key=key,
@@ -113,7 +119,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         resolution=_RESOLUTION if key == "thickness" else None,
         searched=key in _SEARCHED or (owner is Spline and field == "n") or owner is FreeProfile,
         group=group,
-        levels=_FEW if oscillator else None,
+        levels=(_DRUDE if drude else {}).get(key, _FEW) if oscillator else None,
+        decades=drude and key == "Ep",
     )
 
 

@@ -179,11 +179,19 @@ def _even(count: int) -> np.ndarray:
     return (np.arange(count) + 0.5) / count
 
 
+def _by_decades(lower: float, upper: float, count: int) -> np.ndarray:
+    """Positions in 0..1 whose values have one ratio, from a 20th of the range to near its end."""
+    span = upper - lower
+    return (np.geomspace(lower + span / 20, upper - span / 6, count) - lower) / span
+
+
 def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if not p.searched:
         return np.array([(p.start - p.lower) / (p.upper - p.lower)])
     if p.key == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
+    if p.levels is not None and p.decades:
+        return _by_decades(p.lower, p.upper, p.levels)
     if p.levels is not None:
         return _even(p.levels)
     count = np.ceil((p.upper - p.lower) / 0.2)
