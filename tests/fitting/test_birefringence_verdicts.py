@@ -1,5 +1,7 @@
 """Verdicts on isotropic and birefringent descriptions of one film, from fits written down by hand."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -55,3 +57,14 @@ def test_tilt_is_called_what_it_is(difference, expected, angles):
     """Against an axis along the normal, whether its angles are free or given."""
     both = candidate("aligned", difference, (0.1, 0.01)), candidate("tilted", 0.0, (0.1, 0.01), angles)
     assert Comparison(both, 100.0).verdict.endswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(0.4, "the data favour native.k"), (0.2, "the data strongly favour native.k")]
+)
+def test_evidence_is_strong_where_the_number_is_beyond_its_total_error(error, words):
+    """A BIC counts noise alone: that of an oxide of 3.2 ± 1.2 nm may be 50 lower."""
+    plain, more = candidate("plain", 50.0), candidate("more", 0.0)
+    native = Estimate("native.k", 1.0, error, "", 0.0, 9.0, True, stderr_noise=0.01)
+    fit = dataclasses.replace(more.fit, parameters=more.fit.parameters | {"native.k": native})
+    assert words in Comparison((plain, dataclasses.replace(more, fit=fit, free=3)), 100.0).verdict

@@ -49,8 +49,15 @@ def test_a_likely_cause(rows, cause, remedy):
     assert sentence.endswith(remedy)
 
 
-@pytest.mark.parametrize(("explains", "alone"), [(0.25, 2.0), (0.9, 20.0)])
-def test_noise_and_a_slit_of_no_ordinary_size_are_no_cause(explains, alone):
+def test_an_effect_far_beyond_its_ordinary_size_is_named_before_a_material():
+    angle = row("angle of incidence", 0.05, "deg", 0.99, 0.489)
+    [sentence] = likely_cause(found(INDEX, OXIDE, angle), [A, DEPTH])
+    assert sentence.startswith("angle of incidence of 0.49 deg would explain 99 %")
+    assert "far beyond its uncertainty of 0.05 deg" in sentence
+
+
+@pytest.mark.parametrize(("explains", "alone"), [(0.25, 2.0), (0.5, 20.0), (0.9, 70.0)])
+def test_noise_and_a_slit_of_no_likely_size_are_no_cause(explains, alone):
     assert likely_cause(found(row("slit", 2.0, "nm", explains, alone)), [A, DEPTH]) == []
 
 

@@ -17,11 +17,13 @@ def test_solutions_stay_on_bounds():
     assert found == pytest.approx(np.array([[0.5, 0.0]]))
 
 
-def test_solutions_within_bounds_are_those_of_each_fit():
-    """Of one bounded coefficient, where what is held is never let go."""
+@pytest.mark.parametrize("bounded", [1, 4, 6])
+def test_solutions_within_bounds_are_those_of_each_fit(bounded):
+    """With several bounded coefficients some are held on the way that the solution lets go."""
     rng = np.random.default_rng(0)
     rows, data = rng.normal(size=(50, 20, 6)) + rng.normal(size=(50, 20, 1)), rng.normal(size=(50, 20))
-    lower, upper = np.tile([-np.inf] * 5 + [-0.1], (50, 1)), np.tile([np.inf] * 5 + [0.1], (50, 1))
+    upper = np.tile([np.inf] * (6 - bounded) + [0.1] * bounded, (50, 1))
+    lower = -upper
     covariance = covariances(rows)
     free = times(covariance @ np.swapaxes(rows, 1, 2), data)
     found = held_within(free, covariance, lower, upper)

@@ -1,6 +1,6 @@
 """Uncertainty budget of a fit: the systematic effects that its errors include."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -14,6 +14,11 @@ _STRUCTURE = 0.3
 _USUAL = 3.0
 """Standard uncertainties up to which an effect is of ordinary size."""
 
+_LARGEST = 30.0
+"""Standard uncertainties up to which an effect is named at all: an angle of incidence that is 3° off."""
+_CLEAR, _MORE = 0.6, 0.1
+"""Share of the residuals' sum of squares that an effect of no ordinary size explains at least, and how much
+more than any of ordinary size."""
 _EXPOSURE = 0.9
 """Share of the residuals' sum of squares that a wrong exposure or calibration explains at least."""
 
@@ -46,26 +51,34 @@ def _lead(parameters: Sequence[Parameter]) -> int:
 
 
 def likely_cause(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
-    """A sentence on the effect of ordinary size that alone explains most of the residuals, or on the index of
-    another material that does; none without either."""
+    """A sentence on the effect that alone explains most of the residuals: one of ordinary size, one clearly
+    beyond that, or the index of another material; none without any."""
     at = _lead(parameters)
     rows, lead = discrepancy.contributions, parameters[at]
-    usual = [c for c in rows if abs(c.alone) <= _USUAL * c.effect.size and c.explains > _STRUCTURE]
-    best = max(usual, key=lambda c: c.explains, default=None)
+
+    def most(some: Iterable[Contribution]) -> Contribution | None:
+        return max(some, key=lambda c: c.explains, default=None)
+
+    def share(row: Contribution | None) -> float:
+        return 0.0 if row is None else row.explains
+
+    sizes = [(c, abs(c.alone) / c.effect.size) for c in rows]
+    best = most(c for c, size in sizes if size <= _USUAL and c.explains > _STRUCTURE)
+    large = [c for c, size in sizes if size > _USUAL]
     position = other_material(rows)
     other = rows[position] if position >= 0 else None
-    level = max(
-        (c for c in rows if c.effect.name.startswith("scale")), key=lambda c: c.explains, default=None
-    )
-    if (
-        level is not None
-        and abs(level.alone) > _USUAL * level.effect.size
-        and level.explains > max(_EXPOSURE, other.explains if other else 0.0, best.explains if best else 0.0)
-    ):
+    level = most(c for c in large if c.effect.name.startswith("scale"))
+    beyond = most(c for c, size in sizes if _USUAL < size <= _LARGEST and not c.effect.material)
+    if level is not None and share(level) > max(_EXPOSURE, *map(share, (other, best, beyond))) - 1e-12:
         return [
             f"a {level.effect.name} that is {100 * abs(level.alone):.2g} % {_towards(level)} would explain"
             f" {100 * level.explains:.0f} % of the residuals: calibrate it against a white or a reference, or"
             ' free it by `scale="free"`'
+        ]
+    if beyond is not None and share(beyond) > max(_CLEAR, share(other), share(best) + _MORE):
+        return [
+            f"{_cause(beyond, at, lead)}, far beyond its uncertainty of {_size(beyond, beyond.effect.size)}:"
+            " check it, or free it"
         ]
     if other is not None:
         far = f"{100 * abs(other.alone):.2g} % {_towards(other)}"
@@ -75,12 +88,19 @@ def likely_cause(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> l
         ]
     if best is None:
         return []
-    size = f"{best.alone:.2g} {best.effect.unit}" if best.effect.unit else f"{100 * best.alone:.2g} %"
-    return [
-        f"{best.effect.name} of {size} would explain {100 * best.explains:.0f} % of the residuals and change"
-        f" {lead.name} by {best.shift[at]:+.2g}{f' {lead.unit}' if lead.unit else ''}: describe it in the"
-        " scene if it is real"
-    ]
+    return [f"{_cause(best, at, lead)}: describe it in the scene if it is real"]
+
+
+def _cause(row: Contribution, at: int, lead: Parameter) -> str:
+    """Words on what an effect explains alone, and what that changes of the parameter at a position."""
+    return (
+        f"{row.effect.name} of {_size(row, row.alone)} would explain {100 * row.explains:.0f} % of the"
+        f" residuals and change {lead.name} by {row.shift[at]:+.2g}{f' {lead.unit}' if lead.unit else ''}"
+    )
+
+
+def _size(row: Contribution, size: float) -> str:
+    return f"{size:.2g} {row.effect.unit}" if row.effect.unit else f"{100 * size:.2g} %"
 
 
 def _towards(row: Contribution) -> str:

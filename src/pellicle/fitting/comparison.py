@@ -30,6 +30,9 @@ UNDECIDED, STRONG = 2.0, 6.0
 and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
 
 
+_CLEAR = 3.5
+"""Total errors by which one of the further numbers differs from 0 where the evidence for them is strong: a
+BIC counts noise alone, which the usual errors of instruments exceed."""
 _COMPATIBLE = 1.96
 """Standard errors within which a number is compatible with 0, at 95 %."""
 
@@ -81,7 +84,7 @@ class Comparison(ReportMixin):
             more, less = [
                 [*names, TILTED] if one else names for names, one in zip(named, tilted, strict=True)
             ]
-        verb = "strongly favour" if apart >= STRONG else "favour"
+        verb = "strongly favour" if apart >= STRONG and _beyond_errors(best.fit, second.fit) else "favour"
         if apart < UNDECIDED:
             sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
             if best.free != second.free:
@@ -225,6 +228,12 @@ def _size_of_birefringence(fit: Fit) -> str:
     wavelength, n, error = birefringence
     doubt = ": by noise alone it is there, but usual errors of instruments and samples would imitate it"
     return f", {n:.3g} ± {error:.2g} at {wavelength:g} nm{doubt if abs(n) <= _COMPATIBLE * error else ''}"
+
+
+def _beyond_errors(one: Fit, other: Fit) -> bool:
+    """True unless all numbers that only the first fits are within `_CLEAR` of their total errors of 0."""
+    further = [p for p in one.free if p.name not in {q.name for q in other.free}]
+    return not further or any(abs(p.value) > _CLEAR * p.stderr for p in further)
 
 
 def _extra(one: Fit, other: Fit) -> list[str]:

@@ -425,7 +425,8 @@ class _Balance:
         def left(x: np.ndarray, gram: np.ndarray, right: np.ndarray) -> np.ndarray:
             return np.sum(x * times(gram, x), axis=-1) - 2 * np.sum(x * right, axis=-1)
 
-        best, _ = normal.of(np.arange(known)).solved()
+        bounds = system.lower[:, :known], system.upper[:, :known]
+        best = held_within(*normal.of(np.arange(known)).solved(), *bounds)
         before = power + left(best, gram[:, :known, :known], right[:, :known])
         both = np.stack([np.append(np.arange(known), known + i) for i in range(effects)])
         square = both[:, :, None], both[:, None, :]
@@ -440,8 +441,8 @@ class _Balance:
 
         flat = matrix.reshape(-1, known + 1, known + 1), normal.right[:, both].reshape(-1, known + 1)
         free, covariance = Normal(*flat, rows).solved()
-        bounds = (x[:, both].reshape(free.shape) for x in (system.lower, system.upper))
-        moved = held_within(free, covariance, *bounds).reshape(fits, effects, known + 1)
+        each = (x[:, both].reshape(free.shape) for x in (system.lower, system.upper))
+        moved = held_within(free, covariance, *each).reshape(fits, effects, known + 1)
         after = power[:, None] + left(moved, gram[:, *square], right[:, both])
         explains = 1 - after / np.maximum(before, 1e-300)[:, None]
         return explains, moved[..., -1], moved[..., :-1] - best[:, None]

@@ -96,7 +96,8 @@ def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def held_within(free: np.ndarray, covariance: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Solutions where coefficients that would leave their bounds stay on them, and are not let go again.
+    """Least-squares solutions within bounds: coefficients that would leave them stay on them, until the slope
+    points inwards again.
 
     `free` are the solutions (fits, columns) without bounds, of this `covariance`; `lower` and `upper` (fits,
     columns). Coefficients h that are held at b move the others as by Gaussian conditioning:
@@ -106,22 +107,25 @@ def held_within(free: np.ndarray, covariance: np.ndarray, lower: np.ndarray, upp
         return free
     bounded = np.flatnonzero((np.isfinite(lower) | np.isfinite(upper)).any(axis=0))
     solution, held = free.copy(), np.zeros((len(free), len(bounded)), bool)
-    bounds = np.zeros(held.shape)
+    bounds, force = np.zeros(held.shape), np.zeros(held.shape)
     todo = np.arange(len(free))
-    for _ in range(_PASSES):
+    for step in range(_PASSES):
         own = solution[todo][:, bounded]
         inside = np.clip(own, lower[todo][:, bounded], upper[todo][:, bounded])
         outside = (own != inside) & ~held[todo]
-        some = outside.any(axis=1)
+        # a bound pulls a coefficient back; one that would push it there lets go, but not for ever
+        pushed = np.where(bounds[todo] == lower[todo][:, bounded], force[todo] < 0, force[todo] > 0)
+        pushed &= held[todo] & (step < _PASSES // 2)
+        some = (outside | pushed).any(axis=1)
         todo, outside = todo[some], outside[some]
         if not len(todo):
             break
         bounds[todo] = np.where(outside, inside[some], bounds[todo])
-        held[todo] |= outside
+        held[todo] = (held[todo] & ~pushed[some]) | outside
         now = held[todo]
         beside = covariance[todo[:, None], bounded]
         matrix = np.where(now[:, :, None] & now[:, None, :], beside[:, :, bounded], np.eye(len(bounded)))
-        force = solve(matrix, np.where(now, bounds[todo] - free[todo][:, bounded], 0.0))
-        solution[todo] = free[todo] + np.einsum("pij,pi->pj", beside, force)
+        force[todo] = solve(matrix, np.where(now, bounds[todo] - free[todo][:, bounded], 0.0))
+        solution[todo] = free[todo] + np.einsum("pij,pi->pj", beside, force[todo])
         solution[todo[:, None], bounded] = np.where(now, bounds[todo], solution[todo][:, bounded])
     return solution

@@ -17,7 +17,7 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import Fit, Part
+from pellicle.fitting.result import Fit, Part, Status
 from pellicle.sampling.chain import Checks
 from pellicle.sampling.density import Modes
 
@@ -214,7 +214,9 @@ def verdict(posterior: Posterior) -> str:
         return f"The chain does not carry an interval: {'; '.join(checks.doubts)}."
     lead = next(iter(posterior.parameters.values()))
     unit = f" {lead.unit}" if lead.unit else ""
-    opening = f"If {posterior.assumption}, with" if posterior.assumption else "With"
+    misfit = posterior.fit.status is Status.MISFIT
+    assumption = "the scene explained the data, which it does not" if misfit else posterior.assumption
+    opening = f"If {assumption}, with" if assumption else "With"
     sentence = (
         f"{opening} 95 % probability {lead.name} lies between {lead.q025:.5g} and {lead.q975:.5g}{unit}"
     )

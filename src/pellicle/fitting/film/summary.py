@@ -35,6 +35,9 @@ _ABSORBS = 1e-3
 """An extinction above this is what makes a layer opaque."""
 _CHANCE = 5.0
 """Standard errors by which a mean square must exceed that of the noise of a depolarisation."""
+_WHITE, _OFF = 2.0, 9.0
+"""Points over which the residuals of white noise are correlated at most, and the factor on the given σ²
+beyond which that is said to be wrong: three times."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -157,6 +160,11 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
             )
         if structure is not None:
             messages.append(f"{own}the model misses structure {structure.words}")
+        if view.noise.given and length < _WHITE and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
+            messages.append(
+                f"{own}residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is"
+                f" too {'small' if ratio > 1 else 'large'}, and errors by the noise with it"
+            )
         if fit.outliers:
             messages.append(
                 f"{own}{fit.outliers} of {view.rows} points are outliers that count for less than half"
