@@ -66,8 +66,6 @@ def load_script():
 
     def load_script(path: str):
         spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
-        assert spec is not None
-        assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
         return module

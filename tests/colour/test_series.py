@@ -1,7 +1,5 @@
 """Colours of published series, computed by tmm and colour-science or named, against their thicknesses."""
 
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +8,11 @@ import pytest
 import pellicle as pl
 from pellicle.colour import FilmColourTable, invert
 
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "colour_series.py"
-
 
 @pytest.fixture(scope="module")
-def benchmark():
-    spec = spec_from_file_location("colour_series", BENCHMARK)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "path", list(sys.path))
-        patch.setitem(sys.modules, "colour_series", module)
-        spec.loader.exec_module(module)
-        yield module
+def benchmark(modules_of):
+    with modules_of(Path(__file__).parents[2] / "benchmarks", "colour_series") as modules:
+        yield modules["colour_series"]
 
 
 @pytest.fixture(scope="module")

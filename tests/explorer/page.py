@@ -19,7 +19,6 @@ def explorer(folder: Path, recipe: str) -> Iterator[tuple[subprocess.Popen, str]
     code = "from pellicle.cli import process; process()"
     command = [sys.executable, "-c", code, "explore", str(folder / "film.toml"), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
         yield server, server.stdout.readline().strip()
         server.send_signal(signal.SIGINT)
         assert server.wait(timeout=20) == 0

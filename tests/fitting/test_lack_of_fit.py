@@ -27,7 +27,6 @@ def test_sums_of_squares_of_all_sweeps():
     model, rng = 0.3 + 0.1 * np.cos(NM / 30), np.random.default_rng(0)
     sweeps = model + rng.normal(0, 0.002, (3, 128)) + 0.001 * np.sin(NM / 50)
     found = lack_of_fit(part(model, sweeps), 2)
-    assert found is not None
     about_model, within = np.sum((sweeps - model) ** 2), np.sum((sweeps - sweeps.mean(axis=0)) ** 2)
     expected = ((about_model - within) / 126) / (within / 256)
     assert found.freedom == (126, 256)
@@ -56,7 +55,6 @@ def test_verdicts(error, drift, words):
     noise = rng.normal(0, 0.002, (3, 128))
     shifts = drift * np.array([-1.0, 0.0, 1.0])[:, None]
     found = lack_of_fit(part(model + error * np.sin(NM / 50), model + noise + shifts), 1)
-    assert found is not None
     assert words in found.verdict
 
 
@@ -70,7 +68,6 @@ def test_a_fit_reports_it():
     assert abs(fit["thickness"].value - 300) < 4 * fit["thickness"].stderr
     # 256 degrees of freedom: 4.4 %
     found = lack_of_fit(fit.parts[0], 1)
-    assert found is not None
     assert found.repeatability == pytest.approx(0.002, rel=0.2)
     expected = f"sweeps 3, of which a point scatters by {found.repeatability:.2g}; {found.verdict}"
     assert expected in " ".join(fit.report().split())

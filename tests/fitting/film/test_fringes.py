@@ -20,7 +20,6 @@ def test_the_frequency_is_the_thickness(thickness):
     lamp = 1 + 0.3 * np.sin(1 + 600 * X)
     for signal in (np.cos(2 * np.pi * thickness * X), 1 / (1.4 + np.cos(2 * np.pi * thickness * X))):
         found = fringes(X, lamp * (3 + signal) + 0.02 * NOISE)
-        assert found is not None
         assert found.thickness == pytest.approx(thickness, rel=0.03)
         assert found.number == pytest.approx(thickness * np.ptp(X), rel=0.05)
 

@@ -179,7 +179,6 @@ def test_a_shift_of_wavelengths_at_the_ends_of_a_table_beside_a_free_index():
     (view,) = make(*measurements(pl.Spectrum(nm, np.full(66, 0.1), "R"), scene)).views
     at = np.array([0.05])
     shift = extended(view, at).wavelength
-    assert shift is not None
     changes = [(shift, x) for x in (0.5, 0.0, -0.5)]
     longer, as_is, shorter = extended(view, at).signals(view.data, at, changes)[:, :66]
 
