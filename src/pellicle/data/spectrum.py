@@ -113,13 +113,13 @@ class Spectrum:
             object.__setattr__(self, name, array)
         self._check_arrays()
         if self.folded is None:
-            at = None
+            kink = None
             if self.delta is not None and not parts:
                 group = np.zeros(size) if self.setting is None else self.setting
-                at = folding_at(self.wavelength, self.values, self.delta, group)
-            object.__setattr__(self, "folded", at is not None)
-            if at is not None:
-                object.__setattr__(self, "notes", (*self.notes, folding_note(at)))
+                kink = folding_at(self.wavelength, self.values, self.delta, group)
+            object.__setattr__(self, "folded", kink is not None)
+            if kink is not None:
+                object.__setattr__(self, "notes", (*self.notes, folding_note(kink)))
 
     @property
     def kind(self) -> Signal:
@@ -130,11 +130,11 @@ class Spectrum:
         for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
             if getattr(self, name) not in known:
                 raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
-        own = KINDS[self.signal]
+        stated = KINDS[self.signal]
         for name in KEYWORDS:
             value = getattr(self, name)
             given = value is not None and value is not False and not (isinstance(value, tuple) and not value)
-            if (given and name not in own.keywords) or (not given and name in own.required):
+            if (given and name not in stated.keywords) or (not given and name in stated.required):
                 kinds = [word for word, kind in KINDS.items() if name in kind.keywords] or [""]
                 go = "go" if name.endswith("s") else "goes"
                 raise UsageError(f'`{name}` {go} with `signal="{kinds[0]}"`: give both, or neither')

@@ -116,14 +116,14 @@ class Anisotropic(AbstractDispersion):
 
         **Raises:** ValueError for a principal medium that is a name: `pellicle.refractive_index` looks it up.
         """
-        at = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
+        nm = jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
         indices = []
         for medium in (self.x, self.y, self.z):
             if isinstance(medium, str):
                 raise ValueError(f"{medium!r} is a name: use pl.refractive_index(wavelength, medium)")
             if medium is not None:
-                index = medium(at) if isinstance(medium, AbstractDispersion) else medium
-                indices.append(jnp.broadcast_to(index, at.shape) * (1 + 0j))
+                index = medium(nm) if isinstance(medium, AbstractDispersion) else medium
+                indices.append(jnp.broadcast_to(index, nm.shape) * (1 + 0j))
         return jnp.stack(indices, axis=-1)
 
     def index(self, wavelength) -> Medium:  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -38,9 +38,9 @@ class Table(AbstractDispersion):
 
     def index(self, wavelength):
         def column(values):
-            at, values = cast_like(self.wavelength, wavelength), cast_like(values, wavelength)
-            interp = namespace(wavelength, at, values).interp
-            return interp(wavelength, at, values, left=np.nan, right=np.nan)
+            known, values = cast_like(self.wavelength, wavelength), cast_like(values, wavelength)
+            interp = namespace(wavelength, known, values).interp
+            return interp(wavelength, known, values, left=np.nan, right=np.nan)
 
         return column(self.n) if self.k is None else Pair(column(self.n), column(self.k))
 

@@ -36,9 +36,9 @@ def coherence(scene: Scene) -> Row:
     if _by_orders(scene):
         why = f"fringes are damped by {' and '.join(blurs)}"
         # of a phase of P radians that is taken as linear over the window: P σ²/λ²
-        at, layers = _layers(scene)
-        window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(at)
-        return Row("coherence", True, why, float(min(_path(at, layers) * window**2, 1.0)))
+        nm, layers = _layers(scene)
+        window = upper(scene.instrument.bandwidth) / series.FWHM / np.min(nm)
+        return Row("coherence", True, why, float(min(_path(nm, layers) * window**2, 1.0)))
     return coherence_by_nodes(scene)
 
 
@@ -68,14 +68,14 @@ def _unresolved(scene: Scene) -> str | None:
     """
     if scene.light.wavelength is None or not _has_series(scene) or _blurs(scene):
         return None
-    at, (layer,) = np.unique(np.asarray(scene.light.wavelength, dtype=float)), coherent_layers(scene)
-    step = float(np.min(np.diff(at), initial=np.inf))
+    nm, (layer,) = np.unique(np.asarray(scene.light.wavelength, dtype=float)), coherent_layers(scene)
+    step = float(np.min(np.diff(nm), initial=np.inf))
     thickness = float(layer.thickness.lower if isinstance(layer.thickness, Free) else layer.thickness)
-    if at.size < 2 or 10 * thickness * step < at[-1] ** 2:  # resolved at any index below 10
+    if nm.size < 2 or 10 * thickness * step < nm[-1] ** 2:  # resolved at any index below 10
         return None
     steepest = min(np.deg2rad(scene.light.largest_angle), np.pi / 2)
-    square = smallest_index(layer.material, at) ** 2 - (least_ambient(scene) * np.sin(steepest)) ** 2
-    spacing = at[-1] ** 2 / (2 * np.sqrt(max(square, 1e-12)) * thickness)
+    square = smallest_index(layer.material, nm) ** 2 - (least_ambient(scene) * np.sin(steepest)) ** 2
+    spacing = nm[-1] ** 2 / (2 * np.sqrt(max(square, 1e-12)) * thickness)
     if 2 * spacing > step:
         return None
     return f"fringes every {spacing:.2g} nm are narrower than the sampling of {step:.2g} nm"
@@ -138,22 +138,22 @@ def _nodes(scene: Scene) -> tuple[int, float]:
 
     It is the error on a fringe of the thickest stack within the bounds, for every blur up to the largest.
     """
-    at, layers = _layers(scene)
-    blurs = [_path(at, layers) / np.min(at) * upper(scene.instrument.bandwidth) / series.FWHM]
-    blurs += [4 * np.pi / np.min(at) * index * upper(thickness_spread(scene, x)) for x, index in layers]
+    nm, layers = _layers(scene)
+    blurs = [_path(nm, layers) / np.min(nm) * upper(scene.instrument.bandwidth) / series.FWHM]
+    blurs += [4 * np.pi / np.min(nm) * index * upper(thickness_spread(scene, x)) for x, index in layers]
     tried = [(n, float(sum(quadrature.normal_error(blur, n) for blur in blurs))) for n in NODES]
     return next(((n, error) for n, error in tried if error < NODES_ERROR), tried[-1])
 
 
 def _layers(scene: Scene) -> tuple[np.ndarray, list[tuple[Layer, float]]]:
     """The wavelengths, and every coherent layer with its largest index."""
-    at = np.asarray(scene.light.wavelength, dtype=float)
-    return at, [(layer, largest_index(layer.material, at)) for layer in coherent_layers(scene)]
+    nm = np.asarray(scene.light.wavelength, dtype=float)
+    return nm, [(layer, largest_index(layer.material, nm)) for layer in coherent_layers(scene)]
 
 
-def _path(at: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
+def _path(nm: np.ndarray, layers: list[tuple[Layer, float]]) -> float:
     """The largest phase of a round trip through all layers, in radians."""
-    return float(4 * np.pi / np.min(at) * sum(upper(layer.thickness) * index for layer, index in layers))
+    return float(4 * np.pi / np.min(nm) * sum(upper(layer.thickness) * index for layer, index in layers))
 
 
 RAYS = (3, 4, 6, 8, 12, 16, 24)
@@ -187,11 +187,11 @@ def rays_of_axes(plan: Plan) -> int:
 
 def _rays(scene: Scene) -> tuple[int, int, float]:
     """The fewest rays for a fringe of the thickest stack, and its error over the cone."""
-    at, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
+    nm, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
     sine = np.sin(scene.instrument.largest_half_angle(ambient))
     axis = np.deg2rad(scene.light.largest_angle)
-    index = min([smallest_index(layer.material, at) for layer in coherent_layers(scene)], default=1.0)
-    path = 4 * np.pi / np.min(at) * sum(upper(layer.thickness) for layer in coherent_layers(scene))
+    index = min([smallest_index(layer.material, nm) for layer in coherent_layers(scene)], default=1.0)
+    path = 4 * np.pi / np.min(nm) * sum(upper(layer.thickness) for layer in coherent_layers(scene))
 
     def phase(angle):
         return path * np.sqrt(np.maximum(index**2 - (ambient * np.sin(angle)) ** 2, 0.0))
@@ -206,20 +206,20 @@ def _rays(scene: Scene) -> tuple[int, int, float]:
 
 def _lens_rays(scene: Scene) -> tuple[int, int, float]:
     """The fewest rays where s and p mix, and their error for the thickest films within the bounds."""
-    at, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
+    nm, ambient = np.asarray(scene.light.wavelength, dtype=float), least_ambient(scene)
     media = [medium for medium in scene_media(scene) if isinstance(medium, Anisotropic)]
-    wavenumber, phase, others, index = 2 * np.pi / np.min(at), 0.0, 0.0, np.inf
+    wavenumber, phase, others, index = 2 * np.pi / np.min(nm), 0.0, 0.0, np.inf
     for layer in coherent_layers(scene):
         if isinstance(layer.material, Anisotropic):
             phase += wavenumber * upper(layer.thickness)
         else:
             others += wavenumber * upper(layer.thickness)
-            index = min(index, smallest_index(layer.material, at))
+            index = min(index, smallest_index(layer.material, nm))
     index = index if np.isfinite(index) else 1.0
     films = [
         Film(ambient, *indices, axis, phase, index, others)
         for medium in media
-        for indices in _extreme_indices(medium, at)
+        for indices in _extreme_indices(medium, nm)
         for axis in _axes(medium)
     ]
     light = scene.light
@@ -235,11 +235,11 @@ def _lens_rays(scene: Scene) -> tuple[int, int, float]:
     return chosen_rays(films, np.deg2rad(sorted(degrees)), sine, columns, CONE_ERROR)
 
 
-def _extreme_indices(medium: Anisotropic, at: np.ndarray) -> set[tuple[float, float]]:
+def _extreme_indices(medium: Anisotropic, nm: np.ndarray) -> set[tuple[float, float]]:
     """Pairs of an ordinary and an extraordinary index that differ most."""
     *first, last = principal_media(medium)
-    most, least = max(largest_index(m, at) for m in first), min(smallest_index(m, at) for m in first)
-    return {(most, smallest_index(last, at)), (least, largest_index(last, at))}
+    most, least = max(largest_index(m, nm) for m in first), min(smallest_index(m, nm) for m in first)
+    return {(most, smallest_index(last, nm)), (least, largest_index(last, nm))}
 
 
 _ASYMMETRIC = (0.07, 0.3)

@@ -100,10 +100,10 @@ def _corners(scene: Any) -> list[tuple[float, ...]]:
 
 
 def _ratio(scene: Scene) -> float:
-    at = jnp.asarray(scene.light.wavelength, dtype=float)
+    nm = jnp.asarray(scene.light.wavelength, dtype=float)
     group = next(group for group in groups(scene)[0] if group.layers)
     media = (group.above, group.layers[0].material, group.below)
-    above, layer, below = (medium.index(at) for medium in media)
+    above, layer, below = (medium.index(nm) for medium in media)
     squares, shift = [], upper(scene.instrument.angle_shift)
     # None is normal incidence
     angles: list[Any] = [None if normal_incidence(scene) else jnp.deg2rad(scene.light.angle + shift)]
@@ -111,10 +111,10 @@ def _ratio(scene: Scene) -> float:
         half = scene.instrument.largest_half_angle(least_ambient(scene))
         angles.append(jnp.minimum(half + (0.0 if angles[0] is None else angles[0]), jnp.pi / 2))
     for angle in angles:
-        a, _ = interface.transverse(scene.ambient.index(at), angle)
+        a, _ = interface.transverse(scene.ambient.index(nm), angle)
         inside = None if angle is None else interface.Inside(a)
         for polarisation in "s" if angle is None and all(map(isotropic_in_plane, media)) else "sp":
-            b = orders.airy_series(above, layer, below, 0.0 * at, inside, polarisation)
+            b = orders.airy_series(above, layer, below, 0.0 * nm, inside, polarisation)
             squares.append(np.asarray(abs2(b.upper * b.lower)))
     return float(np.sqrt(np.nanmax(np.stack(squares))))
 

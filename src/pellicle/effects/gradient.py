@@ -56,11 +56,11 @@ def gradient(scene: Scene) -> Row:
     def measured(count: int) -> float:
         return _largest((signals(numbers, count), signals(numbers, 2 * count)) for numbers in many)
 
-    at, least = np.asarray(few[0].light.wavelength, dtype=float), 2.0
+    nm, least = np.asarray(few[0].light.wavelength, dtype=float), 2.0
     for layer in (layer for numbers in few for layer in _graded_layers(numbers)):
         # slices that are thin against the wavelength and resolve the profile
-        ends = [real(known_index(x, at)) for x in (layer.material.first, layer.material.second)]
-        phase = 2 * np.pi / at * np.asarray(layer.thickness) * np.maximum(*ends)
+        ends = [real(known_index(x, nm)) for x in (layer.material.first, layer.material.second)]
+        phase = 2 * np.pi / nm * np.asarray(layer.thickness) * np.maximum(*ends)
         least = max(least, float(np.max(phase)) / _STEP, layer.material.profile.variations)
     counts = [n for n in COUNTS if n >= min(int(np.ceil(least)), COUNTS[-1])]
     count, error = COUNTS[-1], np.inf
@@ -82,9 +82,9 @@ def _graded_layers(scene: Scene) -> list[Any]:
 
 def _passes_zero(scene: Scene) -> bool:
     """True where the real part of the permittivity has both signs in a graded layer."""
-    at = np.asarray(scene.light.wavelength, dtype=float)
+    nm = np.asarray(scene.light.wavelength, dtype=float)
     for layer in _graded_layers(scene):
-        index = _layer(layer, 32, at).middle
+        index = _layer(layer, 32, nm).middle
         square = real(index) ** 2 - imag(index) ** 2
         if np.any((np.min(square, axis=0) < 0) & (np.max(square, axis=0) > 0)):
             return True
@@ -97,13 +97,13 @@ def _largest(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
 
 def _scenes(scene: Scene, wavelengths: int, inside: int) -> list[Scene]:
     """The scene at a few wavelengths, with the start values, at corners of the bounds and between them."""
-    at, angle = np.asarray(scene.light.wavelength, dtype=float), scene.light.angle
-    chosen = np.linspace(0, at.size - 1, wavelengths).round().astype(int)
-    chosen = np.unique([*chosen, int(np.argmin(at))])
+    nm, angle = np.asarray(scene.light.wavelength, dtype=float), scene.light.angle
+    chosen = np.linspace(0, nm.size - 1, wavelengths).round().astype(int)
+    chosen = np.unique([*chosen, int(np.argmin(nm))])
     few = jax.tree_util.tree_map(
-        lambda x: _at(x, at, chosen), scene, is_leaf=lambda x: is_free(x) or isinstance(x, Tabulated | Scaled)
+        lambda x: _at(x, nm, chosen), scene, is_leaf=lambda x: is_free(x) or isinstance(x, Tabulated | Scaled)
     )
-    few = with_wavelength(few, at[chosen], np.asarray(angle)[chosen] if np.ndim(angle) else angle)
+    few = with_wavelength(few, nm[chosen], np.asarray(angle)[chosen] if np.ndim(angle) else angle)
     free = [leaf for _, leaf in free_leaves(few)]
     rng = np.random.default_rng(0)
     if 2 ** len(free) < _CORNERS:
@@ -130,17 +130,17 @@ def _at(medium: Any, wavelength: np.ndarray, chosen: np.ndarray) -> Any:
 
 def signals(scene: Scene, count: int) -> np.ndarray:
     """Reflectances and transmittances of every group, or N, C, S and such, (quantities, wavelengths)."""
-    at, light = np.asarray(scene.light.wavelength, dtype=float), scene.light
+    nm, light = np.asarray(scene.light.wavelength, dtype=float), scene.light
     tilt = scene.instrument.largest_half_angle(least_ambient(scene)) if scene.instrument.has_cone else 0.0
     tilt += np.deg2rad(upper(scene.instrument.angle_shift))
     angle = np.minimum(np.deg2rad(np.asarray(light.angle, dtype=float)) + tilt, 0.4999 * np.pi)
-    a = real(known_index(scene.ambient, at)) * np.sin(angle)
+    a = real(known_index(scene.ambient, nm)) * np.sin(angle)
     values = []
     for group in groups(scene)[0]:
         if any(isinstance(layer.material, Graded) for layer in group.layers):
-            layers = [_layer(layer, count, at) for layer in group.layers]
-            phases = [2 * np.pi / at * np.asarray(layer.thickness) for layer in group.layers]
-            above, below = known_index(group.above, at), known_index(group.below, at)
+            layers = [_layer(layer, count, nm) for layer in group.layers]
+            phases = [2 * np.pi / nm * np.asarray(layer.thickness) for layer in group.layers]
+            above, below = known_index(group.above, nm), known_index(group.below, nm)
             each = [
                 stack_response(above, layers, below, phases, a, x)
                 for x in ("s" if normal_incidence(scene) else "sp")
@@ -153,10 +153,10 @@ def signals(scene: Scene, count: int) -> np.ndarray:
     return np.array(values)
 
 
-def _layer(layer: Layer, count: int, at: np.ndarray) -> Any:
+def _layer(layer: Layer, count: int, nm: np.ndarray) -> Any:
     """Index of a layer at the wavelengths, of a graded one at the points of its slices."""
     # a number of JAX would be computed by JAX, op by op
     material: Any = jax.tree_util.tree_map(lambda x: np.asarray(x)[()], layer.material)
     if isinstance(material, Graded):
-        return Gradient(*(material.at(z, at) for z in gauss_points(count)))
-    return known_index(material, at)
+        return Gradient(*(material.at(z, nm) for z in gauss_points(count)))
+    return known_index(material, nm)

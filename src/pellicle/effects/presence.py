@@ -196,8 +196,8 @@ def _propagates(material, scene: Scene) -> bool:
     angle, wavelength = scene.light.angle, scene.light.wavelength
     if free_leaves(material) or isinstance(angle, Free) or wavelength is None or free_leaves(scene.ambient):
         return False
-    at = np.asarray(wavelength, dtype=float)
-    index, ambient = (real(known_index(medium, at)) for medium in (material, scene.ambient))
+    nm = np.asarray(wavelength, dtype=float)
+    index, ambient = (real(known_index(medium, nm)) for medium in (material, scene.ambient))
     shift = scene.instrument.angle_shift
     steepest = np.deg2rad(angle + upper(shift)) + scene.instrument.largest_half_angle(float(np.min(ambient)))
     return bool(np.all(index > ambient * np.sin(np.minimum(steepest, np.pi / 2)) * (1 + 1e-6)))
@@ -252,11 +252,11 @@ def back_face(scene: Scene) -> Row:
 
 def dispersion(scene: Scene) -> Row:
     """On where an index varies with the wavelength."""
-    at = scene.light.wavelength
+    nm = scene.light.wavelength
     media = [*_media(scene), ("ambient", scene.ambient)]
     bare = [(name, m.dispersion if isinstance(m, Material) else m) for name, m in media]
     varying = dict.fromkeys(name for name, m in bare if not isinstance(m, Constant))
-    if at is not None and np.size(np.unique(at)) == 1:
+    if nm is not None and np.size(np.unique(nm)) == 1:
         return Row("dispersion", False, "one wavelength")
     words = f"the index of {' and '.join(varying)}" if varying else "no index"
     return Row("dispersion", bool(varying), f"{words} varies with the wavelength")

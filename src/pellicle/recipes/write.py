@@ -69,26 +69,21 @@ def recipe_text(
     """
     check_scene(scene)
     place = Path(folder)
-    names = [_relative(file, place) for file in files]
     data, camera = _options(reading, place)
-    data = ({"files": names} if names else {}) | data
+    if names := [_relative(file, place) for file in files]:
+        data = {"files": names} | data
     if isinstance(scene, Surface):
         text = _document({"data": {"signal": "brdf", **data}, "scene.surface": _surface(scene, place)})
         again: Any = checked(tomllib.loads(text), str(place / "recipe")).scene()
         _check_surface(scene, again)
         return text
-    of_files = []
-    for table in tables:
-        given = {**table, **table.get("camera", {})}
-        keys, seen = _options({key: x for key, x in given.items() if key != "camera"}, place)
-        of_files.append(keys | {"path": _relative(table["path"], place)} | ({"camera": seen} if seen else {}))
     ambient = written_medium(scene.ambient, "the ambient", place)
     of_scene, of_instrument = parts.uncertainty_keys(scene.uncertainty)
     data = data if wavelength is None else {"wavelengths": _wavelengths(wavelength)} | data
     text = _document(
         {
             "data": _data(scene) | data,
-            "data.file": of_files,
+            "data.file": [_file_keys(table, place) for table in tables],
             "scene": {
                 **({} if ambient == 1.0 else {"ambient": ambient}),
                 "substrate": parts.substrate_keys(scene.substrate, place),
@@ -107,6 +102,12 @@ def recipe_text(
 
 def _relative(path: str | os.PathLike[str], folder: Path) -> str:
     return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _file_keys(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    given = {**table, **table.get("camera", {})}
+    keys, camera = _options({key: x for key, x in given.items() if key != "camera"}, folder)
+    return keys | {"path": _relative(table["path"], folder)} | ({"camera": camera} if camera else {})
 
 
 def _options(reading: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:

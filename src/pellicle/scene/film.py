@@ -286,8 +286,8 @@ def media(scene: Scene) -> list[AbstractDispersion]:
     """
     back = [] if scene.substrate.back is None else [scene.substrate.back]
     layers = [layer.material for layer in scene.layers if not isinstance(layer, Interface)]
-    own = [part for x in layers for part in ((x.first, x.second) if isinstance(x, Graded) else (x,))]
-    every = (*own, scene.substrate.material, scene.ambient, *back)
+    of_layers = [part for x in layers for part in ((x.first, x.second) if isinstance(x, Graded) else (x,))]
+    every = (*of_layers, scene.substrate.material, scene.ambient, *back)
     return [principal for medium in every for principal in principal_media(medium)]
 
 

@@ -54,8 +54,8 @@ def index_numbers(
         raise UsageError(f"{part} and {' and '.join(sorted(clash))} exclude each other")
     dispersion = medium(value)
     if free_leaves(dispersion):
-        own = " and ".join(key for key in KEYS[part] if key in known)
-        raise UsageError(f"{part} cannot be free: give {own} with bounds of their own in its place")
+        keys = " and ".join(key for key in KEYS[part] if key in known)
+        raise UsageError(f"{part} cannot be free: give {keys} with bounds of their own in its place")
     for material in materials_in(dispersion):
         material.check_range(nm)
     index = known_index(dispersion, nm)

@@ -78,12 +78,12 @@ def kinks(
     lowest = np.flatnonzero((s[1:-1] <= s[:-2]) & (s[1:-1] <= s[2:])) + 1
     result = []
     for split in np.union1d(lowest, lowest + 1).tolist():
-        at = 0.5 * (wavelength[split - 1] + wavelength[split])
+        kink = 0.5 * (wavelength[split - 1] + wavelength[split])
         widest = _SHARE * min(_rising(s[split - 1 :: -1], noise), _rising(s[split:], noise))
         for half in _HALF_WIDTHS:
             if half > widest:
                 break
-            near, position = (x[split - half : split + half] for x in (s, wavelength - at))
+            near, position = (x[split - half : split + half] for x in (s, wavelength - kink))
             rise = min(near[:half].max(), near[half:].max())
             basis = np.linalg.qr(np.vander(position / np.ptp(position), 4))[0]
             columns = np.stack([near, np.where(np.arange(2 * half) < half, -near, near)], axis=1)
@@ -93,7 +93,7 @@ def kinks(
                 # the narrowest window that tells them apart decides: a wide one has other bends
                 ratio = float(as_measured / max(restored, noise**2))
                 if ratio > _BETTER and rise > _RISE:
-                    result.append((ratio, float(at)))
+                    result.append((ratio, float(kink)))
                 break
     return result
 

@@ -64,10 +64,10 @@ class Generalised(Ratios):
 
     @property
     def quantities(self) -> tuple[base.Quantity, ...]:
-        each = (("psi", "Ψ", "values", ""), ("delta", "Δ", "delta", "½ sin 2Ψ "))
+        angles = (("psi", "Ψ", "values", ""), ("delta", "Δ", "delta", "½ sin 2Ψ "))
         result = []
         for i, name in enumerate(self.parts):
-            for row, (angle, sign, array, weight) in enumerate(each):
+            for row, (angle, sign, array, weight) in enumerate(angles):
                 shown = f"{sign} {NAMES[name]}"
                 cell = base.Cell(row, i, shown, f"{weight}{shown}", 0.5)
                 result.append(base.Quantity(f"{angle}_{name}", f"{sign} {name}", "degrees", array, i, cell))
@@ -208,9 +208,9 @@ def upright(
     return np.stack([*turned, frames[..., 2, :]], axis=-2), shared
 
 
-def _in_directions(each: Float[np.ndarray, "points ratios 3"]) -> Float[np.ndarray, "points channels"]:
+def _in_directions(ratios: Float[np.ndarray, "points ratios 3"]) -> Float[np.ndarray, "points channels"]:
     """Return the channels, of numbers in two directions and outwards of each ratio."""
-    return np.concatenate([each[..., :2].reshape(len(each), -1), each[..., 2]], axis=1)
+    return np.concatenate([ratios[..., :2].reshape(len(ratios), -1), ratios[..., 2]], axis=1)
 
 
 def block_frame(

@@ -155,14 +155,14 @@ class PsiDelta(Ratios):
                 values = np.einsum("pij,pj->pi", frame, values)
         if self.depolarisation and data.depolarisation is not None:
             # the last of what is measured: before the direction outwards
-            at = values.shape[1] if frame is None else values.shape[1] - 1
-            own = sphere.ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
+            place = values.shape[1] if frame is None else values.shape[1] - 1
+            level = sphere.ROUGH if data.depolarisation_sigma is None else data.depolarisation_sigma
             noise = np.broadcast_to(np.reshape(noise, (len(data), -1)), values.shape)
-            values = np.insert(values, at, data.depolarisation, axis=1)
-            noise = np.insert(noise, at, own, axis=1)
+            values = np.insert(values, place, data.depolarisation, axis=1)
+            noise = np.insert(noise, place, level, axis=1)
             if frame is not None:
-                frame = np.insert(np.insert(frame, at, 0.0, axis=1), 3, 0.0, axis=2)
-                frame[:, at, 3] = 1.0
+                frame = np.insert(np.insert(frame, place, 0.0, axis=1), 3, 0.0, axis=2)
+                frame[:, place, 3] = 1.0
         return base.Channels(values, noise, frame)
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
@@ -184,9 +184,9 @@ class PsiDelta(Ratios):
         every = tuple(range(count))
         if not self.depolarisation:
             return (base.ChannelGroup(every, 2),)
-        own = count - 2 if framed else count - 1
-        others = tuple(channel for channel in every if channel != own)
-        return base.ChannelGroup(others, 2), base.ChannelGroup((own,), 1, self.depolarisation_known)
+        position = count - 2 if framed else count - 1
+        others = tuple(channel for channel in every if channel != position)
+        return base.ChannelGroup(others, 2), base.ChannelGroup((position,), 1, self.depolarisation_known)
 
     @property
     def outwards(self) -> int:

@@ -43,8 +43,8 @@ def with_depolarisation(rows: Any, count: int) -> Any:
 
 def on_spheres(rows: Any) -> Any:
     """N, C, S side by side (points, 3 · ratios), each brought to its sphere."""
-    each = rows.reshape(len(rows), -1, 3)
-    return (each * lengths(each, axis=-1)[1]).reshape(rows.shape)
+    vectors = rows.reshape(len(rows), -1, 3)
+    return (vectors * lengths(vectors, axis=-1)[1]).reshape(rows.shape)
 
 
 def stokes_of_jones(x: Number, y: Number) -> list[Any]:
@@ -76,8 +76,8 @@ def ratio_sums_of_mueller(m: Matrix) -> list[Any]:
 
 def angles_of_sums(sums: Sequence[Any]) -> list[Any]:
     """N, C and S of each ratio from its four Stokes sums; 0 where both amplitudes are."""
-    each = (ellipsometry.Stokes(*sums[i : i + 4]) for i in range(0, len(sums), 4))
-    return [row for one in each for row in ellipsometry.normalised(one)]
+    stokes = (ellipsometry.Stokes(*sums[i : i + 4]) for i in range(0, len(sums), 4))
+    return [row for one in stokes for row in ellipsometry.normalised(one)]
 
 
 def isotropic_matrix(n: Any, c: Any, s: Any, m22: Any = None, m44: Any = None) -> Matrix:

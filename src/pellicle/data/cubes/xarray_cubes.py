@@ -41,10 +41,7 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         source = source.to_dataset(name=source.name or "values")
     dataset = _without_signal_axis(source)
     roles = _roles(dataset)
-    band = next((dim for dim, role in roles.items() if role == WAVELENGTH), None)
-    measured = {str(name): v for name, v in dataset.data_vars.items() if band is not None and band in v.dims}
-    if band is None or not measured:
-        raise _no_axis(dataset, "wavelength", path)
+    band, measured = _measured(dataset, roles, path)
     # a curve along the wavelength is no cube, but may be its errors
     written = {
         n: v.attrs.get("units") for n, v in measured.items() if v.ndim > 1 or n.lower() != "wavelength"
@@ -62,16 +59,13 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
     dims = tuple(axis for axis in _PIXELS if axis in {roles[dim] for dim in lengths})
     if not dims:
         raise _no_axis(dataset, "pixels (y and x, or site)", path)
-    renamed = {dim: role for dim, role in roles.items() if role is not None}
     stored = {
-        str(name): Stored(variable.variable, tuple(renamed.get(str(d), str(d)) for d in variable.dims))
+        str(name): Stored(variable.variable, tuple(roles[str(dim)] or str(dim) for dim in variable.dims))
         for name, variable in dataset.data_vars.items()
     }
     wavelength, unit = _band_axis(dataset, band, asked, path)
-    coords, units, dates = _coordinates(dataset, renamed, dims)
-    facts = dataset.attrs | main.attrs
-    light = str(facts.get("polarisation", facts.get("polarization", ""))).lower().replace("zed", "sed")
-    stated["polarisation"] = stated.get("polarisation") or (light if light in POLARISATIONS else None)
+    coords, units, dates = _coordinates(dataset, roles, dims)
+    stated["polarisation"] = stated.get("polarisation") or _polarisation(dataset.attrs | main.attrs)
     delta = f", {chosen['delta']!r}" if "delta" in chosen else ""
     return RawCube(
         path,
@@ -92,6 +86,19 @@ def xarray_to_raw(source: Any, path: str, asked: Asked, files: tuple[Path, ...] 
         ),
         **stated,
     )
+
+
+def _measured(dataset: Any, roles: Mapping[str, str | None], path: str) -> tuple[str, dict[str, Any]]:
+    """The axis of the bands, and the variables along it. Raises DataError where there are none."""
+    for band in (dim for dim, role in roles.items() if role == WAVELENGTH):
+        if measured := {str(name): v for name, v in dataset.data_vars.items() if band in v.dims}:
+            return band, measured
+    raise _no_axis(dataset, "wavelength", path)
+
+
+def _polarisation(facts: Mapping[str, Any]) -> str | None:
+    word = str(facts.get("polarisation", facts.get("polarization", ""))).lower().replace("zed", "sed")
+    return word if word in POLARISATIONS else None
 
 
 def _without_signal_axis(dataset: Any) -> Any:
@@ -168,15 +175,15 @@ def _angles(dataset: Any, roles: Mapping[str, str | None], path: str) -> np.ndar
 
 
 def _coordinates(
-    dataset: Any, renamed: Mapping[str, str], dims: tuple[str, ...]
+    dataset: Any, roles: Mapping[str, str | None], dims: tuple[str, ...]
 ) -> tuple[dict[str, np.ndarray], dict[str, str], list[str]]:
     """Coordinates along one axis of pixels, with their units; dates become seconds since the first."""
     coords, units, notes = {}, {}, []
     for name, coordinate in dataset.coords.items():
-        axes = [renamed.get(str(dim)) for dim in coordinate.dims]
+        axes = [roles[str(dim)] for dim in coordinate.dims]
         if len(axes) != 1 or axes[0] not in dims:
             continue
-        key = renamed.get(str(name), str(name))
+        key = roles.get(str(name)) or str(name)
         values, unit = np.asarray(coordinate.values), _units(coordinate)
         if values.dtype.kind == "M":
             values, unit = (values - values[0]) / np.timedelta64(1, "s"), "s"

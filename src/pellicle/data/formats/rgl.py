@@ -252,8 +252,7 @@ def _channels(
     if brdf.wavelengths is None:
         told = "R, G, B of linear sRGB"
         return np.eye(3), told + ("" if bands else ', at wavelengths: give the surface sensor = "srgb"')
-    own = WAVELENGTHS if wavelengths is None else wavelengths
-    wanted = np.array(bands[0] if bands else own, dtype=float)
+    wanted = np.array(bands[0] if bands else WAVELENGTHS if wavelengths is None else wavelengths, dtype=float)
     first, last = brdf.wavelengths[[0, -1]]
     stored = [np.interp(wanted, brdf.wavelengths, row) for row in np.eye(brdf.wavelengths.size)]
     if bands:

@@ -61,18 +61,18 @@ def read(file: TextFile) -> list[Table] | None:
     Raises DataError where the file has none.
     """
     lines = file.lines
-    at = _unit_line(lines)
-    if at is None:
+    place = _unit_line(lines)
+    if place is None:
         return None
-    heading, unit = lines[:at], lines[at].text.upper().split()
+    heading, unit = lines[:place], lines[place].text.upper().split()
     method = next((line.text for line in heading if line.text.startswith(METHOD)), "")
-    rows = [(line, _cells(line)) for line in lines[at + 1 :] if line.bare.strip()]
+    rows = [(line, _cells(line)) for line in lines[place + 1 :] if line.bare.strip()]
     if not (method or unit[1:] or any(_KNOWN.fullmatch(cells[0]) for _, cells in rows)):
         return None
     dynamic = any(line.text.strip().lower() == "dynamic" for line in heading)
     transmitted = "TransmissionMeas=1" in method.replace(" ", "")
     facts = [("format", "Woollam text")]
-    facts += [(key, found[1]) for key, text in _FACTS.items() if (found := re.search(text, method))]
+    facts += [(key, match[1]) for key, text in _FACTS.items() if (match := re.search(text, method))]
     if heading and not heading[0].text.startswith((METHOD, "Original[")):
         facts.append(("sample", heading[0].text.strip()))
     facts += [("light", "transmitted")] if transmitted else []

@@ -80,8 +80,8 @@ def layout_of(file: TextFile) -> Table:
     declared = declarations([*above, *lines[:skipped], *lines[end:]])
     width = max(width, len(names or ()))
     cells = TextCells(delimiter, decimal, width, max(width, trailing), rows)
-    found = tuple(names) if names else None
-    return Table(found, width, cells, tuple(notes), "", declared, file.path, file.sha256)
+    named = tuple(names) if names else None
+    return Table(named, width, cells, tuple(notes), "", declared, file.path, file.sha256)
 
 
 def _without_empty_columns(lines: Sequence[Line]) -> Sequence[Line]:
