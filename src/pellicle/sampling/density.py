@@ -48,11 +48,11 @@ class Systematics(NamedTuple):
         """
         pairs = list(zip(self.columns, views, strict=True))
         explained = jnp.zeros(len(self.columns[0]))
-        for changes, (own, view) in zip(self.changes, pairs, strict=True):
+        for changes, (columns, view) in zip(self.changes, pairs, strict=True):
             points = changes.shape[1]
-            priors = own.shape[1] - points
-            explained += own[:, :points] @ view.residual[:points]
-            explained += own[:, points:] @ view.residual[len(view.residual) - priors :]
+            priors = columns.shape[1] - points
+            explained += columns[:, :points] @ view.residual[:points]
+            explained += columns[:, points:] @ view.residual[len(view.residual) - priors :]
         total = sum(share * view.deviance for share, view in zip(self.shares, views, strict=True))
         return total - jnp.sum(jnp.square(explained))
 
@@ -76,14 +76,14 @@ def systematics(
         for effect in view.effects:
             order.setdefault((effect.name, None if effect.shared else i), len(order))
     every, columns, information = [], [], np.eye(len(order))
-    for i, (own, share, width) in enumerate(zip(evidence, shares, channels, strict=True)):
-        rows, measured = own.residual.shape
+    for i, (view, share, width) in enumerate(zip(evidence, shares, channels, strict=True)):
+        rows, measured = view.residual.shape
         changes = np.zeros((len(order), rows, width))
-        for effect in own.effects:
-            at = order[effect.name, None if effect.shared else i]
-            changes[at, :, :measured] = effect.change * own.weights
-        linear = np.zeros((rows, width, own.jacobian.shape[2] - known))
-        linear[:, :measured] = own.jacobian[:, :, known:] * own.weights[:, :, None]
+        for effect in view.effects:
+            row = order[effect.name, None if effect.shared else i]
+            changes[row, :, :measured] = effect.change * view.weights
+        linear = np.zeros((rows, width, view.jacobian.shape[2] - known))
+        linear[:, :measured] = view.jacobian[:, :, known:] * view.weights[:, :, None]
         flat = changes.reshape(len(order), rows * width)
         # less what scale and offset, under their priors of unit width, follow: only so the effects explain no
         # more than there is where the signal, and with it what the scale follows, is another
@@ -96,7 +96,7 @@ def systematics(
         every.append(flat)
         columns.append(share * rest)
     factor = np.linalg.cholesky(information)
-    columns = tuple(np.linalg.solve(factor, own) for own in columns)
+    columns = tuple(np.linalg.solve(factor, linear) for linear in columns)
     return Systematics(tuple(every), columns, np.array(shares))
 
 
@@ -277,10 +277,10 @@ class _Expansion(NamedTuple):
 def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Expansion:
     """Linearisation of an affine problem at a point (parameters,) of the unit cube."""
     values = np.asarray(problem.values(unit))
-    at = [view.local(problem.seen_by(view, values)) for view in problem.views]
+    parts = [view.local(problem.seen_by(view, values)) for view in problem.views]
     counted = np.array([view.independent_fraction for view in problem.views])
-    matrix, _, names, pulls = scaled(problem, unit, at, (1 / (counted * effects.shares)).tolist())
-    pull, pairs = np.asarray(pulls), list(zip(problem.views, at, counted.tolist(), strict=True))
+    matrix, _, names, pulls = scaled(problem, unit, parts, (1 / (counted * effects.shares)).tolist())
+    pull, pairs = np.asarray(pulls), list(zip(problem.views, parts, counted.tolist(), strict=True))
     rest = [view.residuals(local).ravel() * fraction**0.5 for view, local, fraction in pairs]
     count, width, first, priors = len(effects.changes[0]), len(names), 0, len(unit)
     jacobian = np.zeros((len(matrix) + count, width + count))
@@ -289,12 +289,12 @@ def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Exp
     residual = np.zeros(len(jacobian))
     residual[len(matrix) - width : len(matrix)] -= pull
     explained = np.zeros(count)
-    for changes, columns, share, own in zip(*effects, rest, strict=True):
-        rows = slice(first, first + len(own))
-        jacobian[rows, width:], residual[rows] = share**0.5 * changes.T, share**0.5 * own
-        several = columns.shape[1] - len(own)
-        explained += columns @ np.concatenate([own, pull[priors : priors + several]])
-        first, priors = first + len(own), priors + several
+    for changes, columns, share, weighted in zip(*effects, rest, strict=True):
+        rows = slice(first, first + len(weighted))
+        jacobian[rows, width:], residual[rows] = share**0.5 * changes.T, share**0.5 * weighted
+        several = columns.shape[1] - len(weighted)
+        explained += columns @ np.concatenate([weighted, pull[priors : priors + several]])
+        first, priors = first + len(weighted), priors + several
     return _Expansion(jacobian, residual, float(np.sum(residual**2) - np.sum(explained**2)))
 
 
