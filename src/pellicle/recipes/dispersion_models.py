@@ -189,12 +189,12 @@ def build_oscillator(kind: str, values: Values) -> oscillators.AbstractOscillato
     return KINDS[kind](**{key: spec.value for key, spec in TERMS[kind].items()} | dict(values))
 
 
-def free_by_default(at: ParameterLocation, number: Parameter) -> Free | None:
+def free_by_default(location: ParameterLocation, number: Parameter) -> Free | None:
     """Return a parameter free within its default bounds, else within its own; None where there are none.
 
     It starts at a fixed number within the bounds, else in their middle.
     """
-    spec = _spec(at)
+    spec = _spec(location)
     if spec is None:
         return Free(number.lower, number.upper, limits=number.limits) if is_free(number) else None
     if isinstance(number, Free) or not spec.lower <= number <= spec.upper:
@@ -202,15 +202,16 @@ def free_by_default(at: ParameterLocation, number: Parameter) -> Free | None:
     return spec.parameter(number)
 
 
-def _spec(at: ParameterLocation) -> ParameterSpec | None:
-    if at.field == "fraction":
+def _spec(location: ParameterLocation) -> ParameterSpec | None:
+    if location.field == "fraction":
         return ParameterSpec(0.0, 1.0, 0.5, (0.0, 1.0))
     for name, specs in MODELS.items():
         kind = KINDS[name]
         # words free n and k of a constant with bounds around its own index
-        if kind is not Constant and kind is type(at.owner) and (at.key in specs or at.field in specs):
-            return specs.get(at.key) or specs[at.field]
-    return _EPS_INF if at.field == "eps_inf" else None
+        spec = specs.get(location.key) or specs.get(location.field)
+        if spec and kind is type(location.owner) and kind is not Constant:
+            return spec
+    return _EPS_INF if location.field == "eps_inf" else None
 
 
 KINDS: dict[str, type[Any]] = {

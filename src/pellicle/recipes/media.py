@@ -313,7 +313,7 @@ def _free_parameter(
     leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
     numbers = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
     located = [locate_parameter(dispersion, leaves[i][0]) for i in numbers]
-    known = {at.name: (at, i) for at, i in zip(located, numbers, strict=True)}
+    known = {location.name: (location, i) for location, i in zip(located, numbers, strict=True)}
     if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
         raise UsageError(f"cannot free {name!r}: the layer has no such number; n and k can always be freed")
     if name not in known:
@@ -321,9 +321,9 @@ def _free_parameter(
         listed = f"{', '.join(first)} and {last}" if first else last
         close = did_you_mean(name, known)
         raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
-    at, position = known[name]
+    location, position = known[name]
     replaced = [leaf for _, leaf in leaves]
-    replaced[position] = Free(*bounds) if bounds else models.free_by_default(at, replaced[position])
+    replaced[position] = Free(*bounds) if bounds else models.free_by_default(location, replaced[position])
     if replaced[position] is None:
         raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
     changed = jax.tree_util.tree_unflatten(structure, replaced)
