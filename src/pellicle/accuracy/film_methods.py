@@ -197,10 +197,6 @@ def _finer(case: Case) -> Variant | str:
     return Variant(case.plan, with_wavelength(case.scene, more), finish)
 
 
-def _planned(case: Case) -> Variant:
-    return Variant(plan(case.scene, case.tolerance), case.scene)
-
-
 def _sliced(count: int) -> Apply:
     return having(*_GRADED, partial(removed, HomogeneousSlices(count)))
 
@@ -213,7 +209,11 @@ SLICES, HOMOGENEOUS_SLICES = (2, 4, 8), (8, 32)
 METHODS = (
     Method("float64", "nothing", lambda case: Variant(case.plan, case.scene)),
     Method("float32", "nine digits of sixteen", lambda case: Variant(case.plan, case.scene), double=False),
-    Method("planned", "what its plan leaves out", _planned),
+    Method(
+        "planned",
+        "what its plan leaves out",
+        lambda case: Variant(plan(case.scene, case.tolerance), case.scene),
+    ),
     Method("closed form", "the damping of fringes", having(*_CLOSED, partial(_damping, on=False))),
     *(Method(f"{m} order{'s' * (m > 1)}", "higher orders", partial(_orders, m)) for m in ORDERS),
     Method("incoherent", "interference", partial(_orders, 0)),

@@ -20,14 +20,22 @@ from pellicle.cli.messages import (
     LOG,
     Progress,
     TimeLeft,
-    as_flags,
     duration,
     log_to_stderr,
     say,
     show,
     with_flags,
 )
-from pellicle.cli.session import BAD_DATA, GOOD, INTERRUPTED, TOO_SHORT, UNCLEAR, check_folder
+from pellicle.cli.session import (
+    BAD_DATA,
+    GOOD,
+    INTERRUPTED,
+    TOO_SHORT,
+    UNCLEAR,
+    check_folder,
+    error_message,
+    reported,
+)
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -116,9 +124,8 @@ class Batch:
         try:
             compared = repeats(self.fits)
         except UsageError as error:
-            say(f"pellicle: {error}")
-            if self.json:
-                show(failure([file.path for file in self.inputs.files], str(error)))
+            record = failure([file.path for file in self.inputs.files], str(error))
+            reported(str(error), record if self.json else None)
             return None
         show(to_json(compared) if self.json else report(compared), self.out is not None)
         if self.out is not None:
@@ -181,11 +188,9 @@ class Batch:
                 fit, posterior = self._result(data, scene, folder, progress)
         except ValueError as error:
             message = error_message(error, paths)
-            say(f"pellicle: {message}")
             self.records.append(failure(paths if self.inputs.joint else paths[0], message))
-            if self.json:
-                show(self.records[-1])
-            return BAD_DATA  # also where the error is one of usage: the other files go on
+            # also where the error is one of usage: the other files go on
+            return reported(message, self.records[-1] if self.json else None)
         record = to_json(fit, posterior)
         self.records.append(record)
         if self.inputs.repeats:
@@ -255,12 +260,6 @@ def measurement(
     if not joint and len(data) == 1:
         return data[0], scenes[0]
     return data, scenes[0] if isinstance(scenes[0], Surface) else scenes
-
-
-def error_message(error: Exception, paths: list[str]) -> str:
-    """The message of an error with flags for arguments, and the data files in front unless it names one."""
-    message = as_flags(str(error))
-    return message if any(path in message for path in paths) else f"{', '.join(paths)}: {message}"
 
 
 def written(write: Callable[[], object], done: str = "", failed: str | None = "") -> int:

@@ -71,13 +71,20 @@ def chart(
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
+    from pellicle.scene.free import Free
+    from pellicle.simulation.colours import varied_layer
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):
         return _surface(described, out, how)
     scene = described.scene()
     angles = _range("--angle", how.angle, 90.0)
-    nm = _bounds(scene, how.layer) if how.thickness is None else _range("--thickness", how.thickness, inf)
+    if how.thickness is None:  # the recipe's bounds, or 0 to twice a fixed thickness
+        chosen: Any = scene.layers[varied_layer(scene, how.layer)]
+        depth, free = chosen.thickness, isinstance(chosen.thickness, Free)
+        nm = (depth.lower, depth.upper) if free else (0.0, max(2 * float(depth), 1.0))
+    else:
+        nm = _range("--thickness", how.thickness, inf)
     if how.view != "chart":
         return _objects(scene, Path(recipe).stem, out, nm, how)
     start()
@@ -152,14 +159,3 @@ def _range(flag: str, text: str, upper: float) -> tuple[float, float]:
     if low < 0 or high > upper:
         raise UsageError(f"{flag} must lie in 0 to {upper:g}, got {text}")
     return low, high
-
-
-def _bounds(scene: Scene, layer: str | None) -> tuple[float, float]:
-    """The recipe's bounds, or 0 to twice a fixed thickness."""
-    from pellicle.scene.free import Free
-    from pellicle.simulation.colours import varied_layer
-
-    chosen: Any = scene.layers[varied_layer(scene, layer)]
-    if isinstance(chosen.thickness, Free):
-        return chosen.thickness.lower, chosen.thickness.upper
-    return 0.0, max(2 * float(chosen.thickness), 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,7 +48,6 @@ def explore(
     Example: pellicle explore film.toml
     """
     light = light or LightFlags()
-    reading = light.options()
     given = [*scene.given(), *light.given()]
     if recipe is not None and given:
         raise UsageError(
@@ -55,8 +55,15 @@ def explore(
         )
     start()
     from pellicle.explorer.server import serve
+    from pellicle.explorer.session import Session
 
-    session = _of_recipe(recipe) if recipe is not None else _of_flags(scene, reading)
+    if recipe is not None:
+        session = _of_recipe(recipe)
+    else:
+        film: Any = replace(scene, **{name: getattr(scene, name) or x for name, x in DEFAULTS.items()})
+        session = Session(film.scene(light.options()), title=f"{film.layer} on {film.substrate}")
+        if scene.thickness is None:
+            say("thickness: 0 to 1000 nm, since no --thickness was given")
 
     def ready(address: str) -> None:
         print(address, flush=True)
@@ -95,15 +102,3 @@ def _of_recipe(path: str) -> Session:
     reading = {name: x for name, x in first.options.items() if name not in ("angle", "polarisation")}
     about = {"title": title, "spectra": spectra, "reading": reading}
     return Session(scene, Path(path).parent, wavelength=given, **about)
-
-
-def _of_flags(flags: SceneFlags, reading: FileOptions) -> Session:
-    from dataclasses import replace
-
-    from pellicle.explorer.session import Session
-
-    film: Any = replace(flags, **{name: getattr(flags, name) or x for name, x in DEFAULTS.items()})
-    scene = film.scene(reading)
-    if flags.thickness is None:
-        say("thickness: 0 to 1000 nm, since no --thickness was given")
-    return Session(scene, title=f"{film.layer} on {film.substrate}")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.cli.batch import Batch, error_message, measurement, written
+from pellicle.cli.batch import Batch, measurement, written
 from pellicle.cli.flags import (
     OUTPUT,
     SAMPLER,
@@ -21,8 +21,8 @@ from pellicle.cli.flags import (
     switch,
 )
 from pellicle.cli.inputs import LEAST_SQUARES, Inputs, inputs
-from pellicle.cli.messages import Progress, say, show, with_flags
-from pellicle.cli.session import BAD_DATA, GOOD, UNCLEAR, check_folder, start
+from pellicle.cli.messages import Progress, show, with_flags
+from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
 from pellicle.errors import DataError, UsageError
 
 log = getLogger(__name__)
@@ -128,15 +128,10 @@ def _compare(
         comparison = compare_fits(fits)
     except ValueError as error:
         message = error_message(error, [label])
-        say(f"pellicle: {message}")
-        if as_json:
-            show(failure(label, message))
-        return BAD_DATA
+        return reported(message, failure(label, message) if as_json else None)
     show(to_json(comparison) if as_json else report(comparison), folder is not None)
     code = GOOD if comparison.best.fit.status == "converged" else UNCLEAR
-    if folder is not None:
-        code = max(
-            code,
-            written(partial(write_comparison, folder, comparison), f"{folder}: comparison and fits written"),
-        )
-    return code
+    if folder is None:
+        return code
+    write = partial(write_comparison, folder, comparison)
+    return max(code, written(write, f"{folder}: comparison and fits written"))

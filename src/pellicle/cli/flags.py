@@ -155,11 +155,6 @@ class SceneFlags(Flags):
     uncertainty: Annotated[str | None, flag(INSTRUMENT)] = None
     """usual: errors include those of ordinary instruments and samples; or none."""
 
-    @property
-    def assumed(self) -> list[str]:
-        """Sentences on what the flags leave open."""
-        return [] if self.thickness else ["thickness: 1 to 5000 nm, since no --thickness was given"]
-
     def scene(self, reading: FileOptions) -> Scene:
         """Build the scene that the flags describe, in the light of `reading`. Raises UsageError."""
         from pellicle.recipes import media as w
@@ -168,7 +163,19 @@ class SceneFlags(Flags):
         from pellicle.scene.instrument import Instrument
         from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate, Uncertainty
 
-        layer, substrate = self._checked()
+        layer, substrate = self.layer, self.substrate
+        if layer is None or substrate is None:
+            missing = "--layer" if layer is None else "--substrate"
+            raise UsageError(
+                f"{missing} is missing: give layer and substrate, as in "
+                "--layer SiO2 --substrate Si, or give a --recipe"
+            )
+        if self.uncertainty not in (None, "usual", "none"):
+            raise UsageError(f"--uncertainty must be usual or none, not {self.uncertainty!r}")
+        if self.plate_mm is not None and self.back is None:
+            raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
+        if self.plate_mm is not None and not 0 < self.plate_mm < inf:
+            raise UsageError(f"--plate-mm must be a finite number above zero, got {self.plate_mm:g}")
         free = [item.strip() for item in (self.free or "").split(",") if item.strip()]
         film = Layer(w.medium(layer, free), w.thickness(self.thickness or DEFAULT_THICKNESS))
         part, lit = self.back_collected, light(reading)
@@ -192,22 +199,6 @@ class SceneFlags(Flags):
             ),
             uncertainty=Uncertainty() if self.uncertainty != "none" else Uncertainty.none(),
         )
-
-    def _checked(self) -> tuple[str, str]:
-        """Layer and substrate. Raises UsageError where one is missing, or other flags are wrong."""
-        if self.layer is None or self.substrate is None:
-            missing = "--layer" if self.layer is None else "--substrate"
-            raise UsageError(
-                f"{missing} is missing: give layer and substrate, as in "
-                "--layer SiO2 --substrate Si, or give a --recipe"
-            )
-        if self.uncertainty not in (None, "usual", "none"):
-            raise UsageError(f"--uncertainty must be usual or none, not {self.uncertainty!r}")
-        if self.plate_mm is not None and self.back is None:
-            raise UsageError("--plate-mm needs --back: which medium lies behind the plate, as in --back air")
-        if self.plate_mm is not None and not 0 < self.plate_mm < inf:
-            raise UsageError(f"--plate-mm must be a finite number above zero, got {self.plate_mm:g}")
-        return self.layer, self.substrate
 
 
 def light(reading: FileOptions, azimuth: Any = None) -> Light:

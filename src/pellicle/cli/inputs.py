@@ -181,7 +181,8 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -
             " --recipe that does; pellicle demo is an example, --help lists every flag"
         )
     scene = scene_flags.scene(reading)
-    say(*scene_flags.assumed)
+    if not scene_flags.thickness:
+        say("thickness: 1 to 5000 nm, since no --thickness was given")
     check_free_count(len(free_leaves(scene)))
     check_camera(reading, [(file, reading) for file in files])
     inputs = [one for file in files for one in _film_inputs(file, scene, reading)]

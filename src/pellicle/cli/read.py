@@ -12,7 +12,7 @@ from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, named, sw
 from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.reading import read as read_file
-from pellicle.cli.session import BAD_DATA, GOOD, start
+from pellicle.cli.session import BAD_DATA, GOOD, error_message, reported, start
 from pellicle.data.options import FileOptions
 from pellicle.errors import DataError, UsageError
 
@@ -59,8 +59,10 @@ def read(
         try:
             measurements += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
-            worst = BAD_DATA
-            _report_error(path, as_flags(str(error)), json)
+            from pellicle.reporting.json_record import error_record
+
+            message = error_message(error, [path])
+            worst = reported(message, error_record(message, BAD_DATA) if json else None)
     if out is not None:
         from pellicle.data.cube import Cube
 
@@ -73,15 +75,6 @@ def read(
     if out is not None:
         _write(Path(out), measurements, formats)
     return worst
-
-
-def _report_error(path: str, message: str, as_json: bool) -> None:
-    from pellicle.reporting.json_record import error_record
-
-    message = message if path in message else f"{path}: {message}"
-    say(f"pellicle: {message}")
-    if as_json:
-        show(error_record(message, BAD_DATA))
 
 
 def _measurements(

@@ -247,15 +247,20 @@ def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     return scene, nm
 
 
+def refuse_wavelengths(recipe: FilmRecipe) -> None:
+    """Raise DataError where a recipe of colours has wavelengths."""
+    if recipe.tables.data.wavelengths is not None:
+        raise DataError(
+            f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
+        )
+
+
 def _in_colours(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
     """The scene at each angle of its colours, and the wavelengths of the sensor for each."""
     import equinox as eqx
     import numpy as np
 
-    if recipe.tables.data.wavelengths is not None:
-        raise DataError(
-            f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
-        )
+    refuse_wavelengths(recipe)
     scene, angles = recipe.first.scene(), recipe_angles(recipe)
     nm = recipe.first.sight().sensor.wavelength
     say(f"wavelengths: {nm[0]:g} to {nm[-1]:g} nm every 1 nm, those of the sensor")

@@ -15,10 +15,10 @@ from math import inf
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from shutil import disk_usage
-from typing import TypeVar
+from typing import Any, TypeVar
 from warnings import filterwarnings
 
-from pellicle.cli.messages import say
+from pellicle.cli.messages import as_flags, say, show
 from pellicle.errors import UsageError
 from pellicle.programs.threads import single_threaded
 
@@ -90,6 +90,20 @@ def check_folder(path: str) -> None:
         from pellicle.files import new_folder
 
         new_folder(path)
+
+
+def error_message(error: Exception, paths: list[str]) -> str:
+    """The message of an error with flags for arguments, and the data files in front unless it names one."""
+    message = as_flags(str(error))
+    return message if any(path in message for path in paths) else f"{', '.join(paths)}: {message}"
+
+
+def reported(message: str, record: dict[str, Any] | None) -> int:
+    """Print an error after which other files go on, and its JSON record if there is one; BAD_DATA."""
+    say(f"pellicle: {message}")
+    if record is not None:
+        show(record)
+    return BAD_DATA
 
 
 Task = TypeVar("Task")

@@ -14,7 +14,7 @@ from pellicle.cli.batch import Batch
 from pellicle.cli.flags import Flags, SamplerFlags
 from pellicle.cli.inputs import inputs
 from pellicle.cli.messages import say, show
-from pellicle.cli.reading import directions, each_setting, recipe_angles, wavelengths
+from pellicle.cli.reading import directions, each_setting, recipe_angles, refuse_wavelengths, wavelengths
 from pellicle.cli.session import check_folder, not_negative, start
 from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError, install_command
@@ -188,10 +188,7 @@ def _write_colours(
     from pellicle.simulation.colours import simulate_colours
 
     scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
-    if table.data.wavelengths is not None:
-        raise DataError(
-            f"{recipe.path}: [data] wavelengths: colours take those of their sensor; leave them out"
-        )
+    refuse_wavelengths(recipe)
     log_scene(scene)
     options: Any = {"gamma": table.camera.gamma or 1.0, "camera": seen.matrix, "noise": noise}
     options |= {"seed": how.seed, "tolerance": how.tolerance}
@@ -214,6 +211,9 @@ def _csv(scene: Scene, result: SimulatedSignal, kind: Signal, noise: float, comm
     """The spectrum as CSV below its comments, which end with the true values of the parameters."""
     import numpy as np
 
+    from pellicle.reporting.drawable import Table
+    from pellicle.reporting.plain_text import csv_text
+
     light, count = scene.light, len(result.wavelength)
     angles = np.asarray(getattr(light.angle, "start", light.angle), float)
     about = "" if light.ellipsometric else f", {light.polarisation}"
@@ -229,12 +229,10 @@ def _csv(scene: Scene, result: SimulatedSignal, kind: Signal, noise: float, comm
     if result.depolarisation is not None:
         measured.append(("depolarisation", result.depolarisation))
         errors.append(("sigma_depolarisation", result.depolarisation_noise))
-    columns = [(name, [f"{x:.10g}" for x in values.tolist()]) for name, values in known]
-    columns += [(name, [f"{x:.8f}" for x in values.tolist()]) for name, values in measured]
-    columns += [(name, [f"{error:g}"] * count) for name, error in errors if error]
-    header = ",".join(name for name, _ in columns)
-    rows = map(",".join, zip(*(texts for _, texts in columns), strict=True))
-    return "\n".join([*(f"# {line}" for line in lines), header, *rows, ""])
+    columns = {name: [f"{x:.10g}" for x in values.tolist()] for name, values in known}
+    columns |= {name: [f"{x:.8f}" for x in values.tolist()] for name, values in measured}
+    columns |= {name: [f"{error:g}"] * count for name, error in errors if error}
+    return csv_text(Table(columns, lines))
 
 
 def _write_samples(

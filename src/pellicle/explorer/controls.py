@@ -98,7 +98,8 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
         value: Any = present[path]
         label = _LABELS.get(number.key, number.key)
         free = value if isinstance(value, Free) else None
-        unit, start = {"deg": "°"}.get(number.unit, number.unit), float(value) if free is None else free.start
+        unit = {"deg": "°"}.get(number.unit, number.unit)
+        start = value.start if isinstance(value, Free) else float(value)
         bounds, group = (number.lower, number.upper), _group(scene, path)
         optional = getattr(path[-1], "name", "") in _OPTIONAL and number.lower <= 0
         controls.append(Control(number.name, label, unit, *bounds, start, group, path, optional, free))

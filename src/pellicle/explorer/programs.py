@@ -63,12 +63,13 @@ def measured_angles(spectra: Sequence[Spectrum]) -> np.ndarray:
 
 def asked_angles(given: Any) -> np.ndarray:
     """Check the angles of a request, which are returned rising and each once. Raises UsageError."""
-    expected = f"the angles of incidence must be 1 to {MOST} numbers from 0 to 90, such as 65, 70, 75"
-    if not isinstance(given, list | tuple) or not 1 <= len(given) <= MOST:
-        raise UsageError(expected)
-    if not all(isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= 90 for x in given):
-        raise UsageError(expected)
-    return np.unique(np.asarray(given, float))
+    asked = given if isinstance(given, list | tuple) else ()
+    known = all(isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= 90 for x in asked)
+    if not known or not 1 <= len(asked) <= MOST:
+        raise UsageError(
+            f"the angles of incidence must be 1 to {MOST} numbers from 0 to 90, such as 65, 70, 75"
+        )
+    return np.unique(np.asarray(asked, float))
 
 
 def thinned(angles: np.ndarray) -> np.ndarray:

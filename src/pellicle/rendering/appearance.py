@@ -88,24 +88,12 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     # without the others' names, so that it is found by its own
     named = tuple(replace(x, name=FILM if i == position else None) for i, x in enumerate(scene.layers))
     scene = replace(scene, layers=named)
-    colour = interference_colours(scene, nm, ANGLES, FILM)
-    return Appearance(
-        nm,
-        np.swapaxes(np.asarray(colour.xyz), 0, 1),
-        _index(film.material, CHANNELS),
-        _index(scene.substrate.material, CHANNELS),
-        _bare(scene),
-        scene,
-        notes=_notes(scene, film),
-        lacking=_lacking(scene, film),
-    )
-
-
-def _bare(scene: Scene) -> np.ndarray:
-    """Linear sRGB of the substrate in the scene's ambient at normal incidence, without a layer."""
-    bands, to_srgb = integration_bands(BANDS), srgb_matrix(sensor().white)
+    colour, bands = interference_colours(scene, nm, ANGLES, FILM), integration_bands(BANDS)
     n0, n2 = (_index(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
-    return np.clip(to_srgb @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights), 0.0, 1.0)
+    bare = srgb_matrix(sensor().white) @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights)
+    own, base = (_index(medium, CHANNELS) for medium in (film.material, scene.substrate.material))
+    xyz, left_out = np.swapaxes(np.asarray(colour.xyz), 0, 1), _left_out(scene, film)
+    return Appearance(nm, xyz, own, base, np.clip(bare, 0.0, 1.0), scene, **left_out)
 
 
 def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
@@ -114,24 +102,24 @@ def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
     return np.broadcast_to(re + (0j if im is None else 1j * np.asarray(im)), wavelength.shape)
 
 
-def _notes(scene: Scene, film: Layer) -> tuple[str, ...]:
-    notes = []
-    if any(isinstance(x, Plate) for x in scene.layers) or scene.substrate.back is not None:
-        notes.append("light that returns from the back face of a plate is part of its colours")
-    if film.roughness is not None or scene.substrate.roughness is not None:
-        notes.append("interfaces with a roughness in nm are part of its colours")
-    if film.thickness_spread is not None or scene.instrument.thickness_spread is not None:
-        notes.append("the spread of its thickness is part of its colours")
-    return tuple(notes)
-
-
-def _lacking(scene: Scene, film: Layer) -> tuple[str, ...]:
-    coherent = [x for x in scene.layers if isinstance(x, Layer | Interface)]
-    lacking = []
-    if len(coherent) > 1:
-        lacking.append(f"the film has {len(coherent)} layers: formats have one")
-    if np.max(np.imag(_index(film.material, CHANNELS))) > 0:
-        lacking.append("the layer absorbs: formats have none that does")
-    if np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3:
-        lacking.append("it is not in air, as formats assume")
-    return tuple(lacking)
+def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
+    """The sentences `notes` and `lacking` of an `Appearance`."""
+    instrument, own = scene.instrument, scene.substrate
+    coherent = sum(isinstance(x, Layer | Interface) for x in scene.layers)
+    plates = own.back is not None or any(isinstance(x, Plate) for x in scene.layers)
+    rough = film.roughness is not None or own.roughness is not None
+    uneven = film.thickness_spread is not None or instrument.thickness_spread is not None
+    notes = {
+        "light that returns from the back face of a plate is part of its colours": plates,
+        "interfaces with a roughness in nm are part of its colours": rough,
+        "the spread of its thickness is part of its colours": uneven,
+    }
+    absorbs = np.max(np.imag(_index(film.material, CHANNELS))) > 0
+    immersed = np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3
+    lacking = {
+        f"the film has {coherent} layers: formats have one": coherent > 1,
+        "the layer absorbs: formats have none that does": absorbs,
+        "it is not in air, as formats assume": immersed,
+    }
+    each = {"notes": notes, "lacking": lacking}
+    return {key: tuple(text for text, holds in texts.items() if holds) for key, texts in each.items()}

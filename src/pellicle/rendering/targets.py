@@ -82,18 +82,14 @@ class Material:
         }
         if self.solved is None:
             return entries
-        return entries | {
-            "formula": self.solved.formula.name,
-            "used": self.solved.used,
-            **{name: self._set(solution) for name, solution in self.solved.sets.items()},
-        }
-
-    def _set(self, solution: Solution) -> dict[str, Any]:
-        return {
-            "thickness_nm": [float(solution.scale * x) for x in (self.look.thickness[0], self.thickness)],
-            **{key: np.asarray(x).tolist() for key, x in solution.numbers.items()},
-            "delta_e2000": {"mean": solution.error.mean, "largest": solution.error.largest},
-        }
+        entries |= {"formula": self.solved.formula.name, "used": self.solved.used}
+        for name, solution in self.solved.sets.items():
+            entries[name] = {
+                "thickness_nm": [float(solution.scale * x) for x in (self.look.thickness[0], self.thickness)],
+                **{key: np.asarray(x).tolist() for key, x in solution.numbers.items()},
+                "delta_e2000": {"mean": solution.error.mean, "largest": solution.error.largest},
+            }
+        return entries
 
 
 def share_of_range(thickness: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "rows columns"]:

@@ -122,7 +122,13 @@ def draw(sections: Sequence[Section], title: str, width: float = WIDTH_INCHES) -
             if len(axes_row) == 1 and axes is not top and len(axes_rows[0]) == 1:
                 axes.sharex(top)
             draw_panel(axes, panel)
-        _label_abscissa(section, axes_rows)
+        for i, row in enumerate(section.rows):  # the lowest panel of each column has numbers
+            for j, panel in enumerate(row):
+                below = [later[j] for later in section.rows[i + 1 :] if len(later) == len(row)]
+                hidden = panel.empty or any(not other.empty for other in below)
+                axes_rows[i][j].tick_params(labelbottom=not hidden)
+        for axes in axes_rows[-1]:
+            axes.set_xlabel(plain(section.abscissa))
         if len(sections) > 1 and section.title:
             top.set_title(plain(section.title), fontsize="small", loc="left")
         for axes, panel, axes_row in panels:
@@ -130,17 +136,6 @@ def draw(sections: Sequence[Section], title: str, width: float = WIDTH_INCHES) -
                 _legend(axes, axes_row[-1], panel)
     _arrange(figure, grid, [row for _, row in rows], title)
     return figure
-
-
-def _label_abscissa(section: Section, grid: Sequence[Sequence[Axes]]) -> None:
-    """Number the lowest panel of each column, and name the abscissa below the last row."""
-    for i, row in enumerate(section.rows):
-        for j, panel in enumerate(row):
-            below = [later[j] for later in section.rows[i + 1 :] if len(later) == len(row)]
-            hidden = panel.empty or any(not other.empty for other in below)
-            grid[i][j].tick_params(labelbottom=not hidden)
-    for axes in grid[-1]:
-        axes.set_xlabel(plain(section.abscissa))
 
 
 def draw_panel(axes: Axes, panel: Panel) -> None:
