@@ -26,20 +26,20 @@ from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.layers import Layer, Uncertainty
 
-_WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
+WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
 _UNITS = {
     "thickness": "nm",
     "wavelength_shift": "nm",
     "plate_mm": "mm",
     "angle": "deg",
     "angle_shift": "deg",
-    **_WIDTHS,
+    **WIDTHS,
 }
 _NATURAL_ONE = ("back_collected",)
 _NATURAL_ZERO = (
     *("k", "k0", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
     *_NATURAL_ONE,
-    *_WIDTHS,
+    *WIDTHS,
 )
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from pellicle.fitting.evaluation import scanned
 from pellicle.fitting.film.fringes import proposed
+from pellicle.fitting.film.parameters import WIDTHS
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
@@ -39,6 +40,9 @@ that of a rival, as correlated residuals count for less."""
 _NEAR, _INDEX = 4, 0.4
 """Candidates that are polished near the thickness that the fringes suggest, and the difference of ln n up to
 which they are near: from 1.3 to 2.0, or back."""
+_NARROW = 0.05
+"""Position between its bounds at which a width starts that has no start of its own: in the middle of wide
+bounds no fringe is left."""
 _MOST_POLISHED = 2048
 """Starts after which no more are polished."""
 
@@ -187,7 +191,8 @@ def _by_decades(lower: float, upper: float, count: int) -> np.ndarray:
 
 def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if not p.searched:
-        return np.array([(p.start - p.lower) / (p.upper - p.lower)])
+        start = (p.start - p.lower) / (p.upper - p.lower)
+        return np.array([_NARROW if p.key in WIDTHS and start == 0.5 else start])
     if p.key == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
     if p.levels is not None and p.decades:
