@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from pellicle.fitting.conclusion import Conclusion, conclude, linearised
@@ -35,7 +36,7 @@ class Measurements(Protocol):
         """Numbers of the scene or the surface that are not free."""
         ...
 
-    def amended(self, limits: Limits) -> Limits:
+    def amended(self, parts: tuple[Part, ...], limits: Limits, /) -> Limits:
         """Limits of the parameters by what this kind of data cannot tell."""
         ...
 
@@ -102,6 +103,6 @@ def assemble(
         fixed=data.fixed(),
         scans=scans or {},
         near=near,
-        amend=data.amended,
+        amend=partial(data.amended, parts),
     )
     return Assembly(ranked, jacobian, covariance, model_error, parts, missed, conclusion, began)

@@ -207,9 +207,10 @@ class JointMeasurements(NamedTuple):
         """Fixed numbers of the scenes and of the surface."""
         return [*self.films.fixed(), *self.samples.fixed()]
 
-    def amended(self, limits: Limits) -> Limits:
+    def amended(self, parts: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits by what either kind cannot tell."""
-        return self.samples.amended(self.films.amended(limits))
+        count = len(self.films.targets)
+        return self.samples.amended(parts[count:], self.films.amended(parts[:count], limits))
 
 
 def together(apart: Apart, targets: list[Target], ranked: RankedMinima) -> JointMeasurements:

@@ -1,5 +1,6 @@
 """Simulated and fitted again: the truth comes back within its errors, for scenes of every kind."""
 
+import math
 from dataclasses import replace
 
 import jax
@@ -273,3 +274,13 @@ def test_a_sigma_that_the_residuals_contradict_is_said(film, measured, stated, w
     fit = pl.fit(pl.Spectrum(noisy.wavelength, noisy.values, "R", np.full(len(noisy), stated)), film())
     [sentence] = [w for w in fit.warnings if "white noise" in w]
     assert words in sentence
+
+
+@pytest.mark.parametrize(("index", "needed"), [(1.5, False), (1.62, True)])
+def test_a_layer_with_the_index_of_its_substrate_is_no_film(film, measured, index, needed):
+    """Whatever thickness and index fit the noise of a bare substrate best."""
+    scene = film(pl.Free(10, 1000), Constant(pl.Free(1.3, 2.0)), substrate=Constant(1.5))
+    fit = pl.fit(measured(scene, index, 300.0, noise=0.0005), scene)
+    assert (fit.status is pl.Status.CONVERGED) is needed
+    assert ("No film is needed" in fit.verdict) is not needed
+    assert needed or math.isinf(fit["thickness"].stderr)

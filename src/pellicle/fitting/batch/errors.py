@@ -79,7 +79,8 @@ def groups(view: SpectrumView, weight: np.ndarray, known: np.ndarray) -> list[Gr
 class BatchErrors:
     """Errors and status of spectra, as `pellicle.fit` has them of one spectrum.
 
-    Left out is what few spectra need: default bounds are not widened, and a plan is not refined.
+    Left out is what few spectra need: default bounds are not widened, a plan is not refined, and an index is
+    not compared with that of the substrate.
     """
 
     def __init__(self, problem: Problem, target: Measured, calibrated: bool):

@@ -96,7 +96,7 @@ class BrdfMeasurements(NamedTuple):
             ]
         return result
 
-    def amended(self, limits: Limits) -> Limits:
+    def amended(self, _: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""
         coordinates = self.ranked.problem.coordinates
         if coordinates.tilt is None:

@@ -232,7 +232,7 @@ def _verdict(
     rivals: tuple[Rival, ...],
     dark: frozenset[str],
 ) -> str:
-    """The verdict, and what the back face does."""
+    """The verdict, whether there is a film at all, and what the back face does."""
     worst = judged.worst
     pairs = zip(films.structures, judged.parts, strict=True)
     structure = next(structure for structure, part in pairs if part is worst)
@@ -247,4 +247,8 @@ def _verdict(
         dark,
         identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
     )
-    return sentence + backface.sentence(backface.comparison(films.targets, films.ranked))
+    return (
+        sentence
+        + films.unneeded(judged.parts)
+        + backface.sentence(backface.comparison(films.targets, films.ranked))
+    )

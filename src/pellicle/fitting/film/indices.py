@@ -13,11 +13,13 @@ from pellicle.scene.layers import Layer
 
 
 class Indices(NamedTuple):
-    """n and k of each layer (wavelengths,), None of one without a medium of its own, and n of the ambient."""
+    """n and k of each layer (wavelengths,), None of one without a medium of its own, n of the ambient, and
+    n + ik of the substrate."""
 
     n: list[np.ndarray | None]
     k: list[np.ndarray | None]
     ambient: np.ndarray
+    substrate: np.ndarray
 
 
 @remembered
@@ -46,4 +48,6 @@ def _indices(scene: Scene, values: tuple[float, ...] | None) -> Indices:
 
     n = [along(None if x is None else real(x)) for x in each]
     k = [along(None if x is None else imag(x)) for x in each]
-    return Indices(n, k, np.broadcast_to(real(known_index(fitted.ambient, nm)), nm.shape))
+    below = ordinary_index(fitted.substrate.material, nm)
+    substrate = np.broadcast_to(real(below) + 1j * np.asarray(imag(below)), nm.shape)
+    return Indices(n, k, np.broadcast_to(real(known_index(fitted.ambient, nm)), nm.shape), substrate)

@@ -12,6 +12,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.empirical import Shifted
 from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.curves import Curve
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fringes, parts, residual_structure
 from pellicle.fitting.film.evidence import evidence
@@ -38,6 +39,8 @@ _CHANCE = 5.0
 _WHITE, _OFF = 2.0, 9.0
 """Points over which the residuals of white noise are correlated at most, and the factor on the given σ²
 beyond which that is said to be wrong: three times."""
+_WITHIN, _NO_ABSORPTION = 3.0, 1e-4
+"""Standard errors within which a layer's index is that of the substrate, and an extinction that is none."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -82,13 +85,34 @@ class FilmMeasurements:
             for name, value, unit in fixed_numbers(target.scene, target.name)
         ]
 
-    def amended(self, limits: Limits) -> Limits:
-        """Limits by what a drift of scale and offset could imitate."""
+    def amended(self, parts: tuple[Part, ...], limits: Limits) -> Limits:
+        """Limits by what a drift of scale and offset could imitate, and of a layer that is not needed."""
+        if self.unneeded(parts):
+            depth = np.array([p.key == "thickness" for p in self.ranked.problem.parameters])
+            return Limits(
+                np.where(depth, np.inf, limits.stderr), *(np.where(depth, np.nan, x) for x in limits[1:])
+            )
         if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in self.targets):
             return limits
         views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
         least = min(thinnest(view, fit.at.layer) for view, fit in views)
         return bounded_by_drift(limits, self.ranked, least)
+
+    def unneeded(self, parts: tuple[Part, ...]) -> str:
+        """Sentence where the only layer has the index of the substrate within its error, empty elsewhere: its
+        thickness then means nothing, as any or none would do."""
+        view, curve = self.ranked.problem.views[0], parts[0].curve
+        if self.ranked.problem.thickness_axis is None or len(view.scene.layers) != 1:
+            return ""
+        if not isinstance(curve, Curve) or not np.any(curve.n_stderr > 0):
+            return ""
+        below = indices(view.scene, self.ranked.problem.seen_by(view, self.ranked.values)).substrate
+        apart = curve.n + 1j * curve.k - below[: view.rows]
+        alike = np.abs(apart.real) <= _WITHIN * curve.n_stderr
+        alike &= np.abs(apart.imag) <= _WITHIN * curve.k_stderr + _NO_ABSORPTION
+        if not alike.all():
+            return ""
+        return " No film is needed: the index of the layer is that of the substrate within its error."
 
 
 def scan_profile(ranked: RankedMinima) -> Profile | None:
