@@ -120,9 +120,9 @@ def fits(monkeypatch):
     """Replaces the fit of a block; no figures are drawn."""
 
     def fits(fit=fitted):
-        monkeypatch.setattr("pellicle.mapping.pixels.fit_pixels", fit)
+        monkeypatch.setattr("pellicle.mapping.run.fit_pixels", fit)
 
-    monkeypatch.setattr("pellicle.reporting.map_files.figures", lambda made, summary: [])
+    monkeypatch.setattr("pellicle.reporting.map_figures.figures", lambda made, summary: [])
     fits()
     return fits
 
@@ -147,7 +147,7 @@ def photograph(tmp_path):
 
 
 def test_the_folder_of_a_map(pellicle, words, fits, tmp_path, monkeypatch):
-    monkeypatch.setattr("pellicle.reporting.map_files.figures", figures)
+    monkeypatch.setattr("pellicle.reporting.map_figures.figures", figures)
     [record] = pellicle(*words, "--json", code=0).objects
     assert record["status"] == {"converged": 479, "no-data": 1}
     assert record == json.loads((tmp_path / "out/result.json").read_text())
