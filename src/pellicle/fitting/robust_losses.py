@@ -12,7 +12,8 @@ import numpy as np
 
 from pellicle.errors import UsageError
 
-LEAST_SQUARES = "least-squares"
+LEAST_SQUARES, ROBUST = "least-squares", "student-t"
+"""The loss of a fit, and that which is tried where few points carry the residuals."""
 
 _HUBER = 1.345
 """Residual at which Huber's loss turns linear: 95 % of the efficiency of least squares for normal noise."""

@@ -284,3 +284,14 @@ def test_a_layer_with_the_index_of_its_substrate_is_no_film(film, measured, inde
     assert (fit.status is pl.Status.CONVERGED) is needed
     assert ("No film is needed" in fit.verdict) is not needed
     assert needed or math.isinf(fit["thickness"].stderr)
+
+
+def test_a_few_points_that_carry_the_residuals_are_said(film, measured):
+    clean = measured(film(), 430.0, noise=0.002)
+    values = clean.values.copy()
+    values[[10, 60, 61]] += 0.2
+    fit = pl.fit(pl.Spectrum(clean.wavelength, values, "R"), film())
+    assert fit.warnings[0].startswith("3 of 128 points carry 9")
+    robust = pl.fit(pl.Spectrum(clean.wavelength, values, "R"), film(), loss="student-t")
+    assert f"gives thickness {robust['thickness'].value:.1f}" in fit.warnings[0]
+    assert not any("carry" in w for w in (*robust.warnings, *pl.fit(clean, film()).warnings))

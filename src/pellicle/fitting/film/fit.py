@@ -37,8 +37,8 @@ from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Estimate, Fit, Rival, Status
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
-from pellicle.fitting.status import verdict
+from pellicle.fitting.robust_losses import LEAST_SQUARES, ROBUST, check_loss
+from pellicle.fitting.status import expanded, verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, remembered
 
@@ -90,6 +90,12 @@ def fitted(
         targets = measurements(data, scene)
         spectra = listed(data)
         fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
+        if loss == LEAST_SQUARES and (spikes := summary.spikes(ranked)):
+            robust = _fit(spectra, targets, tolerance, ROBUST, progress)[0]
+            lead = next(p for p in robust.parameters.values() if p.free)
+            gives = f"{expanded(lead)} ({robust.status})"
+            remark = f'{spikes}: `loss="{ROBUST}"` lets them count less, and gives {lead.name} {gives}'
+            fit = replace(fit, warnings=(remark, *fit.warnings))
         if fit.status is not Status.MISFIT:
             return fit, ranked
 

@@ -25,6 +25,7 @@ from pellicle.fitting.noise import local_noise, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene
@@ -41,6 +42,9 @@ _WHITE, _OFF = 2.0, 9.0
 beyond which that is said to be wrong: three times."""
 _WITHIN, _NO_ABSORPTION = 3.0, 1e-4
 """Standard errors within which a layer's index is that of the substrate, and an extinction that is none."""
+_SPIKE, _FEW, _CARRY = 8.0, 0.05, 0.5
+"""Sizes of the bulk of the residuals beyond which a point is a spike, the share of all points that spikes may
+be, and the share of the sum of squares that they carry at least."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -200,6 +204,20 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
             )
     messages += _added_to_an_index(spectra[0].scene, ranked)
     return tuple(dict.fromkeys([*messages, *unclear]))
+
+
+def spikes(ranked: RankedMinima) -> str:
+    """Words on a spectrum of which few points carry most of the residuals; empty where none has such."""
+    for view, fit in zip(ranked.problem.views, ranked.fits, strict=True):
+        if not isinstance(view, SpectrumView):
+            continue
+        size = np.max(np.abs(view.residuals(fit.at)), axis=1)
+        far = size > _SPIKE * spread(size)
+        share = float(np.sum(size[far] ** 2) / np.sum(size**2))
+        if 0 < np.mean(far) <= _FEW and share > _CARRY:
+            of = f" of {view.name}" if view.name else ""
+            return f"{np.sum(far)} of {view.rows} points{of} carry {100 * share:.0f} % of the residuals"
+    return ""
 
 
 @remembered
