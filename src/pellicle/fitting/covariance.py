@@ -88,7 +88,7 @@ class Scaled(NamedTuple):
         pull = np.broadcast_to(self.pull, self.stretch.shape[:-1])
         return Scaled(self.jacobian[which], self.stretch[which], self.names, pull[which])
 
-    def blocks(self, sizes: Sequence[int], variance: Sequence[float]) -> list[np.ndarray]:
+    def blocks(self, sizes: Sequence[int], variance: Sequence[float | np.ndarray]) -> list[np.ndarray]:
         """Rows of each view, of so many data values, by the σ of its weights: without its `variance`."""
         rows = np.split(self.jacobian, np.cumsum(sizes), axis=-2)[: len(sizes)]
         pairs = zip(rows, variance, strict=True)
