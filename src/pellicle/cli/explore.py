@@ -55,15 +55,8 @@ def explore(
         )
     start()
     from pellicle.explorer.server import serve
-    from pellicle.explorer.session import Session
 
-    if recipe is not None:
-        session = _of_recipe(recipe)
-    else:
-        film: Any = replace(scene, **{name: getattr(scene, name) or x for name, x in DEFAULTS.items()})
-        session = Session(film.scene(light.options()), title=f"{film.layer} on {film.substrate}")
-        if scene.thickness is None:
-            say("thickness: 0 to 1000 nm, since no --thickness was given")
+    session = _session(recipe, scene, light)
 
     def ready(address: str) -> None:
         print(address, flush=True)
@@ -82,12 +75,18 @@ def explore(
     os._exit(0)  # programs may be compiling in a thread, which Python cannot end
 
 
-def _of_recipe(path: str) -> Session:
-    """The session of a film's recipe, with the data of its first file."""
+def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
+    """The session of a recipe, with the data of a film's first file, or of the flags."""
     from pellicle.cli.reading import read, wavelengths
     from pellicle.explorer.session import Session
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
+    if path is None:
+        film: Any = replace(flags, **{name: getattr(flags, name) or x for name, x in DEFAULTS.items()})
+        session = Session(film.scene(light.options()), title=f"{film.layer} on {film.substrate}")
+        if flags.thickness is None:
+            say("thickness: 0 to 1000 nm, since no --thickness was given")
+        return session
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
         return Session(recipe.scene(), Path(path).parent, title=title)

@@ -54,13 +54,14 @@ def read(
         raise UsageError(f"--to must be of {', '.join(SUFFIXES)}, not {unknown[0]!r}")
     if options.reference or options.reference_material:
         start()  # the reflectance of the reference is computed
+    from pellicle.reporting.json_record import error_record
+    from pellicle.reporting.measured_text import describe, to_json
+
     worst, measurements = GOOD, []
     for path in data:
         try:
             measurements += _measurements(path, options, cubes or CubeOnlyFlags())
         except ValueError as error:
-            from pellicle.reporting.json_record import error_record
-
             message = error_message(error, [path])
             worst = reported(message, error_record(message, BAD_DATA) if json else None)
     if out is not None:
@@ -68,8 +69,6 @@ def read(
 
         if any(isinstance(one, Cube) for one in measurements):
             raise UsageError("--out writes spectra, and a cube stays in its file: leave it out")
-    from pellicle.reporting.measured_text import describe, to_json
-
     for one in measurements:
         show(to_json(one) if json else describe(one, tuple(map(as_flags, one.notes))))
     if out is not None:
