@@ -86,7 +86,13 @@ def test_every_public_name_is_in_the_reference():
     assert len(LISTED) == len(set(LISTED))
 
 
-@pytest.mark.parametrize("name", PUBLIC)
+COMPILED = ("depth_profile", "fit", "solve", "field", "jones", "mueller")
+"""Their examples compile for a second or more."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(x, marks=pytest.mark.slow) if x in COMPILED else x for x in PUBLIC]
+)
 def test_examples_in_docstrings_run(name):
     names = {"pl": pl, "np": np, "jnp": jnp, "jax": jax}
     finder, runner = doctest.DocTestFinder(recurse=False), doctest.DocTestRunner()

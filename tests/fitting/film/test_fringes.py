@@ -38,6 +38,7 @@ def test_no_clear_fringes(values):
     assert fringes(X, values) is None
 
 
+@pytest.mark.slow  # compiles a fit of its own
 def test_a_fit_that_misses_the_fringes_says_what_they_suggest(film, measured):
     """The bounds of the thickness exclude the truth."""
     seen = {"substrate": pl.dispersion.Constant(1.46), "light": pl.Light(signal="T")}

@@ -32,7 +32,7 @@ def test_an_outlier_is_no_structure():
     assert windows(z) == []
 
 
-@pytest.mark.parametrize("sigma", [True, False])
+@pytest.mark.parametrize("sigma", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_fit_says_where(film, measured, sigma):
     scene = film(material=pl.dispersion.Constant(pl.Free(1.3, 1.7)))
     data = measured(scene, 1.46, 430.0, sigma=sigma)
