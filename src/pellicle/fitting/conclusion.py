@@ -335,8 +335,8 @@ def estimates(
     parameters, freedom, free = ranked.problem.parameters, max(float(ranked.freedom), 1.0), []
     columns = ranked.values, *numbers.limits, numbers.noise.stderr
     for p, value, stderr, *ends, noise in zip(parameters, *(x.tolist() for x in columns), strict=True):
-        limited = (None if math.isnan(end) else end for end in ends)
-        bounds = p.lower, p.upper, True, bool(p.on_bound(value)), *limited, p.limits is not None
+        lower, upper = (None if math.isnan(end) else end for end in ends)
+        bounds = p.lower, p.upper, True, bool(p.on_bound(value)), lower, upper, p.limits is not None
         free.append(Estimate(p.name, value, stderr, p.unit, *bounds, noise, freedom))
     free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
     pairs = zip(ranked.problem.views, ranked.fits, strict=True)

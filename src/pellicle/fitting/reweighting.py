@@ -91,9 +91,10 @@ def _view_fit(view: View, noise: NoiseEstimate, at: Any) -> ViewFit:
         scores = view.residuals(at)
         if np.ndim(weight):  # the inflation contains their mean already
             scores = scores * math.sqrt(np.mean(weight) / np.mean(weight * scores**2))
-    numbers = noise.variance(view.noise), noise.length, noise.chi2, noise.freedom
     outliers = int(np.sum(weight < 0.5)) if np.ndim(weight) else 0
-    return ViewFit(at, *(np.asarray(x, float)[()] for x in numbers), outliers, scores)
+    numbers = noise.variance(view.noise), noise.length, noise.chi2, noise.freedom
+    variance, length, chi2, freedom = (np.asarray(x, float)[()] for x in numbers)
+    return ViewFit(at, variance, length, chi2, freedom, outliers, scores)
 
 
 def ranked_by_factor(problem: Problem, candidates: Minima, misfit: np.ndarray, at: Any) -> RankedMinima:

@@ -128,7 +128,10 @@ class BatchErrors:
         [block] = jacobian.blocks([view.points], [fit.variance])
         evidence, units = spectrum_evidence(after, at, block, effects), candidates.units[:, 0]
         systematic = discrepancy([evidence], jacobian, units, contributions=False)
-        [remaining], largest = systematic.remaining, accuracy(view, self.calibrated, view.data.values)
+        [remaining], largest = (
+            systematic.remaining,
+            accuracy(view, self.calibrated, np.asarray(view.data.values)),
+        )
         wrong = misfit(systematic, remaining, largest)
         doubtful = np.flatnonzero((remaining.ratio > DOUBTFUL) & ~wrong)
         if len(doubtful):
@@ -166,12 +169,13 @@ class BatchErrors:
             frame=own.frame,
         )
         whole = replace(view, data=arrays)
-        curves = (getattr(minima, name)[group.spectra] for name in Local._fields[:5])
-        every = Local(*curves, np.zeros(0), np.zeros(0))
+        names, unused = Local._fields[:5], np.zeros(0)
+        curves = {name: getattr(minima, name)[group.spectra] for name in names}
+        every = Local(**curves, layer=unused, layer_slope=unused)
         if group.rows is None:
             return whole, every, replace(whole, sweeps=group.parts), every
 
-        def measured(x: np.ndarray) -> np.ndarray:
+        def measured(x: Any) -> np.ndarray:
             rows = x.reshape(len(own.values), view.rows, -1, *x.shape[2:])
             return group.measured(rows).reshape(len(x), -1, *x.shape[2:])
 
@@ -182,7 +186,7 @@ class BatchErrors:
         if own.frame is not None:
             few = few._replace(frame=group.measured(own.frame))
         seen = replace(whole, data=few, points=few.values.shape[1], sweeps=group.parts)
-        return whole, every, seen, Local(*(measured(x) for x in every[:5]), *every[5:])
+        return whole, every, seen, every._replace(**{name: measured(x) for name, x in curves.items()})
 
     def _flat_sides(
         self,
