@@ -24,7 +24,7 @@ import xarray as xr
 import pellicle as pl
 from pellicle.colour import film_colour, srgb
 from pellicle.colour.spaces import into_srgb
-from pellicle.mapping.pixels.results import CODES
+from pellicle.fitting.batch.data import CODES
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # fewer pixels, for a quick run
