@@ -45,6 +45,8 @@ _WITHIN, _NO_ABSORPTION = 3.0, 1e-4
 _SPIKE, _FEW, _CARRY = 8.0, 0.05, 0.5
 """Sizes of the bulk of the residuals beyond which a point is a spike, the share of all points that spikes may
 be, and the share of the sum of squares that they carry at least."""
+_ROUNDING = 1e-6
+"""Size of the bulk of residuals, as a share of the largest, below which it is rounding."""
 FEWEST_FRINGES = 0.75
 """Fringes that a spectrum must span where scale and offset drift: with fewer, drift can imitate the film.
 On real soap films from 510 to 910 nm this is 330 nm, below which no single spectrum was decided."""
@@ -212,9 +214,13 @@ def spikes(ranked: RankedMinima) -> str:
         if not isinstance(view, SpectrumView):
             continue
         size = np.max(np.abs(view.residuals(fit.at)), axis=1)
-        far = size > _SPIKE * spread(size)
+        bulk = spread(size)
+        far = size > _SPIKE * bulk
+        # without noise all residuals are rounding
+        if not 0 < np.mean(far) <= _FEW or bulk < _ROUNDING * np.max(size):
+            continue
         share = float(np.sum(size[far] ** 2) / np.sum(size**2))
-        if 0 < np.mean(far) <= _FEW and share > _CARRY:
+        if share > _CARRY:
             of = f" of {view.name}" if view.name else ""
             return f"{np.sum(far)} of {view.rows} points{of} carry {100 * share:.0f} % of the residuals"
     return ""
