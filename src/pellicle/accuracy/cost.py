@@ -82,7 +82,7 @@ def compare_intervals(
 
     def prepare(one: DataSet) -> tuple[RankedMinima, Callable[[Interval], tuple[np.ndarray, np.ndarray]]]:
         def score(ends: Interval) -> tuple[np.ndarray, np.ndarray]:
-            """Which true values the intervals contain, and how wide they are."""
+            """Masks of the true values that the intervals contain, and their widths."""
             lower, upper = ends
             inside = (lower <= one.truth) & (one.truth <= upper)
             return inside, np.minimum(upper, 1.0) - np.maximum(lower, 0.0)

@@ -110,8 +110,9 @@ class LocalModels:
         [self._view], [fit], [after] = problem.views, ranked.fits, ranked.problem.views
         self._box = jax.device_get(problem.box)
         data, extra = whole.data, len(self._view.data.values) - whole.points
-        scale = np.max(after.data.weight, axis=1) / np.max(ranked.searched.views[0].data.weight, axis=1)
-        weight = data.weight * scale[:, None]
+        [before] = ranked.searched.views
+        self._raised = np.max(after.data.weight, axis=1) / np.max(before.data.weight, axis=1)
+        weight = data.weight * self._raised[:, None]
         values, weight = (np.pad(x, [(0, 0), (0, extra)]) for x in (data.values, weight))
         frame = data.frame
         if frame is not None:
@@ -142,8 +143,7 @@ class LocalModels:
         ranked, values = self._ranked, self._values
         [before], [after] = ranked.searched.views, ranked.problem.views
         wider = np.asarray(student(ranked.freedom, RIVAL))[:, None] ** 2
-        raised = np.max(after.data.weight, axis=1) / np.max(before.data.weight, axis=1)
-        factor = raised**2 * after.independent_fraction / before.independent_fraction
+        factor = self._raised**2 * after.independent_fraction / before.independent_fraction
         rise = scan * factor[:, None] / wider
         sides = flat_sides(grid, rise - np.minimum(rise.min(axis=1), 0.0)[:, None], values[:, depth])
         doubtful = np.flatnonzero(sides.any(axis=1) & usable)
