@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from family import (
     Bounds,
     Family,
@@ -162,3 +164,27 @@ FAMILIES = {
         ),
     )
 }
+
+
+def _thin(name: str, low: float, high: float) -> Family:
+    """A family with thicknesses of `low` to `high` nm, and its other numbers as they are."""
+    family = FAMILIES[name]
+    return replace(
+        family,
+        name=f"thin {name}",
+        draw=lambda random: (log_uniform(random, low, high), *family.draw(random)[1:]),
+    )
+
+
+THIN = tuple(
+    _thin(name, low, high)
+    for name, low, high in (
+        ("oxide-R", 12, 60),
+        ("nitride-R", 12, 60),
+        ("titania-T", 20, 80),
+        ("gold-T", 8, 30),
+        ("oxide-psi", 4, 40),
+        ("polymer-psi3", 20, 60),
+    )
+)
+"""Thin films, of which an overlayer or pores are a good part."""

@@ -146,6 +146,12 @@ FLAWS = {
     "spikes": Flaw(lambda family: True, _spikes),
 }
 
+HIDDEN = {
+    "contamination": lambda d: {"overlayer_nm": float(d.random.uniform(1.0, 2.5))},
+    "pores": lambda d: {"pores": 0.06},
+}
+"""Flaws of thin films that scale, offset and index together may hide."""
+
 SEVERAL = "several"
 """Three flaws at once, each of half its size, as most measurements have them."""
 
@@ -157,6 +163,8 @@ def flaws_of(family: Family) -> list[str]:
 
 def drawn(name: str, random: np.random.Generator, family: Family, theta: Theta) -> Conditions:
     """The conditions of a measurement with one flaw, or several."""
+    if name in HIDDEN:
+        return replace(Conditions(), **HIDDEN[name](Drawing(random, family, theta, 1.0)))
     if name != SEVERAL:
         return replace(Conditions(), **FLAWS[name].draw(Drawing(random, family, theta, 1.0)))
     names = [each for each in flaws_of(family) if each != SEVERAL]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from media import Index, air, bruggeman, scaled, with_resonance
+from media import Index, air, bruggeman, cauchy, scaled, with_resonance
 from transfer_matrix import power, stokes
 
 FWHM = 2 * math.sqrt(2 * math.log(2))
@@ -61,6 +61,8 @@ class Conditions:
     substrate_factor: float = 1.0
     interlayer: Index | None = None
     interlayer_nm: float = 0.0
+    overlayer_nm: float = 0.0  # of index 1.5, on the upper face
+    pores: float = 0.0  # share of air in the film
     absorption: tuple[float, float, float] | None = None  # strength, energy and width of a resonance, eV
     stray: float = 0.0
     nonlinearity: float = 0.0
@@ -140,6 +142,8 @@ def _flawed(stack: Stack, conditions: Conditions) -> Stack:
     index, thickness = layers[stack.film]
     if conditions.film_factor != 1:
         index = scaled(index, conditions.film_factor)
+    if conditions.pores:
+        index = bruggeman(index, air, conditions.pores)
     if conditions.absorption is not None:
         index = with_resonance(index, *conditions.absorption)
     layers[stack.film] = index, thickness
@@ -154,6 +158,9 @@ def _flawed(stack: Stack, conditions: Conditions) -> Stack:
         slices = [(bruggeman(air, above, share), edge / 6) for share in shares]
         layers[:1] = [*slices, (above, depth - edge)]
         film += 12
+    if conditions.overlayer_nm:
+        layers.insert(0, (cauchy(1.5, 0.0), conditions.overlayer_nm))
+        film += 1
     factor = conditions.substrate_factor
     substrate = stack.substrate if factor == 1 else scaled(stack.substrate, factor)
     return Stack(tuple(layers), substrate, film, stack.plate_mm)

@@ -14,7 +14,7 @@ FIRM = "converged"
 """Status of an answer that pellicle vouches for; every other one is a refusal."""
 RIGHT = 0.01
 """Relative error of a thickness that is right."""
-GROUPS = ("clean", "flawed", "budget-only", "wrong", "undecidable")
+GROUPS = ("clean", "flawed", "budget-only", "hidden", "wrong", "undecidable")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Answer:
             return self.firm
         if self.group == "clean":
             return not self.firm or self.outcome == "outside"
-        if self.group == "budget-only":
+        if self.group in ("budget-only", "hidden"):
             return self.outcome == "outside"
         return self.outcome in ("outside", "refused right")
 
@@ -149,6 +149,10 @@ def goals(answers: Sequence[Answer]) -> list[str]:
     limit("flawed, firm outside three stated errors", sum(a.pull() > 3 for a in firm), len(firm), 0.02)
     limit("flawed, firm outside two stated errors", sum(a.pull() > 2 for a in firm), len(firm), 0.07)
     limit("flawed, refused of those right to 1 %", sum(not a.firm for a in right), len(right), 0.05)
+    hidden = [a for a in of("hidden") if a.firm]
+    limit(
+        "hidden, firm outside three stated errors", sum(a.pull() > 3 for a in hidden), len(of("hidden")), 0.03
+    )
     limit("wrong scenes, firm", sum(a.firm for a in of("wrong")), len(of("wrong")), 0.0)
     limit("undecidable, firm", sum(a.firm for a in of("undecidable")), len(of("undecidable")), 0.0)
     limit("clean, refused", sum(not a.firm for a in clean), len(clean), 0.0)

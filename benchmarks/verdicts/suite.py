@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from detectability import SHOWN, bound, evidence, least_evidence, rival
-from families import FAMILIES
+from families import FAMILIES, THIN
 from family import Family, Theta
-from flaws import drawn, flaws_of
+from flaws import HIDDEN, drawn, flaws_of
 from measurement import Conditions, View
 from undecidable import UNDECIDABLE
 from wrong_scenes import WRONG_SCENES, WrongScene
@@ -77,7 +77,15 @@ def cases() -> list[Case]:
     ]
     wrong = [Case("wrong", w.name, w.family, given, wrong=w) for w in WRONG_SCENES for given in both]
     undecidable = [Case("undecidable", "undecidable", f, given) for f in UNDECIDABLE for given in both]
-    return [*clean, *flawed, *wrong, *undecidable]
+    thin = [Case("clean", "clean", family, given) for family in THIN for given in both]
+    hidden = [
+        Case("hidden", flaw, family, given, number)
+        for family in THIN
+        for flaw in HIDDEN
+        for given in both
+        for number in (1, 2)
+    ]
+    return [*clean, *flawed, *wrong, *undecidable, *thin, *hidden]
 
 
 def short(chosen: list[Case]) -> list[Case]:
@@ -120,7 +128,7 @@ def measured(case: Case, seed: int = SEED) -> Measured:
             break
     else:
         raise RuntimeError(f"{family.name}: no draw is {case.group}")
-    if case.group != "flawed":
+    if case.group not in ("flawed", "hidden"):
         data = _spectrum(case, family.view, clean, sigma, random)
         return Measured(case, case.group, data, theta[0], known, 0.0, _numbers(theta, noise))
     conditions = drawn(case.kind, random, family, theta)
@@ -128,7 +136,7 @@ def measured(case: Case, seed: int = SEED) -> Measured:
     sigma = standard_deviations(values, noise, family.view)
     shown = evidence(family, theta, _with_spikes(values, sigma, conditions), sigma)
     data = _spectrum(case, family.view, values, sigma, random, conditions)
-    group = "flawed" if shown > SHOWN else "budget-only"
+    group = "hidden" if case.group == "hidden" else "flawed" if shown > SHOWN else "budget-only"
     return Measured(case, group, data, theta[0], known, shown, f"{conditions}; {_numbers(theta, noise)}")
 
 

@@ -116,7 +116,7 @@ def test_pixels_are_those_of_fit(name):
     for i, fit in enumerate(fits):
         for j, p in enumerate(model.parameters):
             own = fit[p.name]
-            # effects are interpolated between thicknesses 1/48 of a fringe apart: within 10 %
+            # effects are interpolated between thicknesses 1/96 of a fringe apart: within 10 %
             assert found.stderr[i, j] == pytest.approx(own.stderr, rel=0.1), (i, p.name)
             assert found.stderr_noise[i, j] == pytest.approx(own.stderr_noise, rel=0.1), (i, p.name)
             if np.isfinite(own.stderr):

@@ -193,7 +193,7 @@ def _without_default_bounds(dispersion: AbstractDispersion) -> Sequence[Abstract
 
 _SIGNED = ("wavelength_shift", "angle_shift")
 """Numbers that may be negative."""
-_OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer")
+_OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer", "overlayer")
 """Uncertainties that stand in [scene]; the others stand in [instrument]."""
 
 

@@ -336,6 +336,7 @@ class SceneTable(_Table):
     roughness_uncertainty: Uncertain = None
     thickness_spread_uncertainty: Uncertain = None
     interlayer_uncertainty: Uncertain = None
+    overlayer_uncertainty: Uncertain = None
 
 
 class ReferenceTable(_Table):

@@ -47,6 +47,7 @@ class Uncertainty:
     - `thickness_spread`: standard deviation of the thickness over the spot, relative (at most 12 nm).
     - `interlayer`: thickness of a native oxide on a substrate of an index above 2, in nm, and twice that of a
       mixture of the media at its face.
+    - `overlayer`: thickness of a contamination of index 1.5 on the upper face, in nm.
 
     **Raises:** ValueError for a negative or infinite number.
 
@@ -69,6 +70,7 @@ class Uncertainty:
     roughness: float = 1.5
     thickness_spread: float = 0.01
     interlayer: float = 1.0
+    overlayer: float = 0.5
 
     def __post_init__(self):
         for field in fields(self):

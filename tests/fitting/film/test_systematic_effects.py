@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.dispersion.effective_medium import Bruggeman
+from pellicle.dispersion.empirical import Constant
 from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
@@ -78,6 +80,10 @@ EFFECTS = {
     "thickness spread": (lambda: wide(simulated(thickness_spread=3.1)), 0.02),
     "roughness": (lambda: wide(simulated(roughness=1.5)), 0.02),
     "angle spread": (lambda: wide(simulated(angle_spread=2.0)), 0.02),
+    "overlayer": (
+        lambda: np.asarray(pl.reflectance(NM, [0.5, THICKNESS], [1.5, 1.6], 3.9)) - R(NM),
+        1e-7,
+    ),
     "native oxide": (lambda: simulated(pl.Layer(1.46, 1.0, name="oxide")) - R(NM), 1e-7),
 }
 
@@ -115,6 +121,18 @@ def test_what_the_scene_describes_is_no_effect():
     assert not names & {"roughness", "scale", "bandwidth", "wavelength shift"}
     assert {"offset", "index of the layer", "thickness spread"} <= names
     assert changes(pl.Scene(pl.Layer(1.6, FREE), 3.9, uncertainty=pl.Uncertainty.none()), spectrum()) == {}
+
+
+def test_the_index_of_a_mixture_is_more_uncertain_in_a_thin_layer():
+    mixture = Bruggeman(Constant(1.6), Constant(1.0), 0.2)
+    film = pl.Scene(pl.Layer(mixture, pl.Free(1, 100)), 3.9)
+    uncertainties = []
+    for thickness in (10.0, 20.0):
+        data = pl.simulate(pl.Scene(pl.Layer(mixture, thickness), 3.9), wavelength=NM, noise=1e-4)
+        budget = {row.name: row for row in pl.fit(data, film).budget}
+        assert abs(budget["index of the layer"].changes["thickness"]) > 0
+        uncertainties.append("mixing rule" in budget)
+    assert uncertainties == [True, False]
 
 
 def test_a_wrong_index_moves_the_answer_as_the_budget_says():

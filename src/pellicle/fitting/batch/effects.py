@@ -18,7 +18,9 @@ from pellicle.fitting.film.view import SpectrumView
 from pellicle.programs.cache import in_chunks
 from pellicle.scene.film import Scene
 
-_NODES = 48
+_NODES = 96
+"""Nodes in a fringe. With 48 the error of the interpolation tells an overlayer and an index from a thickness:
+a standard error was 15 % too small (110 nm of oxide on silicon, Ψ and Δ)."""
 _LANES = 64
 """Spectra that one call of the compiled program takes: a few tens of signals each."""
 
@@ -26,7 +28,7 @@ _LANES = 64
 def nodes(lower: float, upper: float, shortest: float) -> np.ndarray:
     """Thicknesses (nm) between which effects are interpolated, for a `shortest` wavelength in the layer.
 
-    At `_NODES` in a fringe of half that wavelength, an interpolated sine is off by (2π/48)²/8, 0.2 %.
+    At `_NODES` in a fringe of half that wavelength, an interpolated sine is off by (2π/96)²/8, 0.05 %.
     """
     return np.linspace(lower, upper, max(int(np.ceil((upper - lower) * 2 * _NODES / shortest)) + 1, 2))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -28,6 +28,8 @@ from pellicle.scene.layers import Interface, Layer
 
 OXIDE_INDEX = 1.46
 """Index of a native oxide, about that of SiO₂."""
+OVERLAYER_INDEX = 1.5
+"""Index of an overlayer, about that of adventitious carbon and of water with organics in it."""
 _LIKE_OXIDE = 0.05
 _OXIDISES = 2.0
 """Substrates of a higher index than this, or with absorption, are semiconductors and metals with an oxide."""
@@ -37,6 +39,8 @@ _ROUND = 16
 """Numbers of candidates are multiples of this."""
 _WIDEST = 10.0
 """Upper bound of the further numbers, in their own units."""
+_PLAIN, _WITH_FACES = 0, 1
+"""Positions of the stack without faces of its own, and of that with all but an overlayer."""
 _ANY = 1.0
 """Number for a parameter on which no plan depends."""
 
@@ -150,9 +154,10 @@ class ExtendedScene:
     """A fitted scene with further numbers; None stands for those that it cannot have.
 
     The first numbers are the parameters of the view.
-    `wavelength` and `angle` are shifts, `roughness` that of the upper face, `oxide` and `mixture` thicknesses
-    on the substrate. Of each coherent layer, by its position: `thickness`; `index`, a relative change of a
-    given one; `shape`, one of a model with free numbers. `substrate_index` is a relative change.
+    `wavelength` and `angle` are shifts, `roughness` that of the upper face, `overlayer` a thickness on it,
+    `oxide` and `mixture` thicknesses on the substrate. Of each coherent layer, by its position: `thickness`;
+    `index`, a relative change of a given one; `shape`, one of a model with free numbers. `substrate_index` is
+    a relative change.
     """
 
     def __init__(
@@ -169,7 +174,8 @@ class ExtendedScene:
         opened = insert(scene, [self._number(value)[1] for value in starts])
         nm = np.asarray(scene.light.wavelength)
         instrument = opened.instrument
-        self.wavelength = self.angle = self.roughness = self.oxide = self.mixture = None
+        self.wavelength = self.angle = self.roughness = self.overlayer = None
+        self.oxide = self.mixture = None
         self.substrate_index: Number | None = None
         self.thickness: dict[int, Number] = {}
         self.index: dict[int, Number] = {}
@@ -199,9 +205,16 @@ class ExtendedScene:
             instrument=instrument,
         )
         self._with_face: dict[int, tuple[Any, ...]] = {}
+        self._stacks, self._programs = [tuple(layers)], dict[int, Program]()
         if judged.substrate:
-            layers = self._faces(layers)
-        self._whole = tuple(layers)
+            self._stacks.append(tuple(self._faces(layers)))
+        self._stack_of = dict.fromkeys(self._with_face, _WITH_FACES)
+        if judged.substrate and isinstance(layers[0], Layer):
+            # apart: the roughness of a covered face is that of two
+            self.overlayer, thin = self._number(0.0)
+            self._stack_of[self.overlayer.position] = len(self._stacks)
+            self._stacks.append((Layer(Constant(OVERLAYER_INDEX), thin), *self._stacks[_PLAIN]))
+            self._with_face[self.overlayer.position] = self._stacks[-1]
 
     def _faces(self, layers: list[Any]) -> list[Any]:
         """The layers with a roughness, an oxide and a mixed interface of no size."""
@@ -257,31 +270,25 @@ class ExtendedScene:
         start = self.start(values)
         keys = [(number.position if change else -1, change) for number, change in changes]
         result: dict[tuple[int, float], np.ndarray] = {}
-        of_faces = [key for key in dict.fromkeys(keys) if key[0] in self._with_face]
-        others = [key for key in dict.fromkeys(keys) if key[0] not in self._with_face]
+        by_stack: dict[int, list[tuple[int, float]]] = {}
+        for key in dict.fromkeys(keys):
+            by_stack.setdefault(self._stack_of.get(key[0], _PLAIN), []).append(key)
         # a stack with all faces takes a hundred times as long for each of its rows. Padded: scenes with other
         # uncertainties share a program
-        for program, own, multiple in (
-            (self._program_plain, others, _ROUND),
-            (self._program_whole, of_faces, len(self._with_face)),
-        ):
-            if not own:
-                continue
+        for stack, own in by_stack.items():
+            multiple = list(self._stack_of.values()).count(stack) or _ROUND
             rows = np.tile(start, (-(-len(own) // multiple) * multiple, 1))
             for row, (position, change) in zip(rows, own, strict=False):
                 row[position] += change  # of the last number, 0 where nothing changes
-            form, scene, order = program
+            form, scene, order = self._program_of(stack)
             simulations = np.asarray(simulated(form, scene, data, rows[:, order]).signal)
             result |= dict(zip(own, simulations, strict=False))
         return np.stack([result[key] for key in keys])
 
-    @cached_property
-    def _program_plain(self) -> Program:
-        return self._program(self._plain.layers)
-
-    @cached_property
-    def _program_whole(self) -> Program:
-        return self._program(self._whole)
+    def _program_of(self, stack: int) -> Program:
+        if stack not in self._programs:
+            self._programs[stack] = self._program(self._stacks[stack])
+        return self._programs[stack]
 
     def programs(self) -> dict[int | None, Program]:
         """Programs of scenes with one number of a face alone, by its position, and of the scene without any.
@@ -289,7 +296,7 @@ class ExtendedScene:
         A scene with all of them is a deep stack, which takes a hundred times as long.
         """
         faces = {position: self._program(layers) for position, layers in self._with_face.items()}
-        return {None: self._program_plain, **faces}
+        return {None: self._program_of(_PLAIN), **faces}
 
     def _program(self, layers: tuple[Any, ...]) -> Program:
         scene = replace(self._plain, layers=layers)
