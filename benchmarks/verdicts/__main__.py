@@ -15,23 +15,34 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+import single_colours
+import surfaces
 from scoring import Answer, changes, failures, goals, read_csv, table, write_csv
 from suite import SEED, Case, Measured, cases, measured, short
 
 import pellicle as pl
 from pellicle.cli.session import start
 
+OTHER_KINDS: dict[str, Callable[[int], Iterator[tuple[str, Any, Any, float, bool, str]]]] = {
+    "brdf": surfaces.cases,
+    "colour": single_colours.cases,
+}
+"""Cases of data that are no spectra, by the name that `--only` asks for: kind, data, scene, truth, whether σ
+is given, and what is true."""
 
-def answer(m: Measured) -> Answer:
-    """Fit the recipe of a case to its measurement."""
-    case, began = m.case, time.perf_counter()
+
+def fitted(data: Any, scene: Any, **about: Any) -> Answer:
+    """Fit a scene to data; `about` are the fields of the answer that describe the case."""
+    began = time.perf_counter()
     value = stderr = noise = chi2 = rms = math.nan
     warnings = ""
     try:
-        fit = pl.fit(m.data, case.family.scene())
+        fit = pl.fit(data, scene)
     except ValueError as error:  # DataError and UsageError too: data that pellicle refuses to fit
         status, verdict = "error", str(error)
     else:
@@ -41,29 +52,54 @@ def answer(m: Measured) -> Answer:
         status, verdict, warnings = str(fit.status), fit.verdict, " / ".join(fit.warnings)
         chi2, rms = fit.chi2_reduced, math.nan if fit.rms is None else fit.rms
     return Answer(
-        name=case.name,
-        group=m.group,
-        family=case.family.name,
-        kind=case.kind,
-        sigma_given=case.sigma_given,
-        truth=m.truth,
         value=value,
         stderr=stderr,
         stderr_noise=noise,
         status=status,
         chi2_reduced=chi2,
         rms=rms,
-        bound=m.bound,
-        evidence=m.evidence,
         seconds=time.perf_counter() - began,
-        detail=m.detail,
         verdict=verdict,
         warnings=warnings,
+        **about,
     )
+
+
+def answer(m: Measured) -> Answer:
+    """Fit the recipe of a case to its measurement."""
+    case = m.case
+    return fitted(
+        m.data,
+        case.family.scene(),
+        name=case.name,
+        group=m.group,
+        family=case.family.name,
+        kind=case.kind,
+        sigma_given=case.sigma_given,
+        truth=m.truth,
+        bound=m.bound,
+        evidence=m.evidence,
+        detail=m.detail,
+    )
+
+
+def other_answers(only: Sequence[str], seed: int) -> Iterator[Answer]:
+    """Answers of the kinds that are no spectra, where they are asked for by name."""
+    for name in only:
+        if name in OTHER_KINDS:
+            numbers: Counter[str] = Counter()
+            for kind, data, scene, truth, given, detail in OTHER_KINDS[name](seed):
+                numbers[kind] += 1
+                about = {"group": name, "family": name, "kind": kind, "sigma_given": given, "truth": truth}
+                case = f"{name} | {kind} {numbers[kind]} | {'sigma' if given else 'no sigma'}"
+                measures = {"bound": math.nan, "evidence": math.nan}
+                yield fitted(data, scene, name=case, detail=detail, **about, **measures)
 
 
 def chosen(only: Sequence[str], limit: int | None, brief: bool) -> list[Case]:
     """Cases whose group, family or kind is among `only`, all without; the first `limit` of them."""
+    if only and set(only) <= OTHER_KINDS.keys():
+        return []
     every = short(cases()) if brief else cases()
     kept = [c for c in every if not only or {c.group, c.family.name, c.kind, c.name} & set(only)]
     if not kept:
@@ -91,7 +127,12 @@ def write_case(m: Measured, folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--only", nargs="+", default=[], help="groups, families, kinds or names of cases")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        default=[],
+        help=f"groups, families, kinds or names of cases; or {', '.join(OTHER_KINDS)}",
+    )
     parser.add_argument("--limit", type=int, help="only the first cases")
     parser.add_argument("--short", action="store_true", help="about 24 cases of all groups")
     parser.add_argument("--seed", type=int, default=SEED, help=f"master seed ({SEED})")
@@ -101,16 +142,21 @@ def main() -> None:
     asked = parser.parse_args()
     start()
     answers: list[Answer] = []
+
+    def add(one: Answer) -> None:
+        answers.append(one)
+        print(f"{one.seconds:6.2f} s  {one.group:11}  {one.outcome:13}  {one.name}", flush=True)
+        if asked.out is not None and len(answers) % 20 == 0:
+            write_csv(answers, asked.out)
+
+    for one in other_answers(asked.only, asked.seed):
+        add(one)
     for case in chosen(asked.only, asked.limit, asked.short):
         m = measured(case, asked.seed)
         if asked.write_cases is not None:
             write_case(m, asked.write_cases)
             continue
-        answers.append(answer(m))
-        last = answers[-1]
-        print(f"{last.seconds:6.2f} s  {m.group:11}  {last.outcome:13}  {case.name}", flush=True)
-        if asked.out is not None and len(answers) % 20 == 0:
-            write_csv(answers, asked.out)
+        add(answer(m))
     if not answers:
         return
     print("\n" + table(answers) + "\n\n" + "\n".join(goals(answers)))

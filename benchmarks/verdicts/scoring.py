@@ -14,7 +14,7 @@ FIRM = "converged"
 """Status of an answer that pellicle vouches for; every other one is a refusal."""
 RIGHT = 0.01
 """Relative error of a thickness that is right."""
-GROUPS = ("clean", "flawed", "budget-only", "hidden", "wrong", "undecidable")
+GROUPS = ("clean", "flawed", "budget-only", "hidden", "wrong", "undecidable", "brdf", "colour")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Answer:
             return self.firm
         if self.group == "clean":
             return not self.firm or self.outcome == "outside"
-        if self.group in ("budget-only", "hidden"):
+        if self.group in ("budget-only", "hidden", "brdf", "colour"):
             return self.outcome == "outside"
         return self.outcome in ("outside", "refused right")
 
@@ -155,6 +155,13 @@ def goals(answers: Sequence[Answer]) -> list[str]:
     )
     limit("wrong scenes, firm", sum(a.firm for a in of("wrong")), len(of("wrong")), 0.0)
     limit("undecidable, firm", sum(a.firm for a in of("undecidable")), len(of("undecidable")), 0.0)
+    for group in ("brdf", "colour"):
+        limit(
+            f"{group}, firm outside three stated errors",
+            sum(a.outcome == "outside" for a in of(group)),
+            len(of(group)),
+            0.02,
+        )
     limit("clean, refused", sum(not a.firm for a in clean), len(clean), 0.0)
     return [*lines, *coverage(clean)]
 

@@ -49,6 +49,7 @@ from pellicle.scene.layers import Substrate as Substrate
 from pellicle.scene.layers import Uncertainty as Uncertainty
 from pellicle.scene.layers import medium as medium
 from pellicle.scene.surface import Surface as Surface
+from pellicle.scene.surface import SurfaceUncertainty as SurfaceUncertainty
 from pellicle.simulation.brdf import Directions as Directions
 from pellicle.simulation.depth import absorptance as absorptance
 from pellicle.simulation.depth import field as field

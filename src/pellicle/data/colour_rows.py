@@ -54,6 +54,7 @@ class ColourRows(NamedTuple):
     name: str = ""
     path: str = ""
     sha256: str = ""
+    balance: float | None = None  # relative standard uncertainty of the white balance
     sight: str = ""  # "observer 1964 under D65", where the file states it
 
 

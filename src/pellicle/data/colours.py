@@ -49,6 +49,8 @@ class Colours:
     - `gamma` of "rgb".
     - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
     - `camera`: matrix of a camera whose sensitivities are not known, by a chart.
+    - `calibrated`: false for the channels of a camera that nobody calibrated: `sensor` is a guess at it.
+    - `balance`: relative standard uncertainty of the white balance; None for the usual one.
     - `path`, `sha256`, `lines`: file, its digest and the source line of each colour.
     - `notes`: sentences on how the file was read.
     - `name` of these colours within their file.
@@ -74,6 +76,8 @@ class Colours:
     lines: np.ndarray | None = None
     notes: tuple[str, ...] = ()
     name: str = ""
+    calibrated: bool = True
+    balance: float | None = None
 
     def __post_init__(self) -> None:
         values = np.asarray(self.values)

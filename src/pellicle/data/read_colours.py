@@ -18,8 +18,11 @@ from pellicle.errors import DataError, UsageError
 
 Pixels = str | Sequence[int] | Sequence[Sequence[int]]
 """Regions or points of a photograph: "x,y,w,h;x,y,w,h", or numbers."""
-_LIMITED = 0.5
-"""Share of clipped pixels above which a channel is a limit: the median is clipped."""
+_LIMITED = 0.05
+"""Share of clipped pixels above which a channel is a limit: the mean of the others is no measure of it."""
+
+_UNBALANCED = 0.05
+"""Relative error of the white balance of a photograph that is not divided by a white."""
 
 
 def read_colours(path: str | os.PathLike[str], *, name: str | None = None, **options) -> Colours:
@@ -153,6 +156,7 @@ def _assembled(
         gamma=camera.gamma,
         white_balance=camera.white_balance,
         camera=seen.matrix,
+        calibrated=film.space != "rgb" or (camera.sensitivities, camera.chart) != (None, None),
     )
 
 
@@ -192,6 +196,7 @@ def _photograph_colours(
         value, sigma, sentences = _region_colour(region, photograph, seen.coding, reference)
         of_region = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
         rows = ColourRows(space, value, sigma, of_region, None, (*told, *sentences), str(region))
+        rows = rows._replace(balance=_UNBALANCED if white is None else None)
         films.append(rows._replace(path=photograph.path, sha256=photograph.sha256))
     if angles is None or not angles.ndim:
         return films, seen

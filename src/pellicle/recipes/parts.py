@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -33,7 +33,7 @@ from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
-from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate, Uncertainty
+from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, StandardUncertainties, Substrate
 from pellicle.scene.priors import HalfNormal, Normal
 
 _NAME: dict[type, str] = {kind: name for table in (MIXTURES, PROFILES, KINDS) for name, kind in table.items()}
@@ -193,8 +193,6 @@ def _without_default_bounds(dispersion: AbstractDispersion) -> Sequence[Abstract
 
 _SIGNED = ("wavelength_shift", "angle_shift")
 """Numbers that may be negative."""
-_OF_THE_SCENE = ("index", "dispersion", "roughness", "thickness_spread", "interlayer", "overlayer")
-"""Uncertainties that stand in [scene]; the others stand in [instrument]."""
 
 
 def optional(value: schema.Number | None, name: str) -> float | Free | None:
@@ -301,29 +299,30 @@ def instrument_keys(instrument: Instrument) -> dict[str, Any]:
     return keys | _keys(instrument, "instrument", keys)
 
 
-def uncertainty(scene: schema.SceneTable, instrument: schema.InstrumentTable) -> Uncertainty:
-    """The usual uncertainties, or none, with those that a recipe gives in their place."""
+Stated = TypeVar("Stated", bound=StandardUncertainties)
+
+
+def uncertainty(kind: type[Stated], scene: Any, *others: Any) -> Stated:
+    """The usual uncertainties of a kind, or none, by the word of the table `scene`, with those that this and
+    other tables give in their place."""
     stated = {
         field.name: value
-        for field in fields(Uncertainty)
-        for table in (scene, instrument)
+        for field in fields(kind)
+        for table in (scene, *others)
         if (value := getattr(table, f"{field.name}_uncertainty", None)) is not None
     }
-    return replace(Uncertainty() if scene.uncertainty == "usual" else Uncertainty.none(), **stated)
+    return replace(kind() if scene.uncertainty == "usual" else kind.none(), **stated)
 
 
-def uncertainty_keys(uncertainty: Uncertainty) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Keys of `[scene]` and of `[instrument]`, the inverse of `uncertainty`.
+def uncertainty_keys(uncertainty: StandardUncertainties) -> dict[str, Any]:
+    """Keys of a recipe, the inverse of `uncertainty`: those that differ from the usual uncertainties or from
+    none, whichever are fewer."""
+    kind = type(uncertainty)
 
-    They are those that differ from the usual uncertainties or from none, whichever are fewer.
-    """
-
-    def stated(base: Uncertainty) -> dict[str, Any]:
+    def stated(base: StandardUncertainties) -> dict[str, Any]:
         return {name: float(x) for name, x in vars(uncertainty).items() if x != getattr(base, name)}
 
-    usual, none = stated(Uncertainty()), stated(Uncertainty.none())
+    usual, none = stated(kind()), stated(kind.none())
     fewest = usual if len(usual) <= len(none) else none
-    keys = {f"{name}_uncertainty": x for name, x in fewest.items()}
-    of_scene = {key: x for key, x in keys.items() if key.removesuffix("_uncertainty") in _OF_THE_SCENE}
     word = {} if fewest is usual else {"uncertainty": "none"}
-    return word | of_scene, {key: x for key, x in keys.items() if key not in of_scene}
+    return word | {f"{name}_uncertainty": x for name, x in fewest.items()}

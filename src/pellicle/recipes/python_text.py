@@ -15,7 +15,7 @@ from pellicle.scene.film import Light, Reference, Scene
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, Substrate, Uncertainty
+from pellicle.scene.layers import Interface, Layer, Plate, StandardUncertainties, Substrate
 from pellicle.scene.surface import Surface
 
 _PLACES = {
@@ -64,8 +64,8 @@ def python_text(thing: Any) -> str:
         return _call("pl.Free", [thing.lower, thing.upper], about)
     if isinstance(thing, Anisotropic):
         return _call("pl.Anisotropic", [], thing.arguments)
-    if isinstance(thing, Uncertainty) and thing == Uncertainty.none():
-        return "pl.Uncertainty.none()"
+    if isinstance(thing, StandardUncertainties) and thing == type(thing).none():
+        return f"pl.{type(thing).__name__}.none()"
     if isinstance(thing, Drift):
         return repr("free" if thing == ONE_NUMBER else "slow")
     if isinstance(thing, Material | Constant):
@@ -137,7 +137,7 @@ def _module(module: Any) -> str:
             continue
         else:
             named[field.name] = _shortened(module, field.name, value)
-    public = kind in _POSITIONAL or kind in (Light, Instrument, Uncertainty)
+    public = kind in _POSITIONAL or isinstance(module, Light | Instrument | StandardUncertainties)
     place = "" if public else f"{_PLACES.get(kind.__module__, 'dispersion')}."
     return _call(f"pl.{place}{kind.__name__}", given, named)
 
@@ -157,7 +157,7 @@ def _is_default(module: Any, field: Any, value: Any) -> bool:
         return isinstance(value, Constant) and value == Constant(1.0)
     if isinstance(value, Light):
         return bool(replace(value, wavelength=None) == Light())
-    if isinstance(value, Instrument | Uncertainty) or isinstance(module, Scene):
+    if isinstance(value, Instrument | StandardUncertainties) or isinstance(module, Scene):
         return bool(value == default)
     if isinstance(module, Reference) and field.name == "layers":
         return value == ()

@@ -24,7 +24,8 @@ from pellicle.recipes import parts, schema
 from pellicle.recipes.media import medium, number
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
-from pellicle.scene.surface import Surface
+from pellicle.scene.layers import Uncertainty
+from pellicle.scene.surface import Surface, SurfaceUncertainty
 
 
 def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
@@ -198,7 +199,7 @@ class FilmRecipe:
                 ambient=medium(described.ambient, name="ambient", folder=folder),
                 light=lit,
                 instrument=parts.instrument(tables.instrument),
-                uncertainty=parts.uncertainty(described, tables.instrument),
+                uncertainty=parts.uncertainty(Uncertainty, described, tables.instrument),
                 reference=None if tables.reference is None else parts.reference(tables.reference, folder),
             )
             check_free_count(len(free_leaves(scene)), least=int(fitted))
@@ -277,6 +278,7 @@ class SurfaceRecipe:
                 sensor,
                 None if table.film is None else medium(table.film, name="film", folder=folder),
                 None if table.base is None else medium(table.base, name="base", folder=folder),
+                parts.uncertainty(SurfaceUncertainty, table),
             )
         with _of_recipe(self.path):
             check_free_count(len(surface.free_numbers()), least=int(fitted))

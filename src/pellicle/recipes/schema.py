@@ -262,6 +262,10 @@ class InstrumentTable(_Table):
     delta_uncertainty: Uncertain = None
     depolarisation_uncertainty: Uncertain = None
     mueller_uncertainty: Uncertain = None
+    white_balance_uncertainty: Uncertain = None
+    flare_uncertainty: Uncertain = None
+    camera_uncertainty: Uncertain = None
+    lamp_uncertainty: Uncertain = None
 
 
 _Angle = Annotated[
@@ -387,6 +391,14 @@ class SurfaceTable(_Table):
     lamp: str | None = None
     film: Medium | None = None
     base: Medium | None = None
+    uncertainty: Literal["usual", "none"] = "usual"
+    index_uncertainty: Uncertain = None
+    base_uncertainty: Uncertain = None
+    gain_uncertainty: Uncertain = None
+    band_uncertainty: Uncertain = None
+    bandwidth_uncertainty: Uncertain = None
+    thickness_spread_uncertainty: Uncertain = None
+    angle_uncertainty: Uncertain = None
 
 
 class SurfaceSceneTable(_Table):

@@ -19,6 +19,7 @@ from pellicle.files import write_text
 from pellicle.recipes import parts
 from pellicle.recipes.parts import same, written_medium, written_number
 from pellicle.recipes.read import checked
+from pellicle.recipes.schema import SceneTable
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
 from pellicle.scene.layers import medium as medium_of
@@ -78,7 +79,9 @@ def recipe_text(
         _check_surface(scene, again)
         return text
     ambient = written_medium(scene.ambient, "the ambient", place)
-    of_scene, of_instrument = parts.uncertainty_keys(scene.uncertainty)
+    stated = parts.uncertainty_keys(scene.uncertainty)
+    of_scene = {key: x for key, x in stated.items() if key in SceneTable.model_fields}
+    of_instrument = {key: x for key, x in stated.items() if key not in of_scene}
     data = data if wavelength is None else {"wavelengths": _wavelengths(wavelength)} | data
     text = _document(
         {
@@ -174,6 +177,7 @@ def _surface(scene: Surface, folder: Path) -> dict[str, Any]:
         medium = getattr(scene, part)
         if medium is not None:
             keys[part] = written_medium(medium_of(medium), part, folder)
+    keys |= parts.uncertainty_keys(scene.uncertainty)
     for key, value in scene.numbers.items():
         several = not isinstance(value, Free) and np.ndim(value) == 1
         keys[key] = [float(x) for x in np.ravel(value)] if several else written_number(value, key)  # pyright: ignore[reportArgumentType,reportCallIssue]
@@ -201,6 +205,7 @@ def _check_surface(scene: Surface, again: Surface) -> None:
     pairs = [(key, scene.numbers[key], again.numbers[key]) for key in scene.numbers]
     pairs += [(part, medium(getattr(scene, part)), medium(getattr(again, part))) for part in ("film", "base")]
     pairs += [(name, getattr(scene, name), getattr(again, name)) for name in ("wavelengths", "sensor")]
+    pairs.append(("uncertainty", vars(scene.uncertainty), vars(again.uncertainty)))
     _check(pairs, "{} of this surface")
 
 

@@ -25,7 +25,21 @@ from pellicle.scene.free import Free, insert, is_free, start_values
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class StandardUncertainties:
+    """Standard uncertainties by name, each finite and not negative."""
+
+    def __post_init__(self):
+        for field in fields(self):
+            check_uncertainty(field.name, getattr(self, field.name))
+
+    @classmethod
+    def none(cls) -> Any:
+        """Everything stated is exact, and nothing else is there: errors are those of noise and residuals."""
+        return cls(**{field.name: 0.0 for field in fields(cls)})
+
+
+@dataclass(frozen=True)
+class Uncertainty(StandardUncertainties):
     """Standard uncertainties of numbers that a scene states, and usual sizes of effects that it leaves out.
 
     The defaults are those of ordinary instruments and samples. 0 is a number that is known, or an effect that
@@ -48,6 +62,9 @@ class Uncertainty:
     - `interlayer`: thickness of a native oxide on a substrate of an index above 2, in nm, and twice that of a
       mixture of the media at its face.
     - `overlayer`: thickness of a contamination of index 1.5 on the upper face, in nm.
+    - `white_balance`: relative, of the channels of colours; `flare`: light or black level added to them, as
+      a share of white; `camera`: share of one channel in another where the camera is not calibrated, and 0.6
+      of it of the exponent of the coding; `lamp`: slope and curvature of its spectrum, relative.
 
     **Raises:** ValueError for a negative or infinite number.
 
@@ -71,15 +88,10 @@ class Uncertainty:
     thickness_spread: float = 0.01
     interlayer: float = 1.0
     overlayer: float = 0.5
-
-    def __post_init__(self):
-        for field in fields(self):
-            check_uncertainty(field.name, getattr(self, field.name))
-
-    @classmethod
-    def none(cls) -> Uncertainty:
-        """Everything stated is exact, and nothing else is there: errors are those of noise and residuals."""
-        return cls(**{field.name: 0.0 for field in fields(cls)})
+    white_balance: float = 0.02
+    flare: float = 0.01
+    camera: float = 0.05
+    lamp: float = 0.1
 
 
 def check_uncertainty(name: str, value: float | None) -> None:

@@ -25,7 +25,7 @@ from pellicle.materials import materials_in
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves
-from pellicle.scene.layers import Interface, Layer, MediumLike, Plate, medium
+from pellicle.scene.layers import Interface, Layer, MediumLike, Plate, StandardUncertainties, medium
 
 KEYS = {"film": ("n", "k"), "base": ("base_n", "base_k")}
 """Keys of the index of each part of a surface."""
@@ -71,6 +71,38 @@ def index_numbers(
     return {n_key: n}
 
 
+@dataclass(frozen=True)
+class SurfaceUncertainty(StandardUncertainties):
+    """Standard uncertainties of numbers that a surface states, and usual sizes of effects that it leaves out.
+
+    The defaults are those of ordinary samples and cameras. 0 is a number that is known, or an effect that is
+    known to be absent. What a surface has as a free parameter does not count.
+
+    **Arguments:**
+
+    - `index`: relative, of the given index of the film.
+    - `base`: relative, of the given index and of the given extinction of the base.
+    - `gain`: relative, of each channel.
+    - `band`: of the wavelength of each channel, in nm.
+    - `bandwidth`: full width at half maximum of the band of a channel that is one wavelength, in nm.
+    - `thickness_spread`: standard deviation of the thickness over the measured area, relative.
+    - `angle`: of the angles from the normal to the light and to the viewer, in degrees.
+
+    **Raises:** ValueError for a negative or infinite number.
+
+    >>> SurfaceUncertainty(band=1.0).index
+    0.005
+    """
+
+    index: float = 0.005
+    base: float = 0.02
+    gain: float = 0.02
+    band: float = 5.0
+    bandwidth: float = 20.0
+    thickness_spread: float = 0.02
+    angle: float = 0.5
+
+
 LETTERS = ("r", "g", "b")
 INDICES = ("ambient_n", "n", "k", "base_n", "base_k")
 """Keys that may have one number for each channel."""
@@ -107,6 +139,8 @@ class Surface:
       surface is the same. An index is then one number for all wavelengths, or that of a medium.
     - `film`, `base`: media of the film and of the base, in place of `n` and `k`, `base_n` and `base_k`: a
       name of the catalogue, a file of n and k, or a dispersion without free parameters.
+    - `uncertainty`: a `SurfaceUncertainty` of what the surface states or leaves out; it enters the errors of
+      a fit.
 
     **Raises:** UsageError for an unknown name or key, and where the count of numbers does not match;
     ValueError for an unknown medium, or one without data at a wavelength.
@@ -122,6 +156,7 @@ class Surface:
     sensor: Sensor | None = None
     film: MediumLike | None = None
     base: MediumLike | None = None
+    uncertainty: SurfaceUncertainty = SurfaceUncertainty()
 
     def __post_init__(self) -> None:
         try:

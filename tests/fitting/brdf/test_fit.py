@@ -88,7 +88,21 @@ def test_errors_are_those_of_the_inverse_hessian(known):
     slopes = (jacobian(rho, best, 1e-5 * best) / s.sigma[..., None]).reshape(-1, len(NAMES))
     expected = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     length = 600 / known.effective_points
-    np.testing.assert_allclose([known[name].stderr for name in NAMES], expected * np.sqrt(length), rtol=1e-4)
+    found = [known[name].stderr_noise for name in NAMES]
+    np.testing.assert_allclose(found, expected * np.sqrt(length), rtol=1e-4)
+
+
+def test_the_budget_is_what_other_numbers_of_the_surface_would_give(known, monkeypatch):
+    """The index of the film is fixed: with another one by its uncertainty the fit gives another thickness."""
+    monkeypatch.setattr(module, "search", search_from(START))
+    n, budget = np.asarray(FREE.numbers["n"]), {row.name: row for row in known.budget}
+    assert {"index of the film", "gain of G", "wavelength of B", "viewing angle"} <= budget.keys()
+    assert not {"index of the base", "extinction of the base"} & budget.keys()  # the model has no base
+    other = dataclasses.replace(FREE, numbers={**FREE.numbers, "n": (1.005 * n).tolist()})
+    moved = fit(known.samples, other)["thickness"].value - known["thickness"].value
+    assert moved == pytest.approx(budget["index of the film"].changes["thickness"], rel=0.15)
+    assert known["thickness"].stderr > 3 * known["thickness"].stderr_noise
+    assert "(95 %; ±" in known.verdict
 
 
 @pytest.mark.slow

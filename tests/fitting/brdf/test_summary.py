@@ -78,7 +78,7 @@ BASELINES = (Baseline("no interference", 2.0), Baseline("two lobes", 3.0))
 def test_a_layer_without_any_doubt():
     result = evidence(GOOD, (Rival({"thickness": 500.0}, 40.0),), 1.0, BASELINES)
     assert result.layered
-    assert result.verdict.startswith("Evidence of a layer: thickness 300.00 ± 0.10")
+    assert result.verdict.startswith("Evidence of a layer: thickness 300.00 ± 0.20 (95 %).")
     assert "50 % below no interference and 67 % below two lobes" in result.verdict
 
 

@@ -1,5 +1,7 @@
 """Fits of colours against films simulated with tmm."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
@@ -119,6 +121,54 @@ def test_clipped_channels_are_limits():
     fit = pl.fit(bright, scene("free"))
     assert fit["thickness"].value == pytest.approx(300.0, abs=3 * fit["thickness"].stderr)
     assert fit["instrument.scale"].value == pytest.approx(3.0, rel=0.02)
+
+
+def test_the_camera_clips_the_model_too():
+    """A soap film of a colour outside sRGB: red is 0.004 by noise, where the film has less than none."""
+    nm, water, noise = NM, 1.333, np.array([0.004, 0.0, 0.0])
+    r = (1 - water) / (1 + water)
+    wave = np.exp(4j * np.pi * water * 230.0 / nm)
+    code = encoding("srgb", SENSOR[1].sum(axis=0))
+    channels = code.channels(np.abs(r * (1 - wave) / (1 - r * r * wave)) ** 2 @ SENSOR[1])
+    assert channels[0] < -0.005
+    values = np.clip(code.encode(channels, code.roots(channels)), 0, 1) + noise
+    film = pl.Scene(pl.Layer(water, pl.Free(50.0, 700.0)), 1.0)
+    fit = pl.fit(Colours(values[None], SENSOR, angle=np.zeros(1)), film)
+    assert fit["thickness"].value == pytest.approx(230.0, abs=1.0)
+    assert fit.model[0, 0] == 0.0
+    # with an unknown exposure red must not pull it to 0
+    brighter = np.clip(code.encode(9 * channels, code.roots(9 * channels)), 0, 1) + noise
+    free = dataclasses.replace(film, instrument=pl.Instrument(scale="free"))
+    fit = pl.fit(Colours(brighter[None], SENSOR, angle=np.zeros(1)), free)
+    assert fit["instrument.scale"].value == pytest.approx(9.0, rel=0.1)
+    names = [row.name for row in fit.budget]
+    assert {"balance of red", "flare or black level", "saturation", "slope of the lamp"} <= {*names}
+    assert "scale" not in names  # it is free
+
+
+def test_colours_far_from_those_of_the_film_are_a_misfit_whatever_their_noise():
+    right = colours(300.0, sigma=0.12, seed=0)
+    film = colours(300.0).values
+    near, far = (
+        dataclasses.replace(right, values=np.clip(film + size * np.array([1.0, -1.0, 1.0]), 0, 1))
+        for size in (0.01, 0.12)
+    )
+    fits = [pl.fit(data, scene(thickness=(290.0, 310.0))) for data in (near, far)]
+    assert [np.max(fit.parts[0].curve.difference) > 10 for fit in fits] == [False, True]
+    assert all(fit.chi2_reduced < 3 for fit in fits)
+    assert [fit.status == "misfit" for fit in fits] == [False, True]
+
+
+def test_channels_of_an_unknown_camera_determine_nothing():
+    code = camera_encoding()._replace(linear=np.diag(1 / SENSOR[1].sum(axis=0)))
+    values = code.channels(xyz(300.0))
+    known, unknown = (
+        pl.fit(Colours(values, SENSOR, "rgb", angle=ANGLES, calibrated=known), scene())
+        for known in (True, False)
+    )
+    assert known.status == "converged"
+    assert unknown.status == "not-identifiable"
+    assert "The camera is not calibrated" in unknown.verdict
 
 
 @pytest.mark.slow  # two kinds of data, and each alone

@@ -17,6 +17,7 @@ from pellicle.fitting.brdf.problem import incoherent, make, restricted, together
 from pellicle.fitting.brdf.search import FEW, SMOOTH, THOROUGH, Effort, search
 from pellicle.fitting.brdf.summary import LayerEvidence
 from pellicle.fitting.brdf.view import RESIDUALS
+from pellicle.fitting.budget import budget
 from pellicle.fitting.conclusion import common_rms, ranked_minima
 from pellicle.fitting.minima import Minima, deviance_at, minima
 from pellicle.fitting.problem import Problem
@@ -139,6 +140,7 @@ def _fit(
         parameters=parameters,
         rivals=summary.with_curves(judged.conclusion.rivals, ranked.problem),
         rms=rms,
+        budget=budget(judged.discrepancy, ranked.problem.parameters),
         warnings=(*notes, *_warnings(samples, surface, judged, status, parameters)),
         scene=surface,
         layer_test=LayerTest(layer.layered, errors["layer"], baselines, residual),

@@ -11,21 +11,21 @@ import numpy as np
 from pellicle.brdf.albedo import energy_warning
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import in_plane
+from pellicle.fitting.brdf.systematic_effects import systematic_effects
 from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.curves import BrdfCurve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Baseline, Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.status import RIVAL, describe, limits_in_words
+from pellicle.fitting.status import RIVAL, expanded, limits_in_words
 from pellicle.materials import materials_in
 from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
 
-_FAR = 4.0
-"""Reduced χ² on a given σ above which residuals are not noise."""
 _STRUCTURED = 0.1
 """Share of independent samples below which residuals without a given σ are not noise."""
 _LARGE = 0.05
@@ -40,15 +40,17 @@ class BrdfMeasurements(NamedTuple):
     ranked: RankedMinima
 
     def evidence(self, jacobian: Scaled) -> list[Evidence]:
-        """Residuals of each view in units of its noise, without effects: BRDF models have no systematic
-        effects."""
-        views, fits, result = self.ranked.problem.views, self.ranked.fits, []
+        """Residuals of each view in units of its noise, and what may explain them."""
+        problem, fits, result = self.ranked.problem, self.ranked.fits, []
+        views = problem.views
         blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
         for view, fit, block in zip(views, fits, blocks, strict=True):
             residual = view.residuals(fit.at)
             columns, one = block.reshape(*residual.shape, -1), np.ones(residual.shape)
             weights = math.sqrt(view.samples.independent_fraction) * one
-            result.append(Evidence(residual, columns, one, 1.0, weights, (), view.correlation_length))
+            values = problem.seen_by(view, self.ranked.values)
+            effects = systematic_effects(view, values, fit.at, self.surface)
+            result.append(Evidence(residual, columns, one, 1.0, weights, effects, view.correlation_length))
         return result
 
     def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
@@ -70,11 +72,15 @@ class BrdfMeasurements(NamedTuple):
 
     def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy) -> list[Part]:
         """The parts that the surface does not explain: residuals are large, and not noise."""
-        missed = []
-        for part, view, fit in zip(parts, self.ranked.problem.views, self.ranked.fits, strict=True):
-            given, chi2_reduced = view.noise.given, fit.chi2 / fit.freedom
-            structured = chi2_reduced > _FAR if given else 1 / fit.length < _STRUCTURED
-            missed += [part] if structured and view.rms(fit.at) > _LARGE * view.span() else []
+        missed, fits = [], self.ranked.fits
+        rows = zip(parts, self.ranked.problem.views, fits, discrepancy.remaining, strict=True)
+        for part, view, fit, left in rows:
+            large = _LARGE * view.span()
+            if view.noise.given:
+                wrong = misfit(discrepancy, left, Accuracy(largest=large))
+            else:
+                wrong = 1 / fit.length < _STRUCTURED and view.rms(fit.at) > large
+            missed += [part] if wrong else []
         return missed
 
     def fixed(self) -> list[Estimate]:
@@ -240,7 +246,7 @@ def evidence(
     if doubts:
         return LayerEvidence(False, f"No evidence of a layer: {'; '.join(doubts)}.")
     gains = " and ".join(f"{100 * (1 - held_out / b.held_out):.0f} % below {b.name}" for b in baselines)
-    lead = f"{describe(depth)}. The" if depth else "the"
+    lead = f"{depth.name} {expanded(depth)}. The" if depth else "the"
     return LayerEvidence(True, f"Evidence of a layer: {lead} held-out error is {gains}.")
 
 

@@ -224,6 +224,12 @@ class SamplesView:
         scale = np.divide(self.stated[: self.rows], weight, out=np.zeros_like(weight), where=weight > 0)
         return self.residuals(at) * scale
 
+    def slope_of_compared(self, at: Local) -> np.ndarray:
+        """Weighted ∂ compared number / ∂ BRDF (rows, channels) at the model."""
+        samples, transform = self.samples, RESIDUALS[self.form.residual]
+        rise = slope(transform, jnp.asarray(at.model), samples.i[:, 2:3], samples.floor)
+        return (np.asarray(rise) * np.asarray(samples.weight))[: self.rows]
+
     def rms(self, at: Local) -> float:
         """rms of the residuals, in the unit of the residual; in standard deviations where σ is given."""
         return float(np.sqrt(np.mean(self.compared(at) ** 2)))

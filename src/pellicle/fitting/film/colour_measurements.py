@@ -1,6 +1,8 @@
 """Colours in a fit: their target and view, their part and curve, evidence of a discrepancy, probabilities."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import permutations
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,8 +15,9 @@ from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence
+from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence, Remaining
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
+from pellicle.fitting.film.extended_scene import Number, extended
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.systematic_effects import named_for, simulated_effects
 from pellicle.fitting.misfit import Accuracy
@@ -110,15 +113,13 @@ def colours_view(
         code = encoding(colours.space, white)
     linear = code.decoded(colours.values)
     response, modes = camera_response(colours, code.linear, scene.instrument.scale)
-    values = colours.values
-    limits = np.where(values >= 1, 1.0, np.where(values <= 0, -1.0, 0.0)) * code.clips
-    if colours.space == "rgb":  # exact 0 and 1 are where a camera clips
-        limits = np.where((values == 0) | (values == 1), limits, 0.0)
+    # exact 1 is where a camera clips: the film may be brighter
+    highest = np.where(code.clips & (colours.values == 1), 1.0, np.inf)
     data = ColourData(
         values=linear,
         frame=code.rise(linear) / colours.noise[:, :, None],
         weight=np.ones(linear.shape),
-        limits=limits,
+        clipped=(np.float64(0.0 if code.clips else -np.inf), highest),
         sensor=colours.sensor[1],
         response=response,
     )
@@ -168,12 +169,15 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
     )
 
 
+_UNLIKE, _CONTRADICTED = 10.0, 5.0
+"""ΔE*ab that no measured colour of a film has from the right one, and the mean square of residuals that no
+effect explains, in units of a given σ², with which none agrees."""
 LARGEST = 0.03
 """Difference of a channel, in units of its range, that no calibrated camera makes: a ΔE*ab of about 3."""
 
 
 def colours_evidence(
-    view: ColoursView, values: np.ndarray, at: Local, scene: Scene, block: np.ndarray
+    view: ColoursView, values: np.ndarray, at: Local, measured: MeasuredColours, block: np.ndarray
 ) -> Evidence:
     """Evidence of colours at `values` (the parameters of the view,), in units of their σ.
 
@@ -183,34 +187,75 @@ def colours_evidence(
     columns = block.reshape(view.rows, 3, -1) / weight[:, :, None]
     residual, one = view.residuals(at) / weight, np.ones(weight.shape)
     response = view.response(at)
-    effects = [
+    simulated = [
         row.effect(view.weighted(at, (weights @ change).reshape(-1, 3) @ response.T) / weight)
-        for row, weights, change in simulated_effects(view, values, scene)
+        for row, weights, change in simulated_effects(view, values, measured.scene)
     ]
-    effects = named_for([*effects, *_of_exposure(view, at, scene, weight)], view.name)
+    every = [*camera_errors(view, at, measured), *lamp_errors(view, values, at, measured.scene)]
+    effects = [
+        Effect(name, size, "", view.weighted(at, size * change) / weight, shared=False)
+        for name, size, change in every
+        if size
+    ]
     counted = weight * np.sqrt(view.independent_fraction)
+    effects = named_for([*simulated, *effects], view.name)
     return Evidence(residual, columns, one, 1.0, counted, effects, view.correlation_length)
+
+
+def camera_errors(
+    view: ColoursView, at: Local, measured: MeasuredColours
+) -> Iterator[tuple[str, float, np.ndarray]]:
+    """Errors of the recorded linear channels (colours, 3): name, standard uncertainty, change by one of it.
+
+    Those of a colorimeter are its scale and balance.
+    """
+    allowed, colours, model = measured.scene.uncertainty, measured.colours, np.asarray(at.model)
+    photographed = colours.space in ("srgb", "rgb")
+    if not any(name.startswith("white_balance") for name in view.modes):
+        if not isinstance(measured.scene.instrument.scale, Drift):
+            yield "scale", allowed.scale, model
+        stated = allowed.white_balance if photographed else allowed.scale
+        size = stated if colours.balance is None or not stated else colours.balance
+        yield "balance of red", size, model * [1.0, 0.0, 0.0]
+        yield "balance of blue", size, model * [0.0, 0.0, 1.0]
+    if photographed:
+        yield "flare or black level", allowed.flare, np.ones(model.shape)
+        yield "tone curve", allowed.camera, 0.6 * model * np.log(np.maximum(model, 1e-3))
+    if colours.space == "srgb" or not colours.calibrated:
+        yield "saturation", allowed.camera, 2 * (model - model.mean(axis=1, keepdims=True))
+        for i, j in permutations(range(3), 2):
+            mixed = np.eye(3)[i] * (model[:, j] - model[:, i])[:, None]
+            yield f"share of {'RGB'[j]} in channel {'RGB'[i]}", allowed.camera, mixed
+
+
+def lamp_errors(
+    view: ColoursView, values: np.ndarray, at: Local, scene: Scene
+) -> Iterator[tuple[str, float, np.ndarray]]:
+    """Errors of the recorded linear channels by a slope and by a curvature of the lamp's spectrum, to which
+    the white is balanced."""
+    sensor, extension = np.asarray(view.data.sensor), extended(view, values)
+    position = np.linspace(-1, 1, len(sensor))[:, None]
+    for name, shape in (("slope of the lamp", position), ("curvature of the lamp", 2 * position**2 - 1)):
+        if size := scene.uncertainty.lamp:
+            lit = sensor * (1 + size * shape)
+            data = view.data._replace(sensor=lit * (sensor.sum(axis=0) / lit.sum(axis=0)))
+            [seen] = extension.signals(data, values, [(Number(0), 0.0)])
+            change = seen.reshape(-1, 3) - np.asarray(at.colours)
+            yield name, size, change @ view.response(at).T / size
+
+
+def unlike(part: Part, left: Remaining) -> bool:
+    """True for colours that are not those of the film, whatever their camera."""
+    assert isinstance(part.curve, ColourCurve)
+    difference = 0.0 if part.curve.difference is None else float(np.max(part.curve.difference))
+    contradicted = part.sigma_from == "given" and left.weighted**2 > _CONTRADICTED
+    return difference > _UNLIKE or bool(contradicted)
 
 
 def accuracy(view: ColoursView, sigma: float) -> Accuracy:
     """The residuals, in units of the median `sigma` of the data, that no camera makes."""
     span = 100.0 if view.encoding.mix[0, 1] else 1.0  # L*, a*, b*
     return Accuracy(largest=LARGEST * span / sigma)
-
-
-def _of_exposure(view: ColoursView, at: Local, scene: Scene, weight: np.ndarray) -> list[Effect]:
-    """Errors of a known exposure and of a known white balance."""
-    size = scene.uncertainty.scale
-    rows = {"scale": np.ones(3), "balance of red and blue": np.array([1.0, 0.0, -1.0])}
-    if not size or any(name.startswith("white_balance") for name in view.modes):
-        return []
-    if isinstance(scene.instrument.scale, Drift):
-        del rows["scale"]
-    changes = {name: size * np.asarray(at.model) * factor for name, factor in rows.items()}
-    return [
-        Effect(name, size, "", view.weighted(at, change) / weight, shared=False)
-        for name, change in changes.items()
-    ]
 
 
 def with_probabilities(

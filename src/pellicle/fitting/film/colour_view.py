@@ -129,8 +129,9 @@ class ColoursView:
 
     @property
     def independent(self) -> int:
-        """Data values that are no limits, one at least."""
-        return max(int(np.sum(np.asarray(self.data.limits) == 0)), 1)
+        """Data values that are not clipped, one at least."""
+        value, lowest, highest = (np.asarray(x) for x in (self.data.values, *self.data.clipped))
+        return max(int(np.sum((value > lowest) & (value < highest))), 1)
 
     @property
     def noise_groups(self) -> tuple[NoiseGroup, ...]:
@@ -147,7 +148,7 @@ class ColoursView:
         return local(self.form, self.scene, self.data, values)
 
     def residuals(self, at: Local) -> np.ndarray:
-        """Weighted residuals (colours, 3); those of limits only where the model is on the wrong side."""
+        """Weighted residuals (colours, 3), of the model as the camera clips it."""
         return np.asarray(at.residual)
 
     def at_model(self, at: Local) -> float:
@@ -162,8 +163,8 @@ class ColoursView:
 
     def weighted(self, at: Local, change: np.ndarray) -> np.ndarray:
         """A change of the recorded linear channels (colours, 3, ...) as the residuals have it."""
-        active = (np.asarray(self.data.limits) == 0) | (np.asarray(at.residual) != 0)
-        weight = np.asarray(self.data.weight) * active
+        model, (lowest, highest) = np.asarray(at.model), self.data.clipped
+        weight = np.asarray(self.data.weight) * ((model > lowest) & (model < highest))
         return np.einsum("pi,pij,pj...->pi...", weight, np.asarray(self.data.frame), change)
 
     def nuisances(self, at: Local) -> list[Factor]:
@@ -223,9 +224,8 @@ class ColoursView:
         return self.encoding.encode(linear, self.encoding.roots(linear))
 
     def rms(self, at: Local) -> float:
-        """rms of the residuals in the space of the data, limits left out where they are kept."""
-        missed = self.encoded(self.data.values) - self.encoded(at.model)
-        return float(np.sqrt(np.mean(np.where(np.asarray(at.residual) == 0, 0.0, missed) ** 2)))
+        """rms of the residuals in the space of the data."""
+        return float(np.sqrt(np.mean((self.encoded(self.data.values) - self.encoded(at.model)) ** 2)))
 
 
 LOOSE = 10.0
@@ -248,15 +248,15 @@ class Response(NamedTuple):
 class ColourData(NamedTuple):
     """Colours as a fit has them: linear channels, each with the matrix that turns differences into σ.
 
-    `values` (colours, 3); `frame` (colours, 3, 3): residual = weight · (frame @ (values − model)); `limits`
-    (colours, 3) is 1 where the film may be brighter than the value, −1 where it may be darker, else 0.
-    `sensor` (bands, 3) makes a colour of a spectrum.
+    `values` (colours, 3); `frame` (colours, 3, 3): residual = weight · (frame @ (values − model)); `clipped`
+    are the ends, a number and (colours, 3), at which the camera clips. `sensor` (bands, 3) makes a colour of
+    a spectrum.
     """
 
     values: Array
     frame: Array
     weight: Array
-    limits: Array
+    clipped: tuple[Array | np.floating, Array]
     sensor: Array
     response: Response
     independent_fraction: Array | np.floating = np.float64(1.0)
@@ -300,13 +300,15 @@ def camera_response(data: Colours, channels: np.ndarray, scale: float | Drift) -
 def record(colours: Any, data: ColourData) -> Recorded:
     """Colours (colours, 3) of the sensor as recorded, with the modes at their best."""
     response, weight = data.response, data.weight * jnp.sqrt(data.independent_fraction)
-    inside = jnp.where(data.limits == 0, weight, 0.0)
+    exposed = colours @ response.channels.T
+    # a channel that the camera clips says nothing of the exposure; where a dark one begins to, it is 0
+    lowest, highest = data.clipped
+    inside = jnp.where((exposed > lowest) & (data.values < highest), weight, 0.0)
 
     def seen(channels: Any) -> Any:
-        """Linear channels, or differences of them, in standard deviations, without those at a limit."""
+        """Linear channels, or differences of them, in standard deviations, without clipped ones."""
         return inside * jnp.einsum("pij,pj->pi", data.frame, channels)
 
-    exposed = colours @ response.channels.T
     along, measured = seen(exposed), seen(data.values)
     # the exposure by plain least squares: the unit of the coefficients, as a known exposure is
     plain = jnp.sum(along * measured) / (jnp.sum(along**2) + 1e-30)
@@ -321,8 +323,7 @@ def record(colours: Any, data: ColourData) -> Recorded:
         coefficients = jnp.linalg.solve(matrix, target)
         determinant = jnp.linalg.slogdet(matrix)[1] + 2 * jnp.sum(jnp.log(response.sd))
         model = model + jnp.einsum("k,kpi->pi", coefficients, terms)
-    missed = weight * jnp.einsum("pij,pj->pi", data.frame, data.values - model)
-    allowed = jnp.where(data.limits > 0, jnp.maximum(missed, 0.0), jnp.minimum(missed, 0.0))
-    residual = jnp.where(data.limits == 0, missed, allowed)
+    model = jnp.clip(model, lowest, highest)
+    residual = weight * jnp.einsum("pij,pj->pi", data.frame, data.values - model)
     prior = (coefficients - response.mean) / response.sd
     return Recorded(model, residual, coefficients, exposure, prior, determinant)

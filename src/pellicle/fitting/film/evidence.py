@@ -37,7 +37,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
     for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
         values = ranked.problem.seen_by(view, ranked.values)
         if isinstance(view, ColoursView):
-            result.append(colours_evidence(view, values, fit.at, spectrum.scene, block))
+            result.append(colours_evidence(view, values, fit.at, spectrum, block))
         else:
             effects = systematic_effects(view, values, fit.at, spectrum.scene)
             result.append(spectrum_evidence(view, fit.at, block, effects))

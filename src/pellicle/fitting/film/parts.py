@@ -14,7 +14,7 @@ from pellicle.fitting.covariance import Errors
 from pellicle.fitting.curves import ColourCurve, Curve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film.colour_measurements import accuracy as colours_accuracy
-from pellicle.fitting.film.colour_measurements import colour_curve, colours_part
+from pellicle.fitting.film.colour_measurements import colour_curve, colours_part, unlike
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.fringes import Fringes
@@ -75,7 +75,9 @@ def missed(
     return tuple(
         part
         for part, view, left, fringe in each
-        if fringe is not None or misfit(discrepancy, left, _part_accuracy(part, view))
+        if fringe is not None
+        or misfit(discrepancy, left, _part_accuracy(part, view))
+        or (isinstance(part.data, Colours) and unlike(part, left))
     )
 
 

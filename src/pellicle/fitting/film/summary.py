@@ -106,7 +106,12 @@ class FilmMeasurements:
 
     def unneeded(self, parts: tuple[Part, ...]) -> str:
         """Sentence where the only layer has the index of the substrate within its error, empty elsewhere: its
-        thickness then means nothing, as any or none would do."""
+        thickness then means nothing, as any or none would do; or where nobody calibrated the camera."""
+        if all(isinstance(each, Colours) and not each.calibrated for each in self.data):
+            return (
+                " The camera is not calibrated, so that its channels are no measure of a thickness: give its"
+                " `sensitivities`, or a photographed `chart`; the orders listed are those of linear sRGB."
+            )
         view, curve = self.ranked.problem.views[0], parts[0].curve
         if self.ranked.problem.thickness_axis is None or len(view.scene.layers) != 1:
             return ""
@@ -190,7 +195,8 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
             )
         if structure is not None:
             messages.append(f"{own}the model misses structure {structure.words}")
-        if view.noise.given and length < _WHITE and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
+        white = isinstance(view, SpectrumView) and view.noise.given and length < _WHITE
+        if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
             messages.append(
                 f"{own}residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is"
                 f" too {'small' if ratio > 1 else 'large'}, and errors by the noise with it"
