@@ -212,7 +212,7 @@ def test_calibration_errors_as_parameters(scene, refused):
 
 
 MATERIAL = 'material = "SiO2"\n'
-SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer"]
+SAMPLE = ["index", "dispersion", "roughness", "thickness_spread", "interlayer", "overlayer"]
 INSTRUMENT = [field.name for field in fields(Uncertainty) if field.name not in SAMPLE]
 
 
