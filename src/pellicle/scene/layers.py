@@ -63,8 +63,8 @@ class Uncertainty(StandardUncertainties):
       mixture of the media at its face.
     - `overlayer`: thickness of a contamination of index 1.5 on the upper face, in nm.
     - `white_balance`: relative, of the channels of colours; `flare`: light or black level added to them, as
-      a share of white; `camera`: share of one channel in another where the camera is not calibrated, and 0.6
-      of it of the exponent of the coding; `lamp`: slope and curvature of its spectrum, relative.
+      a share of white; `camera`: exponent of its coding, and where it is not calibrated share of one channel
+      in another, and half the error of the saturation; `lamp`: slope and curvature of its spectrum, relative.
 
     **Raises:** ValueError for a negative or infinite number.
 

@@ -15,7 +15,7 @@ from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence, Remaining
+from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
 from pellicle.fitting.film.extended_scene import Number, extended
 from pellicle.fitting.film.parameters import anonymous
@@ -170,8 +170,7 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
 
 
 _UNLIKE, _CONTRADICTED = 10.0, 5.0
-"""ΔE*ab that no measured colour of a film has from the right one, and the mean square of residuals that no
-effect explains, in units of a given σ², with which none agrees."""
+"""ΔE*ab that no measured colour of a film has from the right one, and reduced χ² by a given σ that none has."""
 LARGEST = 0.03
 """Difference of a channel, in units of its range, that no calibrated camera makes: a ΔE*ab of about 3."""
 
@@ -220,7 +219,7 @@ def camera_errors(
         yield "balance of blue", size, model * [0.0, 0.0, 1.0]
     if photographed:
         yield "flare or black level", allowed.flare, np.ones(model.shape)
-        yield "tone curve", allowed.camera, 0.6 * model * np.log(np.maximum(model, 1e-3))
+        yield "tone curve", allowed.camera, model * np.log(np.maximum(model, 1e-3))
     if colours.space == "srgb" or not colours.calibrated:
         yield "saturation", allowed.camera, 2 * (model - model.mean(axis=1, keepdims=True))
         for i, j in permutations(range(3), 2):
@@ -244,12 +243,11 @@ def lamp_errors(
             yield name, size, change @ view.response(at).T / size
 
 
-def unlike(part: Part, left: Remaining) -> bool:
+def unlike(part: Part) -> bool:
     """True for colours that are not those of the film, whatever their camera."""
     assert isinstance(part.curve, ColourCurve)
     difference = 0.0 if part.curve.difference is None else float(np.max(part.curve.difference))
-    contradicted = part.sigma_from == "given" and left.weighted**2 > _CONTRADICTED
-    return difference > _UNLIKE or bool(contradicted)
+    return difference > _UNLIKE or (part.sigma_from == "given" and part.chi2_reduced > _CONTRADICTED)
 
 
 def accuracy(view: ColoursView, sigma: float) -> Accuracy:

@@ -77,7 +77,7 @@ def missed(
         for part, view, left, fringe in each
         if fringe is not None
         or misfit(discrepancy, left, _part_accuracy(part, view))
-        or (isinstance(part.data, Colours) and unlike(part, left))
+        or (isinstance(part.data, Colours) and unlike(part))
     )
 
 
