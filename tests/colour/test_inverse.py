@@ -103,6 +103,15 @@ def test_clipped_channels_are_limits(table):
     assert all_white.status in ("not-identifiable", "ambiguous")
 
 
+def test_a_wide_range_of_the_exposure_has_a_grid_as_fine(table):
+    """Where the brightest of 100 times is clipped everywhere, its colours say nothing of the grid."""
+    narrow, wide = (ColourInverse.build(table, exposure=(low, 1 / low)) for low in (0.5, 0.01))
+    assert len(wide.thickness) > 0.8 * len(narrow.thickness)
+    truth = np.array([93.0, 120.0, 301.0])
+    found = wide(measured(truth, (0.0,), 0.1)[:, 0])
+    assert np.all(np.nanmin(np.abs(found.thickness - truth[:, None]) / found.stderr, axis=1) < 4)
+
+
 def test_status(table):
     assert invert(table, [0.1, 0.9, 0.1]).status == "misfit"
     beyond = measured(np.array([411.0]), (0.0, 60.0))

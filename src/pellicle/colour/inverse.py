@@ -96,7 +96,9 @@ class ColourInverse:
             return channels, code.roots(channels)
 
         trial = np.linspace(low, high, 4096)
-        coded = code.encode(*exposed(trial), gain[1]).reshape(len(trial), -1) / deviation
+        shown = exposed(trial)
+        brightest = np.clip(1 / np.maximum(np.max(shown[1]), 1e-9), *gain)  # brighter ones are clipped
+        coded = code.encode(*shown, brightest).reshape(len(trial), -1) / deviation
         apart = np.linalg.norm(np.diff(coded, axis=0), axis=1) / np.diff(trial)  # σ per nm
         density = np.clip(apart, 1 / _COARSEST, 1 / _FINEST)
         length = np.concatenate([[0.0], np.cumsum(density * np.diff(trial))])

@@ -19,8 +19,8 @@ from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
 from pellicle.simulation.colours import colour_table, varied_layer
 
-EXPOSURE = (0.25, 4.0)
-"""Range of a free scale: two stops of a camera to either side."""
+EXPOSURE = (0.01, 100.0)
+"""Range of a free scale, which a soap film of 1 % and an overexposed mirror need."""
 ORDERS = 4
 """Thicknesses of each pixel that are kept."""
 

@@ -1,33 +1,19 @@
 """Systematic effects of BRDF samples: their change by each number that a surface takes for granted."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from pellicle.brdf.directions import direction
-from pellicle.fitting.brdf.view import Local, Samples, SamplesForm, SamplesView
-from pellicle.fitting.coordinates import Array
+from pellicle.fitting.brdf.view import Local, Samples, SamplesView, local
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.optics.orders import FWHM
-from pellicle.programs.cache import kept
 from pellicle.scene.surface import LETTERS, Surface
 
 _STEP = 0.1
 """Finite step of a linear effect, in standard uncertainties."""
 _INDICES = {"n": "index of the film", "base_n": "index of the base", "base_k": "extinction of the base"}
-
-
-class Simulated(NamedTuple):
-    """BRDF of the samples, (samples, channels) in 1/sr."""
-
-    values: Array
-
-
-@kept
-def simulated(form: SamplesForm, samples: Samples, numbers: dict[str, Any]) -> Simulated:
-    """BRDF of a surface with these numbers."""
-    return Simulated(form.evaluate(numbers, samples.i, samples.o))
 
 
 def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface: Surface) -> list[Effect]:
@@ -40,7 +26,9 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
     model, rise, every = np.asarray(at.model)[: view.rows], view.slope_of_compared(at), list[Effect]()
 
     def signal(samples: Samples = view.samples, **changed: Any) -> np.ndarray:
-        return np.asarray(simulated(view.form, samples, numbers | changed).values)[: view.rows]
+        # by the program of the fit
+        at = np.array([changed.pop(key, x) for key, x in zip(view.form.keys, values, strict=True)], float)
+        return np.asarray(local(view.form, samples, view.fixed | changed, at).model)[: view.rows]
 
     def add(name: str, size: float, unit: str, change: np.ndarray, **kind: Any) -> None:
         every.extend([Effect(name, size, unit, rise * change, **kind)] if size else [])
@@ -59,7 +47,7 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
     for name, key, mean, size, by in widths:
         # a normal distribution by three nodes, for a variance of the prior's root mean square
         ends = [signal(**{key: mean + s * math.sqrt(3) * size / by}) for s in (1, -1)]
-        add(name, size, "nm", HALF_NORMAL / 6 * (sum(ends) - 2 * signal()), power=2)
+        add(name, size, "nm", HALF_NORMAL / 6 * (sum(ends) - 2 * model), power=2)
     for side, name in (("i", "angle of incidence"), ("o", "viewing angle")):
         ends = (signal(_turned(view.samples, side, s * _STEP * allowed.angle)) for s in (1, -1))
         add(f"{name}{of}", allowed.angle, "deg", slope(*ends), shared=False)

@@ -170,7 +170,7 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
 
 
 _UNLIKE, _CONTRADICTED = 10.0, 5.0
-"""ΔE*ab that no measured colour of a film has from the right one, and reduced χ² by a given σ that none has."""
+"""ΔE*ab from the right colour, and reduced χ² by a given σ, that no measured colour of a film has."""
 LARGEST = 0.03
 """Difference of a channel, in units of its range, that no calibrated camera makes: a ΔE*ab of about 3."""
 
@@ -217,9 +217,10 @@ def camera_errors(
         size = stated if colours.balance is None or not stated else colours.balance
         yield "balance of red", size, model * [1.0, 0.0, 0.0]
         yield "balance of blue", size, model * [0.0, 0.0, 1.0]
-    if photographed:
+    if photographed:  # a camera's own channels are linear where it has no gamma
         yield "flare or black level", allowed.flare, np.ones(model.shape)
-        yield "tone curve", allowed.camera, model * np.log(np.maximum(model, 1e-3))
+        curve = allowed.camera * (colours.space == "srgb" or colours.gamma != 1)
+        yield "tone curve", curve, model * np.log(np.maximum(model, 1e-3))
     if colours.space == "srgb" or not colours.calibrated:
         yield "saturation", allowed.camera, 2 * (model - model.mean(axis=1, keepdims=True))
         for i, j in permutations(range(3), 2):
@@ -247,7 +248,8 @@ def unlike(part: Part) -> bool:
     """True for colours that are not those of the film, whatever their camera."""
     assert isinstance(part.curve, ColourCurve)
     difference = 0.0 if part.curve.difference is None else float(np.max(part.curve.difference))
-    return difference > _UNLIKE or (part.sigma_from == "given" and part.chi2_reduced > _CONTRADICTED)
+    contradicted = part.sigma_from == "given" and part.chi2_reduced > _CONTRADICTED
+    return bool(difference > _UNLIKE or contradicted)
 
 
 def accuracy(view: ColoursView, sigma: float) -> Accuracy:

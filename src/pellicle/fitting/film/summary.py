@@ -108,10 +108,7 @@ class FilmMeasurements:
         """Sentence where the only layer has the index of the substrate within its error, empty elsewhere: its
         thickness then means nothing, as any or none would do; or where nobody calibrated the camera."""
         if all(isinstance(each, Colours) and not each.calibrated for each in self.data):
-            return (
-                " The camera is not calibrated, so that its channels are no measure of a thickness: give its"
-                " `sensitivities`, or a photographed `chart`; the orders listed are those of linear sRGB."
-            )
+            return " The camera is not calibrated: give its `sensitivities` or a photographed `chart`."
         view, curve = self.ranked.problem.views[0], parts[0].curve
         if self.ranked.problem.thickness_axis is None or len(view.scene.layers) != 1:
             return ""
