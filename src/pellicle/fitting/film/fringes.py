@@ -157,14 +157,13 @@ def _extrema(even: np.ndarray, level: np.ndarray, thickness: float) -> tuple[flo
     return float(line[0]), float(np.std(at[turns] - np.polyval(line, number)) / line[0])
 
 
-def proposed(problem: Problem) -> list[float]:
-    """Thicknesses (nm) that the fringes of the problem's spectra suggest, with the start values of the other
-    parameters."""
+def proposed(problem: Problem, values: np.ndarray) -> list[float]:
+    """Thicknesses (nm) that the fringes of the problem's spectra suggest, with the other parameters at
+    `values` (parameters,)."""
     depth = problem.thickness_axis
     if depth is None:
         return []
-    start = np.array([p.start for p in problem.parameters])
-    each = (_phase_and_fringes(problem, view, start, depth)[1] for view in problem.views)
+    each = (_phase_and_fringes(problem, view, values, depth)[1] for view in problem.views)
     return [clear.thickness for clear in each if clear is not None]
 
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from pellicle.fitting.evaluation import scanned
 from pellicle.fitting.film.fringes import proposed
-from pellicle.fitting.film.parameters import WIDTHS
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
@@ -41,8 +40,15 @@ _NEAR, _INDEX = 4, 0.4
 """Candidates that are polished near the thickness that the fringes suggest, and the difference of ln n up to
 which they are near: from 1.3 to 2.0, or back."""
 _NARROW = 0.05
-"""Position between its bounds at which a width starts that has no start of its own: in the middle of wide
-bounds no fringe is left."""
+_WIDTHS = {"bandwidth": 0.5, "thickness_spread": 4.0, "roughness": 1.0, "angle_spread": 0.5}
+"""Position between its bounds at which a width starts that has no start of its own, and the largest value
+there, in its unit: in the middle of wide bounds no fringe is left."""
+_BROADER = (1.0, 8.0, 32.0)
+"""Multiples of that value at which it starts: with fringes of another contrast than the data's the best order
+is another one. Two of them are scanned; all are starts from the best minimum."""
+_PERIOD = 0.08
+"""Difference of ln thickness up to which a candidate is near what the period of the fringes suggests by the
+index of the best minimum."""
 _MOST_POLISHED = 2048
 """Starts after which no more are polished."""
 
@@ -62,6 +68,9 @@ def search(problem: Problem, progress: Progress) -> Minima:
     lowest = lowest[np.argsort(total.ravel()[lowest])]
     first = np.union1d(lowest[: batches * MOST], _near_fringes(problem, units, lowest))
     polished, tried = _every_order(problem, units, total, first, progress)
+    more = _from_best(problem, polished, units, lowest)
+    if len(more):
+        polished, tried = _joined(polished, solve(problem, more, coarse=_COARSE)), tried + len(more)
     result = settled(problem, polished, coarse=_COARSE)
     best = zip(problem.parameters, problem.values(result.units[0]), strict=True)
     log.info(
@@ -91,8 +100,8 @@ def _lowest_within(values: np.ndarray, reach: int) -> np.ndarray:
 def _near_fringes(problem: Problem, units: np.ndarray, lowest: np.ndarray) -> np.ndarray:
     """The first of the candidates `lowest` whose thickness is what the fringes suggest, by an index that may
     be wrong."""
-    chosen = []
-    for thickness in proposed(problem):
+    chosen, start = [], np.array([p.start for p in problem.parameters])
+    for thickness in proposed(problem, start):
         depths = np.asarray(problem.values(units[lowest]))[:, problem.thickness_axis]
         chosen.append(lowest[np.abs(np.log(np.maximum(depths, 1e-9) / thickness)) < _INDEX][:_NEAR])
     return np.concatenate([lowest[:0], *chosen])
@@ -126,13 +135,35 @@ def _every_order(
         if not len(now):
             break
         more = solve(problem, units[now], coarse=_COARSE, progress=progress)
-        polished = Minima(
-            np.concatenate([polished.units, more.units]),
-            np.concatenate([polished.deviance, more.deviance]),
-            np.concatenate([polished.converged, more.converged]),
-        )
+        polished = _joined(polished, more)
         rest, tried = rest[~np.isin(rest, now)], np.concatenate([tried, now])
     return polished, len(tried)
+
+
+def _joined(first: Minima, second: Minima) -> Minima:
+    """The minima of both."""
+    return Minima(
+        np.concatenate([first.units, second.units]),
+        np.concatenate([first.deviance, second.deviance]),
+        np.concatenate([first.converged, second.converged]),
+    )
+
+
+def _from_best(problem: Problem, polished: Minima, units: np.ndarray, lowest: np.ndarray) -> np.ndarray:
+    """Starts in the unit cube from the best minimum: with its widths narrow and broad, and with thicknesses
+    of the candidates `lowest` near what the period of the fringes suggests by its index."""
+    best = polished.units[np.argmin(polished.deviance)]
+    axes = [i for i, p in enumerate(problem.parameters) if p.key in _WIDTHS]
+    depth, values, starts = problem.thickness_axis, np.asarray(problem.values(best)), [best]
+    for thickness in proposed(problem, values):
+        depths = np.maximum(np.asarray(problem.values(units[lowest]))[:, depth], 1e-9)
+        near = lowest[np.abs(np.log(depths / thickness)) < _PERIOD]
+        if abs(np.log(values[depth] / thickness)) > _PERIOD:
+            starts += [np.where(np.arange(len(best)) == depth, units[one], best) for one in near[:_NEAR]]
+    levels = [_widths(problem.parameters[i]) for i in axes]
+    result = np.repeat(starts, max(len(_BROADER) ** len(axes), 1), axis=0)
+    result[:, axes] = np.tile(list(itertools.product(*levels)), (len(starts), 1))
+    return result if axes else result[1:]
 
 
 def _root(deviance: Any) -> Any:
@@ -189,10 +220,15 @@ def _by_decades(lower: float, upper: float, count: int) -> np.ndarray:
     return (np.geomspace(lower + span / 20, upper - span / 6, count) - lower) / span
 
 
+def _widths(p: Parameter) -> np.ndarray:
+    """Positions between its bounds at which a width starts, narrow ones first."""
+    return np.minimum(1.0, min(_NARROW, _WIDTHS[p.key] / (p.upper - p.lower)) * np.array(_BROADER))
+
+
 def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if not p.searched:
         start = (p.start - p.lower) / (p.upper - p.lower)
-        return np.array([_NARROW if p.key in WIDTHS and start == 0.5 else start])
+        return _widths(p)[:2] if p.key in _WIDTHS and start == 0.5 else np.array([start])
     if p.key == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
     if p.levels is not None and p.decades:
