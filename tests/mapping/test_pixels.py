@@ -62,6 +62,13 @@ def angles(given: bool) -> Cube:
     return Cube(arrays, nm, "psi-delta", ("site",), angles)
 
 
+def bare() -> Cube:
+    """A substrate of index 1.5 without a film, and with one."""
+    scenes = [pl.Scene(pl.Layer(n, 300.0), 1.5) for n in (1.5, 1.5, 1.7)]
+    clean = np.array([pl.simulate(scene, wavelength=NM).values for scene in scenes])
+    return cube_of(clean + 5e-4 * np.random.default_rng(6).normal(size=clean.shape), 5e-4)
+
+
 def index(prior: Any = None) -> pl.Scene:
     return pl.Scene(pl.Layer(pl.Free(1.3, 2.3, prior=prior), FREE), "Si")
 
@@ -94,6 +101,12 @@ CASES = {
         lambda: cube_of(films((350, 1.62), (420, 1.62)), None),
         index(pl.priors.Normal(1.60, 0.004)),
         {"converged"},
+    ),
+    "no film": (lambda: cube_of(films(0, 0, 20)), OXIDE, {"not-identifiable", "converged"}),
+    "the index of the substrate": (
+        bare,
+        pl.Scene(pl.Layer(pl.Free(1.3, 2.3), FREE), 1.5),
+        {"not-identifiable", "converged"},
     ),
     "psi and delta": (lambda: angles(True), OXIDE, {"converged"}),
     "psi and delta without sigma": (lambda: angles(False), OXIDE, {"converged"}),

@@ -73,6 +73,7 @@ def verdicts(
     # only the bounds limit it: the difference of two huge variances is rounding
     more = np.where(linear > upper - lower, 0.0, more)
     every = _widened(noise, values, more, freedom[..., None], (lower, upper))
+    noise, every = _without_film(parameters, values, ~np.asarray(misfit), noise, every)
     rivals = np.asarray(ranked.problem.values(ranked.minima.units[..., 1 : _MOST_RIVALS + 1, :]))
     apart = outside(values, every.stderr, rivals).any(axis=-1)
     close = apart & (delta_chi2[..., 1 : _MOST_RIVALS + 1] < RIVAL)
@@ -144,6 +145,26 @@ def _widened(
         np.sqrt(limits.stderr**2 + variance),
         np.where(seen, lower, limits.lower),
         np.where(seen, upper, limits.upper),
+    )
+
+
+def _without_film(
+    parameters: Sequence[Parameter], values: np.ndarray, usable: Any, noise: Limits, every: Limits
+) -> tuple[Limits, Limits]:
+    """Limits by the noise, and with all that enlarges them, that have an upper end alone where the only
+    thickness rests on its lower bound and no film at all lies within its error: then none is needed."""
+    depth = np.array([p.key == "thickness" for p in parameters])
+    if depth.sum() != 1:
+        return noise, every
+    lower, upper = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
+    resting = np.stack([p.on_ends(x)[0] for p, x in zip(parameters, values.T, strict=True)], axis=-1)
+    reach = math.sqrt(ONE_SIDED) * every.stderr
+    absent = depth & resting & np.isfinite(reach) & (lower <= reach) & np.asarray(usable)[..., None]
+    noise = noise._replace(stderr=np.where(absent, np.inf, noise.stderr))
+    return noise, Limits(
+        np.where(absent, np.inf, every.stderr),
+        np.where(absent, np.nan, every.lower),
+        np.where(absent, np.minimum(values + reach, upper), every.upper),
     )
 
 

@@ -19,6 +19,8 @@ correlation from the residuals of a short or featureless spectrum, so fewer is n
 WINDOW = 5
 """Correlation times at which the window of their own sum closes (A. Sokal, 1997, Monte Carlo methods in
 statistical mechanics)."""
+_STEPS, _WHOLE = tuple(10.0**-k for k in range(-1, 7)), 1e-6
+"""Steps to which files are rounded, and how near to a whole number of them values lie."""
 _LAGS = 12
 """Lags within which that window is looked for first, by sums of products, ten times as fast as a Fourier
 transform: that of white noise closes at 5."""
@@ -58,6 +60,16 @@ def _student(chi2: float) -> Chebyshev:
         at = np.interp(math.erf((chi2 / 2) ** 0.5) * area[-1], area, angle[1:])
         logarithms.append(math.log(math.tan(at) / math.sqrt(share * chi2)) / share)
     return Chebyshev.fit(nodes, logarithms, _DEGREE, domain=[0.0, 1.0])
+
+
+def rounding(values: np.ndarray) -> np.ndarray:
+    """Standard deviation (..., 1) of the rounding of `values` (..., points) that are all multiples of one
+    power of ten: step/√12, 0 where there is no such step."""
+    result, span = np.zeros((*values.shape[:-1], 1)), np.ptp(values, axis=-1, keepdims=True)
+    for step in _STEPS:
+        off = np.abs(values / step - np.round(values / step)).max(axis=-1, keepdims=True)
+        result = np.where((result == 0) & (off < _WHOLE) & (span > step), step / math.sqrt(12), result)
+    return result
 
 
 def local_noise(values: np.ndarray, window: int = 51) -> np.ndarray:

@@ -56,7 +56,7 @@ def layer_errors(at: Any, covariance: np.ndarray, points: int) -> tuple[np.ndarr
 
     `at` is the local model of a spectrum or of colours.
     """
-    n, k = _errors(np.asarray(at.layer_slope)[:2, :points], covariance)
+    n, k = slope_errors(np.asarray(at.layer_slope)[:2, :points], covariance)
     return n, k
 
 
@@ -79,11 +79,11 @@ def principal_indices(
         own.append((extraordinary - ordinary, other - slope))
         names.append(BIREFRINGENCE)
     return {
-        name: Index(wavelength, *value, *_errors(slope, covariance))
+        name: Index(wavelength, *value, *slope_errors(slope, covariance))
         for name, (value, slope) in zip(names, own, strict=True)
     }
 
 
-def _errors(slope: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Standard errors (rows, wavelengths) by slopes (rows, wavelengths, parameters)."""
-    return np.sqrt(np.maximum(np.einsum("cip,pq,ciq->ci", slope, covariance, slope), 0.0))
+def slope_errors(slope: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Standard errors (..., rows, wavelengths) by slopes (..., rows, wavelengths, parameters)."""
+    return np.sqrt(np.maximum(np.einsum("...cip,...pq,...ciq->...ci", slope, covariance, slope), 0.0))

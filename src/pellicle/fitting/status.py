@@ -136,6 +136,10 @@ def verdict(
     if status is Status.NOT_IDENTIFIABLE:
         if lead.name in opaque and lead.lower_limit is not None:
             return f"The layer is opaque: {lead.name} {limits_in_words(lead)}."
+        most = math.nan if lead.upper_limit is None or lead.lower_limit is not None else lead.upper_limit
+        absent = lead.at_bound or (lead.lower == 0 and lead.value <= most)
+        if lead.name.endswith("thickness") and absent and most > 0:
+            return f"No film is needed: {lead.name} {limits_in_words(lead)}."
         return f"The data do not determine {lead.name}: it {limits_in_words(lead)}.{besides}"
     if status is Status.MISFIT:
         return (

@@ -286,6 +286,25 @@ def test_a_layer_with_the_index_of_its_substrate_is_no_film(film, measured, inde
     assert needed or math.isinf(fit["thickness"].stderr)
 
 
+def test_values_that_are_rounded_have_its_noise(film, measured):
+    """A σ of 0.0005 beside steps of 0.01."""
+    exact = measured(film(), 430.0, noise=0.0005)
+    rounded = pl.Spectrum(exact.wavelength, np.round(exact.values, 2), "R", np.full(len(exact), 0.0005))
+    fit = pl.fit(rounded, film())
+    assert 0.5 < fit.chi2_reduced < 2
+    assert any("rounded to 0.01, and 0.0029 of the noise is that" in w for w in fit.warnings)
+    assert not any("rounded" in w for w in pl.fit(exact, film()).warnings)
+
+
+def test_a_thickness_of_zero_is_no_film_but_has_an_upper_limit(film, measured):
+    scene = film(pl.Free(0, 1000))
+    fit = pl.fit(measured(scene, 0.0, noise=0.002), scene)
+    assert fit.status is pl.Status.NOT_IDENTIFIABLE
+    assert 0 < fit["thickness"].upper_limit < 60
+    assert fit.verdict.startswith("No film is needed: thickness is at most ")
+    assert pl.fit(measured(scene, 100.0, noise=0.002), scene).status is pl.Status.CONVERGED
+
+
 def test_a_few_points_that_carry_the_residuals_are_said(film, measured):
     clean = measured(film(), 430.0, noise=0.002)
     values = clean.values.copy()

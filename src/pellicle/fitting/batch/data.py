@@ -117,7 +117,7 @@ def batch_data(block: Mapping[str, np.ndarray], source: Noise) -> BatchData:
     if "delta" in arrays:
         return _on_sphere(arrays, known)
     if "sigma" in arrays:
-        weight = known / arrays["sigma"]
+        weight = known / np.hypot(arrays["sigma"], noise.rounding(values))
     else:
         weight = known / (noise.drifting_sigma(values) if source.drifting else _guess(values))
     size = np.abs(values)

@@ -17,7 +17,7 @@ from pellicle.fitting.film.evidence import spectrum_evidence
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.parts import accuracy
 from pellicle.fitting.film.problem import shortest_wavelength
-from pellicle.fitting.film.summary import bounded_by_drift
+from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.targets import Measured, drifts
 from pellicle.fitting.film.view import SpectrumView
@@ -79,8 +79,7 @@ def groups(view: SpectrumView, weight: np.ndarray, known: np.ndarray) -> list[Gr
 class BatchErrors:
     """Errors and status of spectra, as `pellicle.fit` has them of one spectrum.
 
-    Left out is what few spectra need: default bounds are not widened, a plan is not refined, and an index is
-    not compared with that of the substrate.
+    Left out is what few spectra need: default bounds are not widened, and a plan is not refined.
     """
 
     def __init__(self, problem: Problem, target: Measured, calibrated: bool):
@@ -143,7 +142,7 @@ class BatchErrors:
             lambda _: models.neighbourhood(covariance.covariance),
             self._flat_sides(minima, who, ranked, models, ~wrong),
             misfit=wrong,
-            amend=lambda limits: self._amended(limits, ranked, models),
+            amend=lambda limits: self._amended(limits, ranked, models, systematic.errors.covariance),
         )
         return BatchFits(
             values=ranked.values,
@@ -203,12 +202,14 @@ class BatchErrors:
         scan = _resampled(self.grid, minima.thickness, minima.profile[who])
         return {depth: models.flat_sides(depth, self.grid, scan, usable)}
 
-    def _amended(self, limits: Any, ranked: RankedMinima, models: LocalModels) -> Any:
-        """Limits by what a drift of scale and offset could imitate."""
-        single = len(self.scene.layers) == 1 and self.problem.thickness_axis is not None
-        return (
-            bounded_by_drift(limits, ranked, models.thinnest()) if drifts(self.scene) and single else limits
-        )
+    def _amended(self, limits: Any, ranked: RankedMinima, models: LocalModels, covariance: np.ndarray) -> Any:
+        """Limits by what a drift of scale and offset could imitate, and of layers that are not needed."""
+        if len(self.scene.layers) != 1 or self.problem.thickness_axis is None:
+            return limits
+        if drifts(self.scene):
+            limits = bounded_by_drift(limits, ranked, models.thinnest())
+        count = limits.stderr.shape[-1]
+        return unlimited(limits, ranked, models.unneeded(covariance[:, :count, :count]))
 
 
 def _resampled(grid: np.ndarray, thickness: np.ndarray, profile: np.ndarray) -> np.ndarray:

@@ -12,19 +12,21 @@ import numpy as np
 from pellicle.fitting.covariance import scaled
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.form import Local, SpectrumForm
+from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.search import thickness_grid
-from pellicle.fitting.film.summary import thinnest
+from pellicle.fitting.film.summary import like_substrate, thinnest
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import student
 from pellicle.fitting.normal_equations import solve, times
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Neighbourhood, flat_sides
-from pellicle.fitting.reported_layer import linearised
+from pellicle.fitting.reported_layer import linearised, slope_errors
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
+from pellicle.scene.free import free_leaves
 
 LANES, FEW = 256, 16
 """Spectra that one call of a compiled program takes, and that of the last ones where they are few."""
@@ -59,6 +61,7 @@ class BatchLocals(NamedTuple):
     gain: Any
     offset: Any
     layer: Any
+    layer_slope: Any
     deviance: Any
 
 
@@ -71,7 +74,9 @@ def local_models(form: SpectrumForm, scene: Scene, data: Data, spectra: BatchArr
         linear = linearised(form, scene, own, values)
         solved = nuisance.solve(linear.signal, own, scene.instrument)
         curves = solved.model, solved.gain, solved.offset
-        return BatchLocals(linear.signal, linear.slope, *curves, linear.layer, solved.deviance)
+        return BatchLocals(
+            linear.signal, linear.slope, *curves, linear.layer, linear.layer_slope, solved.deviance
+        )
 
     return jax.vmap(one)(spectra, at)
 
@@ -161,6 +166,17 @@ class LocalModels:
         locals_: BatchLocals = self._in_lanes(local_models, some, self._values[some])
         return thinnest(self._view, locals_.layer)
 
+    def unneeded(self, covariance: np.ndarray) -> np.ndarray:
+        """Spectra (spectra,) whose only layer has the index of the substrate within its error by the
+        `covariance` (spectra, parameters, parameters) of the parameters: see `summary.FilmMeasurements`."""
+        some, view = np.arange(len(self._values)), self._view
+        if len(view.scene.layers) != 1 or not free_leaves(view.scene.layers[0].material):
+            return np.zeros(len(some), bool)
+        locals_: BatchLocals = self._in_lanes(local_models, some, self._values)
+        below = indices(view.scene, self._values[0]).substrate[: view.rows]
+        index, slope = locals_.layer[:, :2, : view.rows], locals_.layer_slope[:, :2, : view.rows]
+        return like_substrate(index, slope_errors(slope, covariance), below)
+
     def _in_lanes(self, program: Callable[..., Any], which: np.ndarray, at: np.ndarray) -> Any:
         """Call a program for some spectra, `LANES` at a time, and return NumPy arrays of all of them."""
         view = self._view
@@ -193,7 +209,7 @@ class LocalModels:
             deviance = models.deviance + self._prior(at)
             better = deviance < best
             best[better], best_at[better] = deviance[better], at[better]
-            local = Local(*models[:6], np.zeros(0))
+            local = Local(*models[:7])
             jacobian = scaled(problem, (at - lower) / span, [local], [1 / arrays.independent_fraction])
             rows = jacobian.jacobian
             data = view.residuals(local) * np.sqrt(arrays.independent_fraction)[:, None, None]

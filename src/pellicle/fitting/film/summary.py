@@ -21,7 +21,7 @@ from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.film.targets import Target, drifts
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import local_noise, student
+from pellicle.fitting.noise import local_noise, rounding, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima
@@ -45,6 +45,8 @@ _WITHIN, _NO_ABSORPTION = 3.0, 1e-4
 _SPIKE, _FEW, _CARRY = 8.0, 0.05, 0.5
 """Sizes of the bulk of the residuals beyond which a point is a spike, the share of all points that spikes may
 be, and the share of the sum of squares that they carry at least."""
+_ROUNDED = 0.5
+"""Share of the rms of the residuals beyond which the rounding of the data is said."""
 _ROUNDING = 1e-6
 """Size of the bulk of residuals, as a share of the largest, below which it is rounding."""
 FEWEST_FRINGES = 0.75
@@ -94,10 +96,7 @@ class FilmMeasurements:
     def amended(self, parts: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits by what a drift of scale and offset could imitate, and of a layer that is not needed."""
         if self.unneeded(parts):
-            depth = np.array([p.key == "thickness" for p in self.ranked.problem.parameters])
-            return Limits(
-                np.where(depth, np.inf, limits.stderr), *(np.where(depth, np.nan, x) for x in limits[1:])
-            )
+            return unlimited(limits, self.ranked, True)
         if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in self.targets):
             return limits
         views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
@@ -115,12 +114,24 @@ class FilmMeasurements:
         if not isinstance(curve, Curve) or not np.any(curve.n_stderr > 0):
             return ""
         below = indices(view.scene, self.ranked.problem.seen_by(view, self.ranked.values)).substrate
-        apart = curve.n + 1j * curve.k - below[: view.rows]
-        alike = np.abs(apart.real) <= _WITHIN * curve.n_stderr
-        alike &= np.abs(apart.imag) <= _WITHIN * curve.k_stderr + _NO_ABSORPTION
-        if not alike.all():
+        index, stderr = np.stack([curve.n, curve.k]), np.stack([curve.n_stderr, curve.k_stderr])
+        if not like_substrate(index, stderr, below[: view.rows]):
             return ""
         return " No film is needed: the index of the layer is that of the substrate within its error."
+
+
+def like_substrate(index: np.ndarray, stderr: np.ndarray, substrate: np.ndarray) -> Any:
+    """True (...) where n and k of a layer (..., 2, rows) are those of the substrate, n + ik (rows,), within
+    their standard errors."""
+    apart = np.abs(index - np.stack([np.real(substrate), np.imag(substrate)]))
+    return np.all(apart <= _WITHIN * stderr + [[0.0], [_NO_ABSORPTION]], axis=(-2, -1))
+
+
+def unlimited(limits: Limits, ranked: RankedMinima, which: Any) -> Limits:
+    """Limits with thicknesses of the fits `which` (...) that the data do not determine."""
+    depth = np.array([p.key == "thickness" for p in ranked.problem.parameters])
+    depth = depth & np.asarray(which)[..., None]
+    return Limits(np.where(depth, np.inf, limits.stderr), *(np.where(depth, np.nan, x) for x in limits[1:]))
 
 
 def scan_profile(ranked: RankedMinima) -> Profile | None:
@@ -192,7 +203,14 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
             )
         if structure is not None:
             messages.append(f"{own}the model misses structure {structure.words}")
-        white = isinstance(view, SpectrumView) and view.noise.given and length < _WHITE
+        spectral = isinstance(view, SpectrumView)
+        step = float(rounding(np.asarray(view.data.values)[: view.points])[0]) if spectral else 0.0
+        if spectral and step > _ROUNDED * view.rms(fit.at.model):
+            messages.append(
+                f"{own}the values are rounded to {step * math.sqrt(12):.1g}, and {step:.2g} of the noise is"
+                " that: export more digits"
+            )
+        white = spectral and view.noise.given and length < _WHITE
         if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
             messages.append(
                 f"{own}residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is"

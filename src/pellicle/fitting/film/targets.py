@@ -1,5 +1,6 @@
 """Targets of a fit of spectra: values, σ and the scene that is to explain them."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
@@ -52,6 +53,8 @@ def measured(data: Spectrum, scene: Scene, name: str = "") -> Measured:
         )
     scene = seen_as(scene, data)
     _check(data, scene)
+    if data.sigma is not None:
+        data = replace(data, sigma=np.hypot(data.sigma, noise.rounding(data.values)))
     source = Noise(data.sigma is not None, data.sigma is None and drifts(scene))
     independent_fraction = 1 / noise.DRIFT_CORRELATION if source.drifting else 1.0
     signal = data.kind.seen_in(scene, _depolarised(scene))
