@@ -157,3 +157,16 @@ def test_another_order_of_interference_is_named():
     [warning] = pl.fitting.repeats([fit(3494.0), fit(3493.9), fit(357.3, path="c", rivals=rivals)]).warnings
     words = "c lies in another minimum: thickness 357.3 nm, while its rival of 3494.1 nm (Δχ² 2.1)"
     assert warning.startswith(words)
+
+
+@pytest.mark.parametrize(("last", "named"), [(512.6, True), (500.1, False)])
+def test_the_one_repeat_that_disagrees_is_named(last, named):
+    values = (500.0, 500.2, 499.8, 500.3, 499.9, last)
+    found = pl.fitting.repeats([fit(value, path=f"{i}.csv") for i, value in enumerate(values)])
+    sentences = [w for w in found.warnings if "alone disagrees" in w]
+    assert [w[:5] for w in sentences] == (["5.csv"] if named else [])
+
+
+def test_repeats_that_all_scatter_have_no_outlier():
+    found = pl.fitting.repeats([fit(value, path=f"{value}.csv") for value in (490.1, 495.2, 500.3, 505.4)])
+    assert not any("alone" in w for w in found.warnings)

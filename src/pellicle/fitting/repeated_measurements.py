@@ -27,6 +27,10 @@ _NEARER = 5.0
 """A rival so many times nearer to the other repeats than the best minimum is the one they share."""
 
 
+_FEWEST, _FAR = 4, 5.0
+"""Repeats of which one can be told from the others, and its least distance from them in their scatter."""
+
+
 class Agreement(StrEnum):
     """Scatter of repeats against their stated noise errors."""
 
@@ -247,7 +251,7 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
             continue
         compared[name] = _repeated(name, [p for *_, p in known])
         if compared[name].agreement is Agreement.LARGER:
-            warnings += _other_minima(known, name)
+            warnings += _other_minima(known, name) or _outlier(known, name)
     if not compared:
         raise UsageError(f"no parameter has a finite error in two of the {len(used)} repeats")
     return Repeats(every, compared, tuple(n for n in names if n not in compared), tuple(warnings))
@@ -307,6 +311,24 @@ def _other_minima(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list
                 " bounds"
             )
     return result
+
+
+def _outlier(known: Sequence[tuple[str, Fit, Estimate]], name: str) -> list[str]:
+    """A sentence on the one repeat without which the scatter of the others is that of their noise."""
+    if len(known) < _FEWEST:
+        return []
+    every = [(path, _repeated(name, [q for other, _, q in known if other != path])) for path, _, _ in known]
+    path, others = max(every, key=lambda one: one[1].probability)
+    value = next(p.value for own, _, p in known if own == path)
+    scatter = max(others.sd, others.stated)
+    if others.probability < UNLIKELY or abs(value - others.mean) < _FAR * scatter:
+        return []
+    unit = f" {others.unit}" if others.unit else ""
+    return [
+        f"{path} alone disagrees: {name} {value:.5g}{unit}, while the others scatter by"
+        f" {short(others.sd)}{unit} around {others.mean:.5g}{unit}: look at that measurement, or leave its"
+        " file out"
+    ]
 
 
 def short(number: float) -> str:
