@@ -444,7 +444,7 @@ class _Balance:
         each = (x[:, both].reshape(free.shape) for x in (system.lower, system.upper))
         moved = held_within(free, covariance, *each).reshape(fits, effects, known + 1)
         after = power[:, None] + left(moved, gram[:, *square], right[:, both])
-        # of an effect that only rounding tells from a parameter on a bound the solution may be worse than none
+        # of an effect that only rounding tells from a parameter on a bound the solution may be worse
         moved = np.where(
             (after <= before[:, None])[..., None], moved, np.pad(best, [(0, 0), (0, 1)])[:, None]
         )
