@@ -20,7 +20,7 @@ import pellicle as pl
 BANDS = (645.0, 525.0, 445.0)
 """Wavelengths of the channels that the recipe states, in nm."""
 NOISE = 0.02
-EACH = 6
+EACH = 3
 """Cases of each kind."""
 
 

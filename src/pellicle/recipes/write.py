@@ -202,7 +202,9 @@ def _check_surface(scene: Surface, again: Surface) -> None:
     def medium(part: Any) -> Any:
         return None if part is None else medium_of(part)
 
-    pairs = [(key, scene.numbers[key], again.numbers[key]) for key in scene.numbers]
+    pairs: list[tuple[str, Any, Any]] = [
+        (key, scene.numbers[key], again.numbers[key]) for key in scene.numbers
+    ]
     pairs += [(part, medium(getattr(scene, part)), medium(getattr(again, part))) for part in ("film", "base")]
     pairs += [(name, getattr(scene, name), getattr(again, name)) for name in ("wavelengths", "sensor")]
     pairs.append(("uncertainty", vars(scene.uncertainty), vars(again.uncertainty)))

@@ -25,7 +25,7 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
     numbers = {key: np.asarray(x, float) for key, x in view.form.numbers(values, view.fixed).items()}
     model, rise, every = np.asarray(at.model)[: view.rows], view.slope_of_compared(at), list[Effect]()
 
-    def signal(samples: Samples = view.samples, **changed: Any) -> np.ndarray:
+    def signal(changed: dict[str, Any], samples: Samples = view.samples) -> np.ndarray:
         # by the program of the fit
         at = np.array([changed.pop(key, x) for key, x in zip(view.form.keys, values, strict=True)], float)
         return np.asarray(local(view.form, samples, view.fixed | changed, at).model)[: view.rows]
@@ -38,7 +38,7 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
 
     for key in [key for key in _INDICES if key in numbers and key not in view.form.keys]:
         size = allowed.index if key == "n" else allowed.base
-        ends = (signal(**{key: numbers[key] * (1 + s * _STEP * size)}) for s in (1, -1))
+        ends = (signal({key: numbers[key] * (1 + s * _STEP * size)}) for s in (1, -1))
         add(_INDICES[key], size, "", slope(*ends))
     depth, nm = numbers.get("thickness", np.zeros(())), numbers["wavelengths"]
     widths = [("thickness spread", "thickness", depth, allowed.thickness_spread * float(depth), 1.0)]
@@ -46,12 +46,12 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
         widths.append(("bandwidth", "wavelengths", nm, allowed.bandwidth, FWHM))
     for name, key, mean, size, by in widths:
         # a normal distribution by three nodes, for a variance of the prior's root mean square
-        ends = [signal(**{key: mean + s * math.sqrt(3) * size / by}) for s in (1, -1)]
+        ends = [signal({key: mean + s * math.sqrt(3) * size / by}) for s in (1, -1)]
         add(name, size, "nm", HALF_NORMAL / 6 * (sum(ends) - 2 * model), power=2)
     for side, name in (("i", "angle of incidence"), ("o", "viewing angle")):
-        ends = (signal(_turned(view.samples, side, s * _STEP * allowed.angle)) for s in (1, -1))
+        ends = (signal({}, _turned(view.samples, side, s * _STEP * allowed.angle)) for s in (1, -1))
         add(f"{name}{of}", allowed.angle, "deg", slope(*ends), shared=False)
-    shifted = slope(*(signal(wavelengths=nm + s * _STEP * allowed.band) for s in (1, -1)))
+    shifted = slope(*(signal({"wavelengths": nm + s * _STEP * allowed.band}) for s in (1, -1)))
     names = [x.upper() for x in LETTERS] if view.channels == 3 else range(1, view.channels + 1)
     for channel, own in zip(names, np.eye(view.channels), strict=True):
         add(f"gain of {channel}", allowed.gain, "", allowed.gain * model * own)

@@ -10,8 +10,7 @@ import numpy as np
 
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Effect, Evidence
-from pellicle.fitting.film.colour_measurements import colours_evidence
-from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_evidence
 from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.targets import Target
@@ -36,7 +35,7 @@ def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) 
     blocks = jacobian.blocks([view.points for view in views], [fit.variance for fit in fits])
     for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
         values = ranked.problem.seen_by(view, ranked.values)
-        if isinstance(view, ColoursView):
+        if isinstance(spectrum, MeasuredColours):
             result.append(colours_evidence(view, values, fit.at, spectrum, block))
         else:
             effects = systematic_effects(view, values, fit.at, spectrum.scene)
