@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
+from scipy.optimize import lsq_linear
 
 import pellicle as pl
-from pellicle.dispersion.base import HC
+from pellicle.dispersion.base import HC, known_index
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.film.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real
@@ -56,16 +57,41 @@ def test_kramers_and_kronig():
     model = KramersKronigSpline(KNOTS, K, 1.5)
     sites = HC / np.array(KNOTS[::-1])
     low, high = sites[0] / sites[1], sites[-1] / sites[-2]
-    around = np.array([sites[0] * low**2, sites[0] * low, *sites, sites[-1] * high, sites[-1] * high**2])
-    parts = [BSpline.basis_element(around[j : j + 5], extrapolate=False) for j in range(5)]
+    below, above = sites[0] * low ** np.array([3, 2, 1]), sites[-1] * high ** np.array([1, 2, 3])
+    around = np.array([*below, *sites, *above])
+    parts = [BSpline.basis_element(around[j : j + 5], extrapolate=False) for j in range(7)]
+    held = [K[-1], *K[::-1], K[0]]
 
     def k(E):
-        return float(sum(c * np.nan_to_num(b(E)) for c, b in zip(K[::-1], parts, strict=True)))
+        return float(sum(c * np.nan_to_num(b(E)) for c, b in zip(held, parts, strict=True)))
 
     for E in (1.1, 1.3, 1.9, 2.7, 3.9, 4.5):
         found = complex(model(HC / E))
         assert found.imag == pytest.approx(k(E), abs=1e-13)
         assert found.real == pytest.approx(1.5 + kramers_kronig(k, E, around, around[-1]), abs=1e-8)
+
+
+def test_poles_outside_the_knots():
+    """A pole above the first knot and one at zero energy, of n alone; finite beyond the knots."""
+    plain, poles = KramersKronigSpline(KNOTS, K, 1.5), KramersKronigSpline(KNOTS, K, 1.5, 3.0, 0.2)
+    E = HC / AT
+    top = 1.2 * HC / KNOTS[0]
+    np.testing.assert_allclose(
+        poles(AT) - plain(AT), 3.0 / (top**2 - E**2) - 0.2 / E**2, rtol=1e-12, atol=1e-13
+    )
+    assert np.isfinite(np.asarray(poles(np.array([250.0, 200.0, 2000.0])))).all()
+
+
+def test_a_spline_of_kramers_and_kronig_follows_hematite():
+    """n and k of the catalogue's hematite from 400 to 780 nm together, which absorbs beyond both ends."""
+    nm = np.linspace(400.0, 780.0, 96)
+    true = np.asarray(pl.refractive_index(nm, "Fe2O3"))
+    knots = (HC / np.linspace(HC / 400, HC / 780, 10)).tolist()
+    columns = [known_index(KramersKronigSpline(knots, row[:10], *row[10:]), nm) for row in np.eye(13)]
+    table = np.array([np.concatenate([real(x), imag(x)]) for x in columns]).T
+    numbers = lsq_linear(table, np.concatenate([true.real, true.imag]), (0, np.inf)).x
+    off = table @ numbers - np.concatenate([true.real, true.imag])
+    assert np.abs(off).max() < 0.02  # 0.4 where k falls to zero beyond the knots and there is no pole
 
 
 @pytest.mark.parametrize("kind", [Spline, KramersKronigSpline])

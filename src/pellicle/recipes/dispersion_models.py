@@ -112,7 +112,13 @@ MODELS: dict[str, dict[str, ParameterSpec]] = {
     },
     **{name: {**specs, "eps_inf": _EPS_INF} for name, specs in TERMS.items()},
     "spline": _INDEX,
-    "spline-kk": {"k": _INDEX["k"], "n_inf": ParameterSpec(1.0, 3.0, 1.5, (1.0, 6.0))},
+    "spline-kk": {
+        "k": _INDEX["k"],
+        "n_inf": ParameterSpec(1.0, 3.0, 1.5, (1.0, 6.0)),
+        # 9 eV² from below 1.6 eV and 35 from above 4.1 eV in silver and silicon, less in oxides
+        "A_uv": ParameterSpec(0.0, 20.0, 0.0, (0.0, 100.0)),
+        "A_ir": ParameterSpec(0.0, 2.0, 0.0, (0.0, 100.0)),
+    },
 }
 """Dispersion models by name. Lengths in nm (Cauchy's B in nm², C in nm⁴, Sellmeier's C1 in nm²),
 energies in eV. `spline` has one n and one k at each knot."""

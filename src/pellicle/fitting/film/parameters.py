@@ -19,7 +19,7 @@ from pellicle.dispersion.oscillators import (
     TaucLorentz,
 )
 from pellicle.dispersion.profiles import Spline as FreeProfile
-from pellicle.dispersion.spline import Spline
+from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
 from pellicle.scene.film import Scene
@@ -37,13 +37,28 @@ _UNITS = {
 }
 _NATURAL_ONE = ("back_collected",)
 _NATURAL_ZERO = (
-    *("k", "k0", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
+    *("k", "k0", "A_uv", "A_ir", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
     *_NATURAL_ONE,
     *WIDTHS,
 )
 _STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
 """Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
-_SEARCHED = ("thickness", "n", "A", "B", "k", "B1", "Ep", "E0", "Eg", "eps_inf", "fraction", "top", "bottom")
+_SEARCHED = (
+    "thickness",
+    "n",
+    "A",
+    "B",
+    "k",
+    "B1",
+    "Ep",
+    "E0",
+    "Eg",
+    "eps_inf",
+    "n_inf",
+    "fraction",
+    "top",
+    "bottom",
+)
 """Parameters that move fringes or make them vanish: a start in the middle of their bounds fails."""
 _RESOLUTION = 0.5
 """Thicknesses (nm) closer than this belong to one minimum."""
@@ -100,7 +115,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         raise UsageError(f"`{key}` must be at most 1: its upper bound is {free.upper:g}")
     strength = key == "A" and issubclass(owner, _STRENGTHS)
     # a search moves the index of a spline as a whole
-    group = full.removesuffix(key) + field if owner in (Spline, FreeProfile) else full
+    group = full.removesuffix(key) + field if owner in (Spline, KramersKronigSpline, FreeProfile) else full
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
     drude = any(isinstance(x, Drude) for x in [location.owner, *getattr(location.owner, "terms", ())])
     return Parameter(
@@ -117,7 +132,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
             key in _NATURAL_ONE and free.upper == 1,
         ),
         resolution=_RESOLUTION if key == "thickness" else None,
-        searched=key in _SEARCHED or (owner is Spline and field == "n") or owner is FreeProfile,
+        searched=key in _SEARCHED or owner in (Spline, FreeProfile) or group.split(".")[-1] == "k",
         group=group,
         levels=(_DRUDE if drude else {}).get(key, _FEW) if oscillator else None,
         decades=drude and key == "Ep",

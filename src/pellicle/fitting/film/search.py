@@ -229,7 +229,7 @@ def _levels(p: Parameter, problem: Problem) -> np.ndarray:
     if not p.searched:
         start = (p.start - p.lower) / (p.upper - p.lower)
         return _widths(p)[:2] if p.key in _WIDTHS and start == 0.5 else np.array([start])
-    if p.key == "k":
+    if p.group.split(".")[-1] == "k":
         return np.array([0.001, 0.01, 0.05, 0.15, 0.4])
     if p.levels is not None and p.decades:
         return _by_decades(p.lower, p.upper, p.levels)
