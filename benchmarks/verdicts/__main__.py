@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import absorbers
 import single_colours
 import surfaces
 from scoring import Answer, changes, failures, goals, read_csv, table, write_csv
@@ -131,7 +132,7 @@ def main() -> None:
         "--only",
         nargs="+",
         default=[],
-        help=f"groups, families, kinds or names of cases; or {', '.join(OTHER_KINDS)}",
+        help=f"groups, families, kinds or names of cases; or {', '.join(OTHER_KINDS)}, absorbers",
     )
     parser.add_argument("--limit", type=int, help="only the first cases")
     parser.add_argument("--short", action="store_true", help="about 24 cases of all groups")
@@ -141,6 +142,9 @@ def main() -> None:
     parser.add_argument("--write-cases", type=Path, help="folder for data and recipes; nothing is fitted")
     asked = parser.parse_args()
     start()
+    if asked.only == ["absorbers"]:
+        absorbers.report(asked.seed, asked.limit)
+        return
     answers: list[Answer] = []
 
     def add(one: Answer) -> None:
