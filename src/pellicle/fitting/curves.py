@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -10,6 +11,8 @@ from typing import Any, overload
 import jax
 import numpy as np
 
+NORMAL = 1.959964
+"""Quantile of the normal distribution at 95 %: the half width of an interval by its standard error."""
 BIREFRINGENCE = "birefringence"
 """Name of the extraordinary index less the ordinary one among the principal indices."""
 
@@ -23,6 +26,26 @@ class Index:
     k: np.ndarray
     n_stderr: np.ndarray
     k_stderr: np.ndarray
+
+    def at(self, wavelengths: Sequence[float]) -> Index:
+        """The index at those of its wavelengths that are nearest to some (nm)."""
+        some = np.unique([int(np.argmin(np.abs(self.wavelength - nm))) for nm in wavelengths])
+        return Index(*(getattr(self, f.name)[some] for f in fields(self)))
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """Each wavelength, and n and k there: `n 3.29 ± 0.05, k 0.17 ± 0.02 (95 %)`."""
+        columns = [getattr(self, f.name) for f in fields(self)]
+        return [
+            (f"{nm:.4g} nm", f"n {_amount(n, n_error)}, k {_amount(k, k_error)} (95 %)")
+            for nm, n, k, n_error, k_error in zip(*columns, strict=True)
+        ]
+
+
+def _amount(value: float, stderr: float) -> str:
+    error = NORMAL * stderr
+    digits = max(0, min(6, 1 - math.floor(math.log10(error)))) if 0 < error < math.inf else 4
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
 def at_each_wavelength(curves: Sequence[Index | Curve | ColourCurve]) -> Index:

@@ -12,17 +12,16 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve, Index, at_each_wavelength
+from pellicle.fitting.curves import NORMAL, BrdfCurve, ColourCurve, Curve, Index, at_each_wavelength
 from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import PlotMixin
+from pellicle.fitting.reported_layer import reported_medium
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
 LEVEL = 0.95
 """Level of confidence of expanded uncertainties."""
-_NORMAL = 1.959964
-"""Quantile of the normal distribution at that level."""
 _FITTED = {
     Spectrum: "a spectrum was fitted",
     Colours: "colours were fitted",
@@ -81,7 +80,7 @@ class Estimate:
     @property
     def coverage_factor(self) -> float:
         """Factor from `stderr` to the half width of a 95 % interval: Student's t (GUM 2008, G.3.2)."""
-        return _NORMAL * student(self.effective_degrees_of_freedom, _NORMAL**2)
+        return NORMAL * student(self.effective_degrees_of_freedom, NORMAL**2)
 
     @property
     def expanded(self) -> float:
@@ -296,6 +295,20 @@ class Fit(PlotMixin):
     def index(self) -> Index:
         """The layer's n and k at every wavelength of any spectrum or sensor, each once."""
         return at_each_wavelength(self._film_curves)
+
+    @property
+    def index_in_short(self) -> Index | None:
+        """The layer's n and k at the knots of a spline, else at ends, quarters and middle of the wavelengths;
+        None where they are known, and of a birefringent layer."""
+        scene = self.scene[0] if isinstance(self.scene, tuple) else self.scene
+        if not isinstance(scene, Scene) or self.principal_indices:
+            return None
+        index = self.index
+        if not np.any(index.n_stderr > 0) and not np.any(index.k_stderr > 0):
+            return None
+        ends = np.min(index.wavelength), np.max(index.wavelength)
+        knots = getattr(reported_medium(scene), "knots", np.linspace(*ends, 5))
+        return index.at([nm for nm in knots if ends[0] <= nm <= ends[1]])
 
     @property
     def principal_indices(self) -> dict[str, Index]:

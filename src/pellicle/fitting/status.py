@@ -85,10 +85,10 @@ def outside(values: np.ndarray, stderr: np.ndarray, rivals: np.ndarray) -> np.nd
 
 def distinct_rivals(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Rival]:
     """Rivals that fit nearly as well and lie outside the errors of the answer."""
-    return [r for r in rivals if r.delta_chi2 < RIVAL and _apart(parameters, r)]
+    return [r for r in rivals if r.delta_chi2 < RIVAL and apart_from(parameters, r)]
 
 
-def _apart(parameters: Mapping[str, Estimate], rival: Rival) -> list[str]:
+def apart_from(parameters: Mapping[str, Estimate], rival: Rival) -> list[str]:
     """Names of the numbers of a rival that lie outside the errors of the answer."""
     own = [parameters[name] for name in rival.parameters]
     about = np.array([p.value for p in own]), np.array([p.stderr for p in own])
@@ -153,7 +153,7 @@ def verdict(
 def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: Estimate) -> str:
     """The best distinct rival, by its leading parameter, or by those that set it apart if that does not."""
     rival = distinct_rivals(parameters, rivals)[0]
-    apart = _apart(parameters, rival)
+    apart = apart_from(parameters, rival)
     value = rival.parameters.get(lead.name, math.nan)
     share = "" if rival.probability is None else f" (probability {100 * rival.probability:.2g} %)"
     if lead.name in apart or not apart:

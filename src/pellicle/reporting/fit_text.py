@@ -55,6 +55,7 @@ def report(fit: Fit, posterior: Posterior | None = None) -> str:
         ("With and without a layer", facts(layer_test_rows(fit))),
         ("Fit statistics", facts(statistic_rows(fit))),
         ("Parameters", _parameters(fit)),
+        ("n and k of the layer", facts([] if fit.index_in_short is None else fit.index_in_short.rows)),
         ("Birefringence: extraordinary less ordinary index", facts(_birefringence(fit))),
         ("Uncertainty budget", budget(fit)),
         (f"Correlations above {LEAST_CORRELATION:g}", _correlations(fit)),

@@ -19,6 +19,7 @@ from pellicle.files import MARKER, new_folder, write_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pellicle.fitting.curves import Index
     from pellicle.fitting.result import Estimate, Fit, Part
     from pellicle.sampling.result import Posterior
 
@@ -47,6 +48,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
             for rival in fit.rivals
         ],
         **taken(fit, "chi2_reduced", "rms", "effective_points"),
+        **({"index": _index(index)} if (index := fit.index_in_short) is not None else {}),
         "correlation": {"names": fit.correlation_names, "matrix": fit.correlation},
         "budget": [
             {"effect": effect.name, **taken(effect, "uncertainty", "unit", "changes", "amount", "explains")}
@@ -108,6 +110,17 @@ def _part(part: Part, fit: Fit) -> dict[str, Any]:
             "probability": lack.probability,
         }
     return record | (taken(part, "rms", "chi2_reduced", "effective_points") if fit.joint else {})
+
+
+def _index(index: Index) -> list[dict[str, float]]:
+    """n and k at some wavelengths, with standard errors and half widths of 95 % intervals."""
+    from pellicle.fitting.curves import NORMAL  # imports JAX, as above
+
+    errors = {"n": index.n_stderr, "k": index.k_stderr}
+    columns: dict[str, np.ndarray] = {"wavelength_nm": index.wavelength}
+    for name, stderr in errors.items():
+        columns |= {name: getattr(index, name), f"{name}_stderr": stderr, f"{name}_expanded": NORMAL * stderr}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _parameter(p: Estimate) -> dict[str, Any]:

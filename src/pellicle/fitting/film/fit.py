@@ -27,6 +27,7 @@ from pellicle.fitting.film import (
 )
 from pellicle.fitting.film.colour_measurements import measured_colours, with_probabilities
 from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.index_curves import IndexCurves, index_curves
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.summary import FilmMeasurements
@@ -101,7 +102,7 @@ def fitted(
 
         def fitted_as(other: list[Spectrum | Colours]) -> Fit:
             read = other[0] if isinstance(data, Spectrum | Colours) else other
-            return _fit(other, measurements(read, scene), tolerance, loss, progress)[0]
+            return _fit(other, measurements(read, scene), tolerance, loss, progress, False)[0]
 
         remarks = other_readings.remarks(spectra, [part.rms for part in fit.parts], fitted_as)
         return replace(fit, warnings=(*remarks, *fit.warnings)), ranked
@@ -167,7 +168,12 @@ def labels(spectra: Sequence[Spectrum | Colours]) -> list[str]:
 
 
 def _fit(
-    data: list[Spectrum | Colours], targets: list[Target], tolerance: float, loss: str, progress: Progress
+    data: list[Spectrum | Colours],
+    targets: list[Target],
+    tolerance: float,
+    loss: str,
+    progress: Progress,
+    other_curves: bool = True,
 ) -> tuple[Fit, RankedMinima]:
     began = time.perf_counter()
     targets, ranked, wider = _searched(targets, tolerance, loss, progress)
@@ -176,6 +182,8 @@ def _fit(
     depth = ranked.problem.thickness_axis
     scans = {} if profile is None or depth is None else {depth: profile}
     judged = assemble(films, began, scans=scans, binding=wider.binding)
+    curves = index_curves(judged, targets) if other_curves else None
+    judged = judged if curves is None else curves.applied(judged)
     parameters, drifts = with_sweeps(data, ranked, judged.jacobian, judged.conclusion.parameters)
     rivals, probability = judged.conclusion.rivals, None
     if any(isinstance(view, ColoursView) for view in ranked.problem.views):
@@ -191,11 +199,12 @@ def _fit(
             else []
         ),
         *default_bounds.remarks(ranked, wider.binding),
+        *([] if curves is None else curves.remark),
         *identifiability.bounded(parameters, dark),
         *judged.conclusion.correlated,
     ]
     fit = judged.fit(
-        verdict=_verdict(films, judged, parameters, rivals, dark),
+        verdict=_verdict(films, judged, parameters, rivals, dark, curves),
         parameters=parameters,
         rivals=parts.with_curves(rivals, judged.parts, ranked),
         probability=probability,
@@ -237,12 +246,14 @@ def _verdict(
     parameters: dict[str, Estimate],
     rivals: tuple[Rival, ...],
     dark: frozenset[str],
+    curves: IndexCurves | None,
 ) -> str:
     """The verdict, whether there is a film at all, and what the back face does."""
     worst = judged.worst
     pairs = zip(films.structures, judged.parts, strict=True)
-    structure = next(structure for structure, part in pairs if part is worst)
-    sentence = verdict(
+    structure = next(structure for structure, part in pairs if part.name == worst.name)
+    lead = next(p for p in parameters.values() if p.free)
+    sentence = (curves.verdict(judged.conclusion.status, lead, judged.parts) if curves else "") or verdict(
         judged.conclusion.status,
         parameters,
         rivals,
@@ -251,7 +262,7 @@ def _verdict(
         " degrees" if isinstance(worst.curve, Curve) and worst.curve.delta_data is not None else "",
         structure.place if structure else "",
         dark,
-        identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
+        [] if curves else identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
     )
     return (
         sentence

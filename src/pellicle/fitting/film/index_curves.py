@@ -1,0 +1,226 @@
+"""Curves of n and k of a layer whose absorbing index is free: what other ones change of the result.
+
+One spectrum seldom determines n, k and a thickness, and the formula chosen for the index decides what its own
+errors cannot show. Splines of k with the n of Kramers and Kronig are fitted too, from several starts and at
+many thicknesses. Those that explain the data about as well, where each further number must lower χ² by one,
+and the fitted formula at other thicknesses, enlarge the errors of n, k and the thickness.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from pellicle.dispersion.base import HC, known_index
+from pellicle.dispersion.empirical import CauchyUrbach, Constant
+from pellicle.dispersion.oscillators import Oscillators
+from pellicle.dispersion.spline import KramersKronigSpline, Spline
+from pellicle.fitting.assembly import Assembly
+from pellicle.fitting.conclusion import Conclusion
+from pellicle.fitting.curves import at_each_wavelength
+from pellicle.fitting.film.parameters import thickness_name
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.targets import Measured, Target
+from pellicle.fitting.minima import solve
+from pellicle.fitting.noise import student
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.reported_layer import reported_layer, reported_medium
+from pellicle.fitting.result import Estimate, Part, Status
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.status import RIVAL, WELL_KNOWN, apart_from, distinct_rivals, expanded
+from pellicle.optics.pair import imag, real
+from pellicle.scene.free import Free, free_leaves, insert
+
+_KNOTS, _BEYOND = (9, 16), (1.15, 1.05)
+"""Knots of the splines, evenly spaced in photon energy, and factors by which they go beyond the blue and the
+red end: absorption next to the spectrum changes n in it. Without that 14 knots follow pigments to 0.003."""
+_LARGEST = 10.0, 6.0, 100.0, 30.0
+"""Largest coefficient of k, n_inf, and strengths of the poles (eV²) of the splines."""
+_GUESSES = ((1.7, 0.05), (2.3, 0.4), (3.0, 0.05), (2.5, 1.5))
+"""n, and k at the blue end, from which splines start; k falls evenly to zero at the red end."""
+_FACTORS = (*np.geomspace(1 / 6, 6, 13).tolist(), 0.95, 0.98, 1.02, 1.05)
+"""Thicknesses that are tried, by the best one."""
+_POLISHED = 16
+"""Best of the fits at given thicknesses that are fitted on with a free one."""
+
+
+class IndexCurves(NamedTuple):
+    """Curves that explain the data about as well as the best of them, the fitted one first.
+
+    `above` (curves,) is χ² above the best, `thickness` (curves,) in nm, NaN where it is given, `curves`
+    (curves, 2, wavelengths) n and k at wavelengths `nm`. `depth` is the name of the layer's thickness, empty
+    where that is given, `medium` those of the formula's numbers.
+    """
+
+    above: np.ndarray
+    thickness: np.ndarray
+    curves: np.ndarray
+    nm: np.ndarray
+    depth: str
+    medium: frozenset[str]
+
+    def spread(self, values: np.ndarray) -> Any:
+        """Standard error for what differs between the curves, of `values` (curves, ...) of them."""
+        weight = np.sqrt(np.maximum(self.above, 1.0)).reshape(-1, *[1] * (values.ndim - 1))
+        return np.max(np.abs(values - values[0]) / weight, axis=0)
+
+    def part(self, part: Part) -> Part:
+        """The part with the spread in the errors of its n and k."""
+        curve, (n, k) = part.spectral, self.spread(self.curves)
+        n, k = (np.interp(curve.wavelength, self.nm, x) for x in (n, k))
+        errors = {"n_stderr": np.hypot(curve.n_stderr, n), "k_stderr": np.hypot(curve.k_stderr, k)}
+        return replace(part, curve=replace(curve, **errors))
+
+    def applied(self, judged: Assembly) -> Assembly:
+        """The judged fit with the spread in its errors and its status."""
+        parts = tuple(self.part(part) for part in judged.parts)
+        return judged._replace(parts=parts, conclusion=self.conclusion(judged.conclusion, parts))
+
+    def conclusion(self, before: Conclusion, parts: Sequence[Part]) -> Conclusion:
+        """The conclusion with the spread in the error of the thickness. Where nothing but the thickness and
+        the formula's numbers is ambiguous, the status is that of the thickness, else of n."""
+        parameters, status, lead = dict(before.parameters), before.status, before.parameters.get(self.depth)
+        known = all(np.median(part.spectral.n_stderr / part.spectral.n) <= WELL_KNOWN for part in parts)
+        if lead is not None:
+            stderr = math.hypot(lead.stderr, float(self.spread(self.thickness)))
+            parameters[self.depth], known = replace(lead, stderr=stderr), stderr <= WELL_KNOWN * lead.value
+        rivals = distinct_rivals(parameters, before.rivals)
+        apart = {name for rival in rivals for name in apart_from(parameters, rival)}
+        if status in (Status.CONVERGED, Status.AMBIGUOUS) and apart <= self.medium | {self.depth}:
+            status = Status.CONVERGED if known else Status.AMBIGUOUS
+        return before._replace(parameters=parameters, status=status)
+
+    def verdict(self, status: Status, lead: Estimate, parts: Sequence[Part]) -> str:
+        """The verdict on n and k, or on a thickness that they leave undetermined; empty on another one."""
+        spectra = [part.spectrum for part in parts]
+        angles = [np.ravel(x.angle) for x in spectra if x.angle is not None] or [np.zeros(1)]
+        known = [any(x.ellipsometric for x in spectra), any(x.signal == "T" for x in spectra)]
+        known, words = [*known, np.ptp(np.concatenate(angles)) > 0], ("ψ and Δ", "T", "a second angle")
+        more = [word for word, has in zip(words, known, strict=True) if not has]
+        decide = f" {', '.join([*more, 'a film of another thickness'])}: any of these may decide it."
+        if self.depth and status is Status.AMBIGUOUS:
+            low, high = (f"{end(self.thickness):.3g}" for end in (np.min, np.max))
+            fits = f"{expanded(lead)} fits best, but {low} to {high} nm fit about as well with other n and k"
+            return f"The data do not determine {lead.name}: {fits}.{decide}"
+        if self.depth or status not in (Status.CONVERGED, Status.AMBIGUOUS):
+            return ""
+        [(where, middle)] = (
+            at_each_wavelength([part.spectral for part in parts]).at([np.median(self.nm)]).rows
+        )
+        if status is Status.CONVERGED:
+            return f"The data determine n and k of the layer: {middle} at {where}."
+        return f"Several curves of n and k explain the data about as well: {middle} at {where}.{decide}"
+
+    @property
+    def remark(self) -> list[str]:
+        """A sentence where a spline explains the data clearly better than the fitted formula."""
+        better = f"a spline-kk of {_KNOTS[0]} to {_KNOTS[-1]} knots explains the data better"
+        what = "the errors of n and k include the difference, those of the formula's numbers do not"
+        return [f"{better} (Δχ² {self.above[0]:.3g}): {what}"] if self.above[0] > RIVAL else []
+
+
+class _Fits(NamedTuple):
+    """Fits of curves at wavelengths `nm`: the targets and ranked minima, `others`, the names of parameters
+    that are none of the index, and `depth`, that of the thickness."""
+
+    targets: Sequence[Target]
+    ranked: RankedMinima
+    others: frozenset[str]
+    depth: str
+    nm: np.ndarray
+
+    def described(self, problem: Problem, medium: Any, deviance: Any, values: np.ndarray) -> tuple[Any, ...]:
+        """χ² above the fit, how many more numbers are free, thicknesses, and curves of `medium`."""
+        names = [p.name for p in problem.parameters]
+        own = [i for i, name in enumerate(names) if name not in self.others]
+        further = len(own) - sum(p.name not in self.others for p in self.ranked.problem.parameters)
+        curves = np.array([_complex(insert(medium, x[own].tolist()), self.nm) for x in values])
+        at = values[:, names.index(self.depth)] if self.depth in names else np.full(len(curves), math.nan)
+        return deviance - self.ranked.minima.deviance[0], np.full(len(curves), further), at, curves
+
+    def at_thicknesses(self, problem: Problem, medium: Any, starts: np.ndarray) -> tuple[Any, ...]:
+        """The same of fits from each start, at each thickness and from the best of these."""
+        lower, span = problem.box.lower, problem.box.upper - problem.box.lower
+        axis = next((i for i, p in enumerate(problem.parameters) if p.name == self.depth), None)
+        if axis is None:
+            found = solve(problem, np.clip((starts - lower) / span, 1e-4, 1 - 1e-4))
+            return self.described(problem, medium, found.deviance, np.asarray(problem.values(found.units)))
+        every = np.tile(starts, (len(_FACTORS), 1))
+        held = np.outer(_FACTORS, starts[:, axis]).ravel()
+        every[:, axis] = np.clip(held, lower[axis], lower[axis] + span[axis])
+        found = solve(problem, np.clip((every - lower) / span, 1e-4, 1 - 1e-4), fixed=(axis, every[:, axis]))
+        values = np.array(problem.values(found.units))
+        values[:, axis] = every[:, axis]
+        again = solve(problem, ((values - lower) / span)[np.argsort(found.deviance)[:_POLISHED]])
+        both = np.concatenate([values, np.asarray(problem.values(again.units))])
+        return self.described(problem, medium, np.append(found.deviance, again.deviance), both)
+
+    def of_spline(self, knots: int, guesses: Sequence[np.ndarray]) -> tuple[Any, ...]:
+        """The same of a spline with all numbers free, from curves near to the `guesses` (2, wavelengths)."""
+        ends = _BEYOND[0] * HC / self.nm.min(), HC / self.nm.max() / _BEYOND[1]
+        sites = (HC / np.linspace(*ends, knots)).tolist()
+        rows, upper = np.eye(knots + 3), [_LARGEST[0]] * knots + [*_LARGEST[1:]]
+        curves = [_complex(KramersKronigSpline(sites, x[:knots], *x[knots:]), self.nm).ravel() for x in rows]
+        free = [Free(0.0, x) for x in upper]
+        spline, before = KramersKronigSpline(sites, free[:knots], *free[knots:]), self.ranked.problem
+        problem = make(*_with_medium(self.targets, spline))
+        views = zip(problem.views, before.views, strict=True)
+        problem = problem._replace(views=tuple(replace(view, data=own.data) for view, own in views))
+        known = dict(zip([p.name for p in before.parameters], self.ranked.values.tolist(), strict=True))
+        starts = np.array([[known.get(p.name, 0.0) for p in problem.parameters]] * len(guesses))
+        near = [lsq_linear(np.transpose(curves), x.ravel(), (0.0, upper)).x for x in guesses]
+        starts[:, [p.name not in self.others for p in problem.parameters]] = near
+        return self.at_thicknesses(problem, spline, starts)
+
+
+def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | None:
+    """The curves of n and k about the best of the ranked minima; None where no absorbing index is free."""
+    scene, ranked, old = targets[0].scene, judged.ranked, judged.ranked.problem
+    medium, shown = reported_medium(scene), reported_layer(scene)
+    formula = isinstance(medium, KramersKronigSpline | Oscillators | CauchyUrbach | Spline)
+    known = [t.wavelength for t in targets if isinstance(t, Measured)]
+    if (
+        not formula
+        or not free_leaves(medium)
+        or getattr(medium, "k", ()) is None
+        or len(known) < len(targets)
+    ):
+        return None
+    names, nm = frozenset(p.name for p in old.parameters), np.unique(np.concatenate(known))
+    others = frozenset(p.name for p in make(*_with_medium(targets, Constant(1.5))).parameters)
+    depth = "" if shown is None else thickness_name(scene, shown)
+    depth, minima = depth if depth in names else "", np.asarray(old.values(ranked.minima.units))
+    fits = _Fits(targets, ranked, others, depth, nm)
+    found = [fits.described(old, medium, ranked.minima.deviance, minima)]
+    found.append(fits.at_thicknesses(old, medium, minima[:1]))
+    fall = (1 / nm - 1 / nm.max()) / max(1 / nm.min() - 1 / nm.max(), 1e-12)
+    guesses = [found[0][3][0], *(np.stack([np.full(nm.size, n), k * fall]) for n, k in _GUESSES)]
+    found += [fits.of_spline(knots, guesses) for knots in _KNOTS]
+    above, further, thickness, curves = (np.concatenate(x) for x in zip(*found, strict=True))
+    # residuals that no curve explains are no noise either
+    left = ranked.chi2_reduced + above.min() / sum(fit.freedom for fit in ranked.fits)
+    share = min(float(judged.discrepancy.evidence_share), 1 / max(left, 1.0))
+    above = share / student(ranked.freedom, RIVAL) ** 2 * above + further
+    close = above - above.min() < RIVAL
+    close[0] = True
+    return IndexCurves(above[close] - above.min(), thickness[close], curves[close], nm, depth, names - others)
+
+
+def _complex(medium: Any, nm: np.ndarray) -> np.ndarray:
+    """n and k (2, wavelengths) of a medium of numbers."""
+    found = known_index(medium, nm)
+    return np.stack([np.broadcast_to(part(found), nm.shape) for part in (real, imag)])
+
+
+def _with_medium(targets: Sequence[Target], medium: Any) -> list[Any]:
+    """The targets with another medium of the reported layer."""
+    shown = reported_layer(targets[0].scene)
+
+    def where(scene: Any) -> Any:
+        return (scene.substrate if shown is None else scene.layers[shown]).material
+
+    return [t._replace(scene=eqx.tree_at(where, t.scene, medium)) for t in targets]
