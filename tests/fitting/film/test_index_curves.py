@@ -56,7 +56,8 @@ def test_results_are_n_and_k_at_the_knots(fit):
     assert [row["n"] for row in rows] == pytest.approx(short.n.tolist())
     assert rows[0]["k_expanded"] == pytest.approx(1.96 * short.k_stderr[0], rel=1e-3)
     assert "n and k of the layer" in report(fit)
-    # no sentence on coefficients
-    assert fit.status in (Status.CONVERGED, Status.AMBIGUOUS)
+    # no sentence on coefficients, and nothing firm where the error of n + ik is a fifth of it
+    error = np.hypot(fit.index.n_stderr, fit.index.k_stderr) / np.hypot(fit.index.n, fit.index.k)
+    assert fit.status is (Status.AMBIGUOUS if np.median(error) > 0.1 else Status.CONVERGED)
     assert " n " in fit.verdict
     assert "k1" not in fit.verdict

@@ -82,9 +82,11 @@ class IndexCurves(NamedTuple):
 
     def conclusion(self, before: Conclusion, parts: Sequence[Part]) -> Conclusion:
         """The conclusion with the spread in the error of the thickness. Where nothing but the thickness and
-        the formula's numbers is ambiguous, the status is that of the thickness, else of n."""
+        the formula's numbers is ambiguous, the status is that of the thickness, else of n + ik."""
         parameters, status, lead = dict(before.parameters), before.status, before.parameters.get(self.depth)
-        known = all(np.median(part.spectral.n_stderr / part.spectral.n) <= WELL_KNOWN for part in parts)
+        every = [part.spectral for part in parts]
+        errors = [np.hypot(x.n_stderr, x.k_stderr) / np.hypot(x.n, x.k) for x in every]
+        known = all(np.median(x) <= WELL_KNOWN for x in errors)
         if lead is not None:
             stderr = math.hypot(lead.stderr, float(self.spread(self.thickness)))
             parameters[self.depth], known = replace(lead, stderr=stderr), stderr <= WELL_KNOWN * lead.value
