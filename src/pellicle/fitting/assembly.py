@@ -1,16 +1,17 @@
 """From ranked minima to a `Fit`, for every kind of data."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-from pellicle.fitting.conclusion import Conclusion, conclude, linearised
+from pellicle.fitting.conclusion import Conclusion, conclude
 from pellicle.fitting.covariance import Errors, Scaled
-from pellicle.fitting.discrepancy import Discrepancy, Evidence, discrepancy
+from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.marginal import Ranking, by_remaining, gains, ranking
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Fit, Part, Profile
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.reweighting import RankedMinima, linearised
 
 
 @runtime_checkable
@@ -20,8 +21,8 @@ class Measurements(Protocol):
     @property
     def ranked(self) -> RankedMinima: ...
 
-    def evidence(self, jacobian: Scaled) -> list[Evidence]:
-        """Residuals of each view at the best minimum and what may explain them."""
+    def evidence(self, at: RankedMinima, jacobian: Scaled, /) -> list[Evidence]:
+        """Residuals of each view and what may explain them `at` the best of some ranked minima."""
         ...
 
     def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
@@ -42,14 +43,13 @@ class Measurements(Protocol):
 
 
 class Assembly(NamedTuple):
-    """The best minimum judged: parts, those that are `missed`, the discrepancy and the conclusion."""
+    """The best minimum judged: parts, those that are `missed`, the covariance and the conclusion."""
 
-    ranked: RankedMinima
-    jacobian: Scaled
+    best: Ranking
     covariance: Errors
-    discrepancy: Discrepancy
     parts: tuple[Part, ...]
     missed: tuple[Part, ...]
+    scans: Mapping[int, Profile]
     conclusion: Conclusion
     began: float
 
@@ -66,43 +66,46 @@ class Assembly(NamedTuple):
             "status": self.conclusion.status,
             "parameters": self.conclusion.parameters,
             "rivals": self.conclusion.rivals,
-            "chi2_reduced": self.ranked.chi2_reduced,
+            "probability": self.conclusion.probability,
+            "chi2_reduced": self.best.ranked.chi2_reduced,
             "effective_points": sum(part.effective_points for part in self.parts),
             "correlation_names": self.covariance.names,
-            "correlation": self.discrepancy.errors.correlation,
+            "correlation": self.best.discrepancy.errors.correlation,
             "profile": None,
+            "ranking": self.best,
             "seconds": time.perf_counter() - self.began,
         }
         return Fit(**(common | about))
 
 
 def assemble(
-    data: Measurements,
+    make: Callable[[RankedMinima], Any],
+    ranked: RankedMinima,
     began: float,
     *,
-    scans: Mapping[int, Profile] | None = None,
+    scans: Callable[[RankedMinima, Sequence[Any]], Mapping[int, Profile]] = lambda *_: {},
     near: bool = False,
     binding: frozenset[str] = frozenset(),
 ) -> Assembly:
-    """Judge the best of the ranked minima of `data`.
+    """Judge the best of ranked minima.
 
-    `began` is when the fit did, by `time.perf_counter`; the other arguments are those of `conclude`.
+    `make` returns the measurements of ranked minima, whose order may change. `began` is when the fit did, by
+    `time.perf_counter`; the other arguments are those of `conclude`, the scans those of ranked minima.
     """
-    ranked = data.ranked
-    jacobian, covariance = linearised(ranked)
-    model_error = discrepancy(data.evidence(jacobian), jacobian, ranked.minima.units[0])
+    best = ranking(make, ranked)
+    data, model_error = best.data, best.discrepancy
     parts = data.parts(model_error)
     missed = tuple(data.missed(parts, model_error))
+    counted = by_remaining(best.ranked, model_error)
+    covariance, scanned = linearised(counted)[1], scans(best.ranked, gains(model_error))
     conclusion = conclude(
-        ranked,
-        jacobian,
+        best._replace(ranked=counted),
         covariance,
-        model_error,
         misfit=bool(missed),
         binding=binding,
         fixed=data.fixed(),
-        scans=scans or {},
+        scans=scanned,
         near=near,
         amend=partial(data.amended, parts),
     )
-    return Assembly(ranked, jacobian, covariance, model_error, parts, missed, conclusion, began)
+    return Assembly(best, covariance, parts, missed, scanned, conclusion, began)

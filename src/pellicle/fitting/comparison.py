@@ -1,27 +1,31 @@
 """Comparison of fits of the same data by information criteria.
 
-With L the likelihood on the points that count, k the free numbers and n those points,
+With L the likelihood, in which scale, offset and systematic effects are integrated out (`fitting.marginal`),
+k the free numbers and n the points that count,
 AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
 BIC = −2 ln L + k ln n (G. Schwarz 1978, Ann. Stat. 6, 461).
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from logging import getLogger
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
-from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
-from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps
-from pellicle.fitting.noise import correlation_length
+from pellicle.fitting.curves import BIREFRINGENCE
+from pellicle.fitting.discrepancy import Evidence
+from pellicle.fitting.marginal import Ranking, by_remaining, marginal
+from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import Fit, Part, Status
+from pellicle.fitting.result import Fit, Status
 from pellicle.forward_model.plan import GENERAL
+from pellicle.scene.film import Scene
 
 log = getLogger(__name__)
 
@@ -121,20 +125,21 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     if len(fits) < 2:
         raise UsageError("a comparison needs two descriptions or more")
     _check_same(fits)
-    residuals = {name: [r for part in fit.parts for r in _residuals(part)] for name, fit in fits.items()}
-    nearest = min(residuals.values(), key=lambda rows: _deviance(rows, [1.0] * len(rows)))
-    lengths = [_correlation(own) for own in nearest]
-    counts = [own.independent for own in nearest]
-    points = sum(count / length for count, length in zip(counts, lengths, strict=True))
+    with jax.enable_x64(True):
+        explained = {name: _Explained(fit.ranking, fit.ranking.evidence()) for name, fit in fits.items()}
+        nearest = max(explained.values(), key=lambda one: one.information)
+        points, weights = nearest.points, nearest.weights
+        wider = float(student(nearest.best.ranked.freedom, STRONG)) ** 2
+        deviances = {name: one.deviance(weights) / wider for name, one in explained.items()}
     candidates = []
-    for name, rows in residuals.items():
-        free, deviance = len(fits[name].free), _deviance(rows, lengths)
+    for name, fit in fits.items():
+        free, deviance = len(fit.free), deviances[name]
         bic = deviance + free * math.log(max(points, 2.0))
         log.info(
             "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: BIC %.6g",
             *(name, free, deviance, points, bic),
         )
-        candidates.append(Candidate(name, fits[name], free, deviance, deviance + 2 * free, bic))
+        candidates.append(Candidate(name, fit, free, deviance, deviance + 2 * free, bic))
     return Comparison(tuple(candidates), points)
 
 
@@ -165,44 +170,37 @@ def _equal(one: np.ndarray | None, other: np.ndarray | None) -> bool:
     return one is other if one is None or other is None else np.array_equal(one, other)
 
 
-class _Residuals(NamedTuple):
-    """Residuals (points, channels) of one noise, in units of σ where that is `known`."""
+class _Explained(NamedTuple):
+    """The best minimum of a fit and its evidence."""
 
-    part: Part
-    rows: np.ndarray
-    known: bool
-    independent: int
+    best: Ranking
+    evidence: list[Evidence]
 
+    @property
+    def weights(self) -> list[np.ndarray]:
+        """1/σ of the points of each view (rows, channels), where σ is what the effects leave."""
+        pairs = zip(self.evidence, self.best.discrepancy.raised, strict=True)
+        return [raised * view.weights * view.unit for view, raised in pairs]
 
-def _residuals(part: Part) -> list[_Residuals]:
-    """Residuals of a part, by their noises."""
-    known = part.sigma_from in ("given", "usual")
-    if isinstance(part.curve, Curve):
-        each = part.spectrum.kind.residuals(part.spectrum, part.curve, known)
-        return [_Residuals(part, *own) for own in each]
-    rows = part.curve.residual
-    rows = rows / part.curve.sigma if isinstance(part.curve, ColourCurve) else rows
-    return [_Residuals(part, rows, known, rows.size)]
+    @property
+    def information(self) -> float:
+        """Logarithm of these weights, added over all points."""
+        return sum(float(np.sum(np.log(np.maximum(own, 1e-300)))) for own in self.weights)
 
+    @property
+    def points(self) -> float:
+        """Independent points."""
+        ranked = by_remaining(self.best.ranked, self.best.discrepancy)
+        pairs = zip(ranked.problem.views, ranked.fits, strict=True)
+        return sum(view.independent / max(fit.variance, 1.0) for view, fit in pairs)
 
-def _correlation(residuals: _Residuals) -> float:
-    """Number of points that count as one: neighbours in a sweep, or in a file of BRDF samples."""
-    part, rows, *_ = residuals
-    if isinstance(part.curve, BrdfCurve):
-        return float(np.mean([correlation_length(column) for column in rows.T]))
-    if isinstance(part.curve, ColourCurve):
-        return 1.0
-    wavelength, angle = part.curve.wavelength, part.spectrum.angle
-    return correlation_in_sweeps(rows, sweeps(wavelength, 0.0 * wavelength if angle is None else angle))
-
-
-def _deviance(residuals: Sequence[_Residuals], lengths: Sequence[float]) -> float:
-    """−2 ln L up to a constant, each point counting for 1/length; an unknown σ takes its best value."""
-    total = 0.0
-    for own, length in zip(residuals, lengths, strict=True):
-        square, count = float(np.sum(own.rows**2)), own.independent
-        total += (square if own.known else count * math.log(max(square / count, 1e-300))) / length
-    return total
+    def deviance(self, weights: Sequence[np.ndarray]) -> float:
+        """−2 ln of the marginal likelihood up to a constant, with these weights of the points."""
+        rows = zip(self.evidence, weights, strict=True)
+        raised = tuple(own / (view.weights * view.unit) for view, own in rows)
+        allowed = replace(self.best.discrepancy, raised=raised)
+        unit = self.best.ranked.minima.units[0]
+        return float(marginal(self.evidence, self.best.jacobian, unit, allowed).deviance)
 
 
 def _matrices(fit: Fit) -> int:
@@ -236,8 +234,20 @@ def _beyond_errors(one: Fit, other: Fit) -> bool:
     return not further or any(abs(p.value) > _CLEAR * p.stderr for p in further)
 
 
+def _layers(fit: Fit) -> list[str]:
+    """Names of the layers of a film, or of their materials."""
+    scene = fit.scene[0] if isinstance(fit.scene, tuple) else fit.scene
+    if not isinstance(scene, Scene):
+        return []
+    return [layer.name or getattr(getattr(layer, "material", None), "name", "") for layer in scene.layers]
+
+
 def _extra(one: Fit, other: Fit) -> list[str]:
-    """Names of the free parameters that only the first has, else of effects that only it simulates."""
+    """Layers that only the first has, else names of free parameters, else of effects that it simulates."""
+    more, less = _layers(one), _layers(other)
+    layers = [name for name in more if name and name not in less]
+    if layers and len(layers) == len(more) - len(less):
+        return [f"the layer `{name}`" for name in layers]
     names = [p.name for p in one.free if p.name not in {q.name for q in other.free}]
     if names:
         return names[:4]

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting import identifiability, profile_likelihood
-from pellicle.fitting.covariance import Errors, Scaled, errors, scaled
+from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.evaluation import total_deviance
+from pellicle.fitting.marginal import Ranking
 from pellicle.fitting.minima import Minima, deviance_at, solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.parameter import Parameter
@@ -48,7 +49,8 @@ def verdicts(
     ranked: RankedMinima,
     covariance: Errors,
     discrepancy: Discrepancy,
-    around: Callable[[np.ndarray], Neighbourhood],
+    delta_chi2: np.ndarray,
+    around: Callable[[], Neighbourhood],
     flat: Mapping[int, np.ndarray],
     *,
     misfit: Any,
@@ -57,15 +59,14 @@ def verdicts(
 ) -> Verdicts:
     """Judge the best of the ranked minima of fits, of which `misfit` (...) are not explained.
 
-    The `discrepancy` enlarges errors, and differences in χ² count less by it. Limits come from profiles in
-    the neighbourhood `around` minima of these `delta_chi2` where a fit is usable, else from the covariance
-    alone, as profiles would mean nothing; `flat` are the `flat_sides` (fits, 2) of scanned parameters.
-    `amend` has the last word on the limits by the noise. `binding` names parameters whose default bounds
-    count as those of the user.
+    The `discrepancy` enlarges errors. The minima are above the best by `delta_chi2` (..., minima). Limits
+    come from profiles in the neighbourhood `around` the best minima where a fit is usable, else from the
+    covariance alone, as profiles would mean nothing; `flat` are the `flat_sides` (fits, 2) of scanned
+    parameters. `amend` has the last word on the limits by the noise. `binding` names parameters whose default
+    bounds count as those of the user.
     """
     parameters, values, freedom = ranked.problem.parameters, ranked.values, np.asarray(ranked.freedom)
-    delta_chi2 = _above_best(ranked, discrepancy.evidence_share)
-    noise, converged = _by_noise(ranked, covariance, lambda: around(delta_chi2), flat, misfit)
+    noise, converged = _by_noise(ranked, covariance, around, flat, misfit)
     noise, linear = amend(noise), covariance.stderr[..., : len(parameters)]
     lower, upper = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
     # a profile likelihood has corrected the error of the noise; what is not noise adds to it
@@ -79,17 +80,6 @@ def verdicts(
     close = apart & (delta_chi2[..., 1 : _MOST_RIVALS + 1] < RIVAL)
     status = _status(parameters, values, every.stderr, converged, misfit, close, binding)
     return Verdicts(noise, every, delta_chi2, status)
-
-
-def _above_best(ranked: RankedMinima, share: Any) -> np.ndarray:
-    """Δχ² (..., minima) of the minima on the effective points.
-
-    Of a difference in χ² only a `share` (...) is evidence where residuals are larger than noise. Where few
-    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
-    """
-    deviance = ranked.minima.deviance
-    wider = np.asarray(student(ranked.freedom, RIVAL))[..., None]
-    return np.asarray(share)[..., None] * np.maximum(deviance - deviance[..., :1], 0.0) / wider**2
 
 
 def _by_noise(
@@ -285,29 +275,20 @@ def ranked_minima(
     return rank(exact, search(exact), loss, **kept), [warning]
 
 
-def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
-    """The scaled Jacobian at the best minima (...), and the covariance from it."""
-    at, variance = [fit.at for fit in ranked.fits], [fit.variance for fit in ranked.fits]
-    jacobian = scaled(ranked.problem, ranked.minima.units[..., 0, :], at, variance)
-    sizes = [view.rows * view.channels for view in ranked.problem.views]
-    pairs = zip(np.cumsum([0, *sizes]).tolist(), ranked.fits, strict=False)
-    return jacobian, errors(jacobian, {at: fit.scores for at, fit in pairs if fit.scores is not None})
-
-
 class Conclusion(NamedTuple):
-    """Status, estimates and rivals of a fit; `correlated` are sentences on parameters that are."""
+    """Status, estimates and rivals of a fit, and the share of the posterior that the answer has beside those
+    rivals that could have some; `correlated` are sentences on parameters that are."""
 
     status: Status
     parameters: dict[str, Estimate]
     rivals: tuple[Rival, ...]
+    probability: float | None
     correlated: list[str]
 
 
 def conclude(
-    ranked: RankedMinima,
-    jacobian: Scaled,
+    best: Ranking,
     covariance: Errors,
-    discrepancy: Discrepancy,
     *,
     misfit: bool,
     fixed: list[Estimate],
@@ -316,32 +297,38 @@ def conclude(
     binding: frozenset[str] = frozenset(),
     amend: Callable[[Limits], Limits] = lambda limits: limits,
 ) -> Conclusion:
-    """Judge the best of the ranked minima of one fit: see `verdicts`.
+    """Judge the `best` of the ranked minima of one fit: see `verdicts`.
 
     `scans` are scans of the misfit by the position of their parameter; with `near` profiles start from near
     rivals too.
     """
+    ranked, discrepancy, above = best.ranked, best.discrepancy, best.delta_chi2
     points = np.asarray(ranked.problem.values(ranked.minima.units))[1 : _MOST_RIVALS + 1]
 
-    def around(delta_chi2: np.ndarray) -> Neighbourhood:
-        close = np.flatnonzero(delta_chi2[1 : len(points) + 1] < RIVAL)[:_MOST_NEAR] if near else []
+    def around() -> Neighbourhood:
+        close = np.flatnonzero(above[1 : len(points) + 1] < RIVAL)[:_MOST_NEAR] if near else []
         return neighbourhood(ranked, covariance.by_curvature, points[close])
 
     flat = {
         axis: flat_sides(scan.thickness, scan.delta_chi2[None], ranked.values[axis, None])
         for axis, scan in scans.items()
     }
-    about = ranked, covariance, discrepancy, around, flat
+    about = ranked, covariance, discrepancy, above, around, flat
     numbers = verdicts(*about, misfit=np.array(misfit), binding=binding, amend=amend)
-    names, above = [p.name for p in ranked.problem.parameters], numbers.delta_chi2.tolist()
+    names = [p.name for p in ranked.problem.parameters]
+    columns = points, above[1:], best.share[1:], best.stderr[1:]
     rivals = tuple(
-        Rival(dict(zip(names, values, strict=True)), delta)
-        for values, delta in zip(points.tolist(), above[1:], strict=False)
+        Rival(dict(zip(names, at, strict=True)), delta)
+        if share == 0.0
+        else Rival(dict(zip(names, at, strict=True)), delta, share, dict(zip(names, stderr, strict=True)))
+        for at, delta, share, stderr in zip(*(column.tolist() for column in columns), strict=False)
         if delta < _RULED_OUT
     )
     parameters = estimates(ranked, numbers, covariance, discrepancy, fixed)
-    correlated = identifiability.correlated(jacobian, parameters)
-    return Conclusion(ORDER[numbers.status.position], parameters, rivals, correlated)
+    correlated = identifiability.correlated(best.jacobian, parameters)
+    sole = all(rival.probability is None for rival in rivals)
+    probability = None if sole else float(best.share[0])
+    return Conclusion(ORDER[numbers.status.position], parameters, rivals, probability, correlated)
 
 
 def estimates(

@@ -85,8 +85,9 @@ class Evidence(NamedTuple):
     show of it; `weights` (..., rows, channels) are those of the residuals in the likelihood of the fit.
     `correlation` returns the number of points that count as one; `least` is the least factor on σ² that
     stands for it. `uncertain` is the relative standard error of σ² where it is estimated. `signals` are the
-    channels of each signal that is judged by itself, empty where all are one. With `exact_noise` the noise is
-    at least `noise`, and `exact_noise(which)` is that of the fits at some positions.
+    channels of each signal that is judged by itself, empty where all are one. `unit` (rows, channels) has
+    multiplied the data; without it those of several scenes compare. With `exact_noise` the noise is at least
+    `noise`, and `exact_noise(which)` is that of the fits at some positions.
     """
 
     residual: np.ndarray
@@ -99,6 +100,7 @@ class Evidence(NamedTuple):
     least: float = 1.0
     uncertain: float = 0.0
     signals: tuple[tuple[int, ...], ...] = ()
+    unit: Any = 1.0
     exact_noise: Callable[[np.ndarray], np.ndarray] | None = None
 
     def of(self, which: np.ndarray) -> Evidence:
@@ -154,7 +156,8 @@ class Discrepancy:
     `shift` (..., parameters and nuisances) away from those of the fit. `implausible` (...) is true where the
     effects would have to be larger together than they are. `evidence_shares` are the shares of a difference
     in χ² of each view, as the fit counts points, that are left when residuals count as what they are;
-    `evidence_share` is their mean.
+    `evidence_share` is their mean. `raised` (..., rows, channels) of each view multiplies the weights of the
+    fit, so that they become those of what remains.
     """
 
     errors: Errors
@@ -164,6 +167,12 @@ class Discrepancy:
     implausible: Any
     evidence_shares: tuple[Any, ...]
     evidence_share: Any
+    raised: tuple[np.ndarray, ...]
+
+    @property
+    def total(self) -> np.ndarray:
+        """Root mean square errors of the fit's own parameters and nuisances."""
+        return np.sqrt(self.variance)
 
     @property
     def variance(self) -> np.ndarray:
@@ -178,11 +187,10 @@ def discrepancy(
 
     `scaled` has the units of the columns and their priors. Without `contributions` those are left out.
     """
-    system = _System(evidence, scaled, unit)
+    system = System(evidence, scaled, unit)
     balance, known, led = _Balance(system), system.known, system.led
     views = list(zip(system.views, balance.views, strict=True))
     remaining, noises = zip(*(_remaining(*view) for view in views), strict=True)
-    shares = [_evidence_share(*view) for view in views]
     sizes = balance.solution[:, known:]
     # terms of a lamp that a spectrum has too few fringes for are zero
     grams = sum(np.einsum("pii->pi", view.gram)[:, known:] for view in balance.views)
@@ -190,14 +198,19 @@ def discrepancy(
     stretch = scaled.stretch
     covariance = stretch @ led(balance.covariance[:, :known, :known]) @ np.swapaxes(stretch, -1, -2)
     weights = [view.data.shape[1] for view in balance.views]
+    by_noise = system.by_noise(noises) if contributions else system
+    plain = balance if by_noise is system else _Balance(by_noise)
+    counted = list(zip(by_noise.views, plain.views, strict=True))
+    shares = [_evidence_share(*view) for view in counted]
     return Discrepancy(
         errors=Errors(scaled.names, covariance),
         shift=times(stretch, led(balance.solution[:, :known])),
         remaining=tuple(Remaining(*(led(x) for x in left)) for left in remaining),
-        contributions=tuple(_contributions(system, balance, noises)) if contributions else (),
+        contributions=tuple(_contributions(system, balance, plain)) if contributions else (),
         implausible=led((count > 0) & (np.sum(sizes**2, axis=1) > improbable(count))),
         evidence_shares=tuple(led(share) for share in shares),
         evidence_share=led(np.average(shares, axis=0, weights=weights)),
+        raised=tuple(led(_raised(*view)) for view in counted),
     )
 
 
@@ -245,7 +258,7 @@ def improbable(count: Any) -> Any:
     return count * (1 - spread_of_cube_root + _CHANCE_QUANTILE * np.sqrt(spread_of_cube_root)) ** 3
 
 
-class _System:
+class System:
     """Linearised fits with their effects: columns of parameters, nuisances and effects, rows of all views, in
     units of the noise, and of the priors. All arrays have one leading axis, of `fits`."""
 
@@ -299,7 +312,7 @@ class _System:
         """An array (fits, ...) with the leading axes of the fits."""
         return x.reshape((*self.lead, *x.shape[1:]))[()]
 
-    def by_noise(self, noises: Sequence[np.ndarray]) -> _System:
+    def by_noise(self, noises: Sequence[np.ndarray]) -> System:
         """The system with the noise of neighbouring points (fits,) of each view for the σ of its points: that
         of a drifting lamp would hide what an effect explains. Itself where they are the same."""
         pairs = list(zip(self.views, noises, strict=True))
@@ -372,7 +385,7 @@ class _ViewBalance:
 class _Balance:
     """Noise factors and robust weights, iterated until they agree with the residuals that they leave."""
 
-    def __init__(self, system: _System):
+    def __init__(self, system: System):
         self.system = system
         self.views = [_ViewBalance(view, system.rows(i)) for i, view in enumerate(system.views)]
         every = slice(None)
@@ -472,17 +485,20 @@ def _evidence_share(view: Evidence, balance: _ViewBalance) -> np.ndarray:
     return np.minimum(1.0, counted**2 / (balance.variance * now**2))
 
 
-def _contributions(
-    system: _System, balance: _Balance, noises: Sequence[np.ndarray]
-) -> Iterator[Contribution]:
-    """Each effect of a system, of these noises of its views."""
+def _raised(view: Evidence, balance: _ViewBalance) -> np.ndarray:
+    """Weights (fits, rows, channels) by what remains, over those of the fit."""
+    roots = balance.roots.reshape(view.residual.shape) / np.sqrt(balance.variance)[:, None, None]
+    return roots / (view.sigma * view.weights)
+
+
+def _contributions(system: System, balance: _Balance, by_noise: _Balance) -> Iterator[Contribution]:
+    """Each effect of a system, of which `by_noise` is the balance by the noise of neighbouring points."""
     if not system.effects:
         return
     known, normal, stretch = system.known, balance.normal(), system.stretch
     _, covariance = normal.of(np.arange(known)).solved()
     changes = -covariance @ normal.matrix[:, :known, known:]
-    by_noise = system.by_noise(noises)
-    explains, alone, shift = (balance if by_noise is system else _Balance(by_noise)).one_by_one()
+    explains, alone, shift = by_noise.one_by_one()
     for i, effect in enumerate(system.effects):
         yield Contribution(
             effect,

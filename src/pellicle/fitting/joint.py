@@ -7,6 +7,7 @@ Both kinds of data are fitted apart first. The numbers that bear one name in the
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -97,7 +98,7 @@ def fitted(
         targets = of_film.measurements(own.films, own.scenes)
         problem, starts = _combined(film_ranked, brdf_ranked)
         ranked = rank(problem, minima(problem, starts, progress), loss)
-        judged = assemble(together(own, targets, ranked), began)
+        judged = assemble(partial(together, own, targets), ranked, began)
         worst, conclusion = judged.worst, judged.conclusion
         return judged.fit(
             verdict=verdict(
@@ -106,8 +107,8 @@ def fitted(
             rms=None,
             warnings=tuple(dict.fromkeys([*_apart_warning(film, brdf), *film.warnings, *brdf.warnings])),
             scene=(*own.scenes, own.surface),
-            budget=budget(judged.discrepancy, problem.parameters),
-        ), ranked
+            budget=budget(judged.best.discrepancy, problem.parameters),
+        ), judged.best.ranked
 
 
 class _Merged(NamedTuple):
@@ -187,11 +188,12 @@ class JointMeasurements(NamedTuple):
     samples: BrdfMeasurements
     ranked: RankedMinima
 
-    def evidence(self, jacobian: Scaled) -> list[Evidence]:
-        """Residuals of all views and what may explain them."""
-        before = sum(view.points for view in self.films.ranked.problem.views)
+    def evidence(self, at: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of all views and what may explain them `at` a minimum."""
+        films, samples = _split(at, len(self.films.targets))
+        before = sum(view.points for view in films.problem.views)
         below = jacobian._replace(jacobian=jacobian.jacobian[before:])
-        return [*self.films.evidence(jacobian), *self.samples.evidence(below)]
+        return [*self.films.evidence(films, jacobian), *self.samples.evidence(samples, below)]
 
     def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """The parts of the films, then those of the samples."""
@@ -213,13 +215,18 @@ class JointMeasurements(NamedTuple):
         return self.samples.amended(parts[count:], self.films.amended(parts[:count], limits))
 
 
-def together(apart: Apart, targets: list[Target], ranked: RankedMinima) -> JointMeasurements:
-    """Both kinds of data with the views of the ranked minima that are theirs; `targets` are the films'."""
-    count, problem = len(targets), ranked.problem
-    one, other = (
+def _split(ranked: RankedMinima, count: int) -> list[RankedMinima]:
+    """Ranked minima with the first `count` views, and with the others."""
+    problem = ranked.problem
+    return [
         replace(ranked, problem=problem._replace(views=problem.views[own]), fits=ranked.fits[own])
         for own in (slice(count), slice(count, None))
-    )
+    ]
+
+
+def together(apart: Apart, targets: list[Target], ranked: RankedMinima) -> JointMeasurements:
+    """Both kinds of data with the views of the ranked minima that are theirs; `targets` are the films'."""
+    one, other = _split(ranked, len(targets))
     return JointMeasurements(
         FilmMeasurements(apart.films, targets, one),
         BrdfMeasurements(apart.samples, apart.surface, other),

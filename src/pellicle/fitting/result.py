@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -214,9 +215,9 @@ class Fit(PlotMixin):
     `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum
     where there are several, or a `Surface`. `budget` has the systematic effects that `stderr` includes, the
     largest first. `probability` is the share of the posterior that the answer has beside its rivals, each by
-    its normal approximation: of fits of colours, which have several answers more often than not. `profile` is
-    the scan against thickness of a fit of spectra,
-    `layer_test` the evidence for a layer of a fit of BRDF samples; None else.
+    its normal approximation; None where no rival could have some. `profile` is the scan against thickness of
+    a fit of spectra, `layer_test` the evidence for a layer of a fit of BRDF samples; None else. `ranking` is
+    the `fitting.marginal.Ranking` that it rests on.
     """
 
     parts: tuple[Part, ...]
@@ -236,6 +237,7 @@ class Fit(PlotMixin):
     layer_test: LayerTest | None = None
     budget: tuple[SystematicEffect, ...] = ()
     probability: float | None = None
+    ranking: Any = field(default=None, compare=False, repr=False)
 
     def __getitem__(self, name: str) -> Estimate:
         return self.parameters[name]

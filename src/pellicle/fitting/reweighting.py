@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.fitting.covariance import Errors, Scaled, errors, scaled
 from pellicle.fitting.minima import MOST, Minima, deviance_at, minima
 from pellicle.fitting.noise import NoiseEstimate, noise_of
 from pellicle.fitting.problem import Problem, View
@@ -153,6 +154,38 @@ def rank(
     at = zip(weighted.views, _local(weighted, candidates.units[0]), noise, strict=True)
     fits = tuple(_view_fit(view, own, local) for view, local, own in at)
     return RankedMinima(problem, weighted, replace(candidates, scan=scan), fits)
+
+
+def linearised(ranked: RankedMinima) -> tuple[Scaled, Errors]:
+    """The scaled Jacobian at the best minima (...), and the covariance from it."""
+    at, variance = [fit.at for fit in ranked.fits], [fit.variance for fit in ranked.fits]
+    jacobian = scaled(ranked.problem, ranked.minima.units[..., 0, :], at, variance)
+    sizes = [view.rows * view.channels for view in ranked.problem.views]
+    pairs = zip(np.cumsum([0, *sizes]).tolist(), ranked.fits, strict=False)
+    return jacobian, errors(jacobian, {at: fit.scores for at, fit in pairs if fit.scores is not None})
+
+
+def at_minimum(ranked: RankedMinima, position: int) -> RankedMinima:
+    """Ranked minima of one fit as if the one at a position were the only one."""
+    chosen = ranked.minima.units[position : position + 1]
+    own = replace(ranked.minima, units=chosen, deviance=ranked.minima.deviance[position : position + 1])
+    local = _local(ranked.problem, chosen[0])
+    fits = tuple(replace(fit, at=at) for fit, at in zip(ranked.fits, local, strict=True))
+    return replace(ranked, minima=own, fits=fits)
+
+
+def led_by(ranked: RankedMinima, position: int) -> RankedMinima:
+    """Ranked minima of one fit with the one at a position in front, which sets the noise."""
+    minima, problem = ranked.minima, ranked.searched
+    order = np.array([position, *(i for i in range(len(minima.units)) if i != position)])
+    noise = _noise(problem, minima.units[position], None)
+    weighted = _reweighted(problem, noise)
+    units = minima.units[order]
+    moved = replace(
+        minima, units=units, deviance=deviance_at(weighted, units), converged=minima.converged[order]
+    )
+    rows = zip(weighted.views, _local(weighted, units[0]), noise, strict=True)
+    return RankedMinima(problem, weighted, moved, tuple(_view_fit(v, own, at) for v, at, own in rows))
 
 
 def _local(problem: Problem, unit: np.ndarray) -> list[Any]:

@@ -21,14 +21,14 @@ from pellicle.errors import DataError, UsageError, install_command
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.brdf.summary import BrdfMeasurements
-from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_measurements import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
+from pellicle.fitting.marginal import by_remaining, ranking, with_shift
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.reweighting import RankedMinima, linearised
 from pellicle.sampling import density
 from pellicle.sampling.chain import Chain, ChainFile, Checks, check, missing
 from pellicle.sampling.result import Posterior, Prediction, predictions
@@ -295,12 +295,12 @@ def _subject(
     `measurements` makes those of the fit from its minima, `identity` is the hash of all that the posterior
     depends on, `assumption` what it assumes beyond the fit.
     """
-    ranked = ranked.counted
+    ranked = by_remaining(ranked, ranking(measurements, ranked).discrepancy).counted
     jacobian, covariance = linearised(ranked)
-    residuals, problem = measurements(ranked).evidence(jacobian), ranked.problem.affine()
-    shares = discrepancy(residuals, jacobian, ranked.minima.units[0]).evidence_shares
+    residuals, problem = measurements(ranked).evidence(ranked, jacobian), ranked.problem.affine()
+    allowed = discrepancy(residuals, jacobian, ranked.minima.units[0])
     channels = [view.channels for view in problem.views]
-    effects = density.systematics(residuals, shares, channels, len(problem.parameters))
+    effects = density.systematics(residuals, allowed.evidence_shares, channels, len(problem.parameters))
     mixture = density.modes(ranked, effects)
     slope = problem.coordinates.slope(problem.box, mixture.centre[0])
     return Subject(
@@ -313,7 +313,7 @@ def _subject(
         max(view.independent for view in problem.views),
         lambda units, seed: predictions(problem, fit.parts, units, seed),
         assumption,
-        density.sandwich_stretch(covariance, slope, mixture),
+        density.sandwich_stretch(with_shift(covariance, allowed), slope, mixture),
     )
 
 

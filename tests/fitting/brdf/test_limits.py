@@ -14,10 +14,10 @@ from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting import conclusion as shared
 from pellicle.fitting.brdf import fit as module
-from pellicle.fitting.conclusion import linearised
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Status
+from pellicle.fitting.reweighting import linearised
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 

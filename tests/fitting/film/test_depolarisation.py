@@ -206,7 +206,7 @@ def test_effects_depolarise(ranked, measured):
     allowed = scene(WIDTH)
     allowed = replace(allowed, uncertainty=replace(pl.Uncertainty.none(), bandwidth=0.5))
     [target] = measurements(measured, allowed)
-    [effect] = systematic_effects(view, values, view.local(values), target.scene)
+    [effect] = systematic_effects(view, values, view.local(values), target.scene, values)
     light = pl.Light(signal="psi-delta", angle=70.0)
 
     def share(**more):

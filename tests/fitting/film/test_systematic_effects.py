@@ -34,7 +34,7 @@ def changes(scene, data):
     [view], values = ranked.problem.views, ranked.values
     assert values == pytest.approx([THICKNESS], abs=1e-4)
     [target] = measurements(data, scene)
-    return {e.name: e for e in systematic_effects(view, values, ranked.fits[0].at, target.scene)}
+    return {e.name: e for e in systematic_effects(view, values, ranked.fits[0].at, target.scene, values)}
 
 
 @pytest.fixture(scope="module")

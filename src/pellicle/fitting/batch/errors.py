@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.fitting.batch.data import CODES, NO_DATA, BatchData, BatchFits, BatchMinima
 from pellicle.fitting.batch.effects import BatchEffects, nodes
 from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
-from pellicle.fitting.conclusion import linearised, verdicts
+from pellicle.fitting.conclusion import verdicts
 from pellicle.fitting.discrepancy import DOUBTFUL, discrepancy
 from pellicle.fitting.film.evidence import spectrum_evidence
 from pellicle.fitting.film.form import Local
@@ -21,10 +21,11 @@ from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.targets import Measured, drifts
 from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.marginal import above_best
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.misfit import misfit, other_material
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.reweighting import RankedMinima, ranked_by_factor
+from pellicle.fitting.reweighting import RankedMinima, linearised, ranked_by_factor
 from pellicle.fitting.status import ORDER
 from pellicle.scene.free import is_free
 
@@ -138,8 +139,8 @@ class BatchErrors:
             wrong[doubtful] = other_material(again.contributions) >= 0
         models = LocalModels(self.problem, whole, ranked)
         numbers = verdicts(
-            *(ranked, covariance, systematic),
-            lambda _: models.neighbourhood(covariance.covariance),
+            *(ranked, covariance, systematic, above_best(ranked, systematic.evidence_share)),
+            lambda: models.neighbourhood(covariance.covariance),
             self._flat_sides(minima, who, ranked, models, ~wrong),
             misfit=wrong,
             amend=lambda limits: self._amended(limits, ranked, models, systematic.errors.covariance),

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import jax
@@ -126,7 +127,8 @@ def _fit(
         return minima(problem, result.units, progress, **kept)
 
     ranked, notes = ranked_minima(build, searched, tolerance, loss, **kept)
-    judged = assemble(summary.BrdfMeasurements(samples, surface, ranked), began, near=True)
+    judged = assemble(partial(summary.BrdfMeasurements, samples, surface), ranked, began, near=True)
+    ranked = judged.best.ranked
     baselines = tuple(Baseline(name, errors[name]) for name in (_FLAT, _PLAIN))
     status, parameters = judged.conclusion.status, judged.conclusion.parameters
     layer = summary.evidence(parameters, judged.conclusion.rivals, errors["layer"], baselines)
@@ -168,7 +170,7 @@ def _warnings(
     parameters: dict[str, Estimate],
 ) -> list[str]:
     """Warnings on weights, directions, numbers and what the data do not determine."""
-    form, values = judged.ranked.problem.views[0].form, judged.ranked.values
+    form, values = judged.best.ranked.problem.views[0].form, judged.best.ranked.values
     numbers = {k: np.asarray(x) for k, x in form.numbers(values, surface.fixed_numbers()).items()}
     return [
         *(summary.weight_warnings(parameters) if status is Status.MISFIT else ()),

@@ -39,18 +39,19 @@ class BrdfMeasurements(NamedTuple):
     surface: Surface
     ranked: RankedMinima
 
-    def evidence(self, jacobian: Scaled) -> list[Evidence]:
-        """Residuals of each view in units of its noise, and what may explain them."""
-        problem, fits, result = self.ranked.problem, self.ranked.fits, []
+    def evidence(self, at: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of each view in units of its noise, and what may explain them `at` a minimum."""
+        problem, fits, result = at.problem, at.fits, []
         views = problem.views
         blocks = jacobian.blocks([view.independent for view in views], [fit.variance for fit in fits])
         for view, fit, block in zip(views, fits, blocks, strict=True):
             residual = view.residuals(fit.at)
             columns, one = block.reshape(*residual.shape, -1), np.ones(residual.shape)
             weights = math.sqrt(view.samples.independent_fraction) * one
-            values = problem.seen_by(view, self.ranked.values)
+            values = problem.seen_by(view, at.values)
             effects = systematic_effects(view, values, fit.at, self.surface)
-            result.append(Evidence(residual, columns, one, 1.0, weights, effects, view.correlation_length))
+            about = residual, columns, one, 1.0, weights, effects, view.correlation_length
+            result.append(Evidence(*about, unit=view.unit()))
         return result
 
     def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:

@@ -218,6 +218,10 @@ class SamplesView:
         values_of = evaluation(view).signals
         return float(np.max(np.abs(values_of(self.plan) - values_of(exact(view)))))
 
+    def unit(self) -> np.ndarray:
+        """Weights (rows, channels) over those before any reweighting."""
+        return np.asarray(self.samples.weight)[: self.rows] / self.stated[: self.rows]
+
     def compared(self, at: Local) -> np.ndarray:
         """Residuals (rows, channels) in the unit of the residual; in standard deviations where σ is given."""
         weight = np.asarray(self.samples.weight)[: self.rows]

@@ -1,7 +1,6 @@
 """Colours in a fit: their target and view, their part and curve, evidence of a discrepancy, probabilities."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import permutations
 from typing import Any, NamedTuple
 
@@ -13,9 +12,8 @@ from pellicle.data.colours import Colours
 from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.discrepancy import Discrepancy, Effect, Evidence
+from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
 from pellicle.fitting.film.extended_scene import Number, extended
 from pellicle.fitting.film.parameters import anonymous
@@ -23,8 +21,8 @@ from pellicle.fitting.film.systematic_effects import named_for, simulated_effect
 from pellicle.fitting.misfit import Accuracy
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.reported_layer import layer_errors, principal_indices
-from pellicle.fitting.result import Part, Rival
-from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.result import Part
+from pellicle.fitting.reweighting import ViewFit
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength
 from pellicle.scene.free import is_free
@@ -176,11 +174,17 @@ LARGEST = 0.03
 
 
 def colours_evidence(
-    view: ColoursView, values: np.ndarray, at: Local, measured: MeasuredColours, block: np.ndarray
+    view: ColoursView,
+    values: np.ndarray,
+    at: Local,
+    measured: MeasuredColours,
+    block: np.ndarray,
+    example: np.ndarray,
 ) -> Evidence:
     """Evidence of colours at `values` (the parameters of the view,), in units of their σ.
 
-    `block` are their rows of the scaled Jacobian, by the σ of their weights.
+    `block` are their rows of the scaled Jacobian, by the σ of their weights; effects are simulated as at the
+    values of an `example`.
     """
     weight = np.asarray(view.data.weight)
     columns = block.reshape(view.rows, 3, -1) / weight[:, :, None]
@@ -188,9 +192,9 @@ def colours_evidence(
     response = view.response(at)
     simulated = [
         row.effect(view.weighted(at, (weights @ change).reshape(-1, 3) @ response.T) / weight)
-        for row, weights, change in simulated_effects(view, values, measured.scene)
+        for row, weights, change in simulated_effects(view, values, measured.scene, example)
     ]
-    every = [*camera_errors(view, at, measured), *lamp_errors(view, values, at, measured.scene)]
+    every = [*camera_errors(view, at, measured), *lamp_errors(view, values, at, measured.scene, example)]
     effects = [
         Effect(name, size, "", view.weighted(at, size * change) / weight, shared=False)
         for name, size, change in every
@@ -229,11 +233,11 @@ def camera_errors(
 
 
 def lamp_errors(
-    view: ColoursView, values: np.ndarray, at: Local, scene: Scene
+    view: ColoursView, values: np.ndarray, at: Local, scene: Scene, example: np.ndarray
 ) -> Iterator[tuple[str, float, np.ndarray]]:
     """Errors of the recorded linear channels by a slope and by a curvature of the lamp's spectrum, to which
-    the white is balanced."""
-    sensor, extension = np.asarray(view.data.sensor), extended(view, values)
+    the white is balanced; simulated as at the values of an `example`."""
+    sensor, extension = np.asarray(view.data.sensor), extended(view, example)
     position = np.linspace(-1, 1, len(sensor))[:, None]
     for name, shape in (("slope of the lamp", position), ("curvature of the lamp", 2 * position**2 - 1)):
         if size := scene.uncertainty.lamp:
@@ -256,37 +260,3 @@ def accuracy(view: ColoursView, sigma: float) -> Accuracy:
     """The residuals, in units of the median `sigma` of the data, that no camera makes."""
     span = 100.0 if view.encoding.mix[0, 1] else 1.0  # L*, a*, b*
     return Accuracy(largest=LARGEST * span / sigma)
-
-
-def with_probabilities(
-    rivals: tuple[Rival, ...], ranked: RankedMinima, discrepancy: Discrepancy
-) -> tuple[tuple[Rival, ...], float]:
-    """The rivals with their share of the posterior and the standard errors there, the most probable first,
-    and the share of the best minimum.
-
-    Orders of interference that the data do not tell apart are weighed by their normal approximations: the
-    share is ∝ exp(−Δχ²/2) |C|^½, with C the covariance of the parameters there and Δχ² as the `discrepancy`
-    lets it count (D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5).
-    """
-    problem, minima = ranked.problem, ranked.minima
-    count, variance = len(problem.parameters), [fit.variance for fit in ranked.fits]
-    span = np.asarray(problem.box.upper) - np.asarray(problem.box.lower)
-    log = -0.5 * discrepancy.evidence_share * (minima.deviance - minima.deviance[0])
-    stderr = np.empty((len(log), count))
-    for i, unit in enumerate(minima.units):
-        values = np.asarray(problem.values(unit))
-        at = [view.local(problem.seen_by(view, values)) for view in problem.views]
-        information = np.linalg.inv(errors(scaled(problem, unit, at, variance)).covariance[:count, :count])
-        # a parameter that the data do not see is known to its bounds
-        information += np.diag(12 / span**2)
-        stderr[i] = np.sqrt(np.diag(np.linalg.inv(information)))
-        log[i] -= 0.5 * np.linalg.slogdet(information)[1]
-    share = np.exp(log - log.max())
-    share /= share.sum()
-    # the rivals are the minima after the first
-    rows = zip(rivals, share[1:].tolist(), stderr[1:].tolist(), strict=False)
-    weighed = [
-        replace(rival, probability=probability, stderr=dict(zip(rival.parameters, errors_there, strict=True)))
-        for rival, probability, errors_there in rows
-    ]
-    return tuple(sorted(weighed, key=lambda rival: -(rival.probability or 0.0))), float(share[0])

@@ -26,19 +26,21 @@ SCATTER_OF_NOISE = 2.9
 median absolute value of second differences of normal noise (simulated: 2.8 to 3.1 at 50 to 1000 points)."""
 
 
-def evidence(spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+def evidence(
+    spectra: Sequence[Target], ranked: RankedMinima, jacobian: Scaled, planned: np.ndarray
+) -> list[Evidence]:
     """Evidence of each spectrum, and of colours, at the best of the ranked minima.
 
-    `jacobian` is the scaled one there.
+    `jacobian` is the scaled one there. Effects are simulated as at `planned` values of the parameters.
     """
     views, fits, result = ranked.problem.views, ranked.fits, []
     blocks = jacobian.blocks([view.points for view in views], [fit.variance for fit in fits])
     for spectrum, view, fit, block in zip(spectra, views, fits, blocks, strict=True):
-        values = ranked.problem.seen_by(view, ranked.values)
+        values, example = (ranked.problem.seen_by(view, x) for x in (ranked.values, planned))
         if isinstance(spectrum, MeasuredColours):
-            result.append(colours_evidence(view, values, fit.at, spectrum, block))
+            result.append(colours_evidence(view, values, fit.at, spectrum, block, example))
         else:
-            effects = systematic_effects(view, values, fit.at, spectrum.scene)
+            effects = systematic_effects(view, values, fit.at, spectrum.scene, example)
             result.append(spectrum_evidence(view, fit.at, block, effects))
     return result
 
@@ -94,6 +96,7 @@ def spectrum_evidence(view: SpectrumView, at: Local, block: np.ndarray, effects:
         DRIFT_CORRELATION if view.noise.drifting else 1.0,
         0.0 if view.noise.known else SCATTER_OF_NOISE / math.sqrt(view.rows),
         _signals(view) if view.signal.degrees and view.signal.parts else (),
+        unit[..., None, :],
         exact,
     )
 

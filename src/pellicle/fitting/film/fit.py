@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -25,7 +26,7 @@ from pellicle.fitting.film import (
     parts,
     summary,
 )
-from pellicle.fitting.film.colour_measurements import measured_colours, with_probabilities
+from pellicle.fitting.film.colour_measurements import measured_colours
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.index_curves import IndexCurves, index_curves
 from pellicle.fitting.film.problem import make
@@ -178,24 +179,21 @@ def _fit(
     began = time.perf_counter()
     targets, ranked, wider = _searched(targets, tolerance, loss, progress)
     progress("errors", 0, 1)
-    films, profile = FilmMeasurements(data, targets, ranked), summary.scan_profile(ranked)
-    depth = ranked.problem.thickness_axis
-    scans = {} if profile is None or depth is None else {depth: profile}
-    judged = assemble(films, began, scans=scans, binding=wider.binding)
+    measured_by = partial(FilmMeasurements, data, targets)
+    judged = assemble(measured_by, ranked, began, scans=summary.scans, binding=wider.binding)
     curves = index_curves(judged, targets) if other_curves else None
     judged = judged if curves is None else curves.applied(judged)
-    parameters, drifts = with_sweeps(data, ranked, judged.jacobian, judged.conclusion.parameters)
-    rivals, probability = judged.conclusion.rivals, None
-    if any(isinstance(view, ColoursView) for view in ranked.problem.views):
-        rivals, probability = with_probabilities(rivals, ranked, judged.discrepancy)
+    films, ranked = judged.best.data, judged.best.ranked
+    parameters, drifts = with_sweeps(data, ranked, judged.best.jacobian, judged.conclusion.parameters)
+    rivals, colours = judged.conclusion.rivals, any(isinstance(x, ColoursView) for x in ranked.problem.views)
     dark = summary.opaque(targets, ranked)
     unclear = [
         *drifts,
         *summary.unexplained_depolarisation(data, targets, ranked.problem.views),
         # the few residuals of colours have a cause in any case, where they are noise
         *(
-            likely_cause(judged.discrepancy, ranked.problem.parameters)
-            if probability is None or judged.missed
+            likely_cause(judged.best.discrepancy, ranked.problem.parameters)
+            if judged.missed or not colours
             else []
         ),
         *default_bounds.remarks(ranked, wider.binding),
@@ -207,11 +205,10 @@ def _fit(
         verdict=_verdict(films, judged, parameters, rivals, dark, curves),
         parameters=parameters,
         rivals=parts.with_curves(rivals, judged.parts, ranked),
-        probability=probability,
         rms=parts.together(judged.parts),
         warnings=(*wider.warnings, *summary.warnings(films, unclear)),
-        profile=profile,
-        budget=budget(judged.discrepancy, ranked.problem.parameters),
+        profile=next(iter(judged.scans.values()), None),
+        budget=budget(judged.best.discrepancy, ranked.problem.parameters),
         scene=targets[0].scene if len(targets) == 1 else tuple(target.scene for target in targets),
     )
     return fit, ranked

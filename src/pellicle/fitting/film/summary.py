@@ -73,9 +73,9 @@ class FilmMeasurements:
         views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
         return [residual_structure.missed(view, fit) for view, fit in views]
 
-    def evidence(self, jacobian: Scaled) -> list[Evidence]:
-        """Residuals of each view and what may explain them."""
-        return evidence(self.targets, self.ranked, jacobian)
+    def evidence(self, at: RankedMinima, jacobian: Scaled) -> list[Evidence]:
+        """Residuals of each view and what may explain them `at` a minimum."""
+        return evidence(self.targets, at, jacobian, self.ranked.values)
 
     def parts(self, discrepancy: Discrepancy) -> tuple[Part, ...]:
         """One part for each measurement."""
@@ -134,20 +134,23 @@ def unlimited(limits: Limits, ranked: RankedMinima, which: Any) -> Limits:
     return Limits(np.where(depth, np.inf, limits.stderr), *(np.where(depth, np.nan, x) for x in limits[1:]))
 
 
-def scan_profile(ranked: RankedMinima) -> Profile | None:
-    """The scan against thickness, in χ² on the effective points; None where no thickness is free."""
-    scan = ranked.minima.scan
-    if scan is None:
-        return None
+def scans(ranked: RankedMinima, raised: Sequence[Any]) -> dict[int, Profile]:
+    """The scan against the thickness at its position, in χ² on the effective points; none without a free
+    one. `raised` of each view multiplies its χ² further."""
+    scan, depth = ranked.minima.scan, ranked.problem.thickness_axis
+    if scan is None or depth is None:
+        return {}
     ratio = []
     for before, after in zip(ranked.searched.views, ranked.problem.views, strict=True):
         old, new = before.data, after.data
         # a robust loss lowers the weights of some points
-        raised = np.max(new.weight / np.where(old.weight > 0, old.weight, np.inf))
-        ratio.append(float(raised**2 * new.independent_fraction / old.independent_fraction))
-    above = (scan.deviance * ratio).sum(-1).min(axis=0) / student(ranked.freedom, RIVAL) ** 2
+        more = np.max(new.weight / np.where(old.weight > 0, old.weight, np.inf))
+        ratio.append(float(more**2 * new.independent_fraction / old.independent_fraction))
+    above = (scan.deviance * np.multiply(ratio, raised)).sum(-1).min(axis=0) / student(
+        ranked.freedom, RIVAL
+    ) ** 2
     # on their new weights several views together may have their least misfit elsewhere in the scan
-    return Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))
+    return {depth: Profile(scan.thickness, np.minimum(above - min(above.min(), 0.0), _RULED_OUT))}
 
 
 def bounded_by_drift(limits: Limits, ranked: RankedMinima, least: Any) -> Limits:

@@ -61,13 +61,16 @@ class SimulatedEffect(NamedTuple):
         return Effect(*about, self.power, self.positive, self.shared, self.material)
 
 
-def systematic_effects(view: SpectrumView, values: np.ndarray, at: Local, scene: Scene) -> list[Effect]:
+def systematic_effects(
+    view: SpectrumView, values: np.ndarray, at: Local, scene: Scene, example: np.ndarray
+) -> list[Effect]:
     """Every effect to which the `scene` gives an uncertainty, at `values` (the parameters of the view,).
 
-    `at` is the local model there. What the scene describes itself, free or fixed, is no effect.
+    `at` is the local model there, and simulations are planned as at the values of an `example`. What
+    the scene describes itself, free or fixed, is no effect.
     """
     result = []
-    for row, weights, own in simulated_effects(view, values, scene):
+    for row, weights, own in simulated_effects(view, values, scene, example):
         change = change_of_data(view, at, weights @ own)
         if view.signal.depolarisation:
             change[:, -1] = _depolarising(view, at, own, weights)
@@ -90,13 +93,14 @@ def named_for(effects: list[Effect], name: str) -> list[Effect]:
 
 
 def simulated_effects(
-    view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene
+    view: SpectrumView | ColoursView, values: np.ndarray, scene: Scene, example: np.ndarray
 ) -> list[tuple[SimulatedEffect, np.ndarray, np.ndarray]]:
-    """Every effect that is simulated, with weights (signals,) and signals (signals, data values).
+    """Every effect that is simulated at `values`, planned as at those of an `example`, with weights
+    (signals,) and signals (signals, data values).
 
     The weighted sum of the signals is the change by the effect.
     """
-    simulations = simulations_of(view, values, scene)
+    simulations = simulations_of(view, example, scene)
     if not simulations:
         return []
     extension, every = simulations

@@ -1,0 +1,198 @@
+"""Marginal likelihood of minima: nuisances and systematic effects integrated out.
+
+A rival explains data with a wavelength scale a little off, or a lamp, as well as the best minimum does. So
+both are compared with all effects allowed for, each by the linear model at its own place, and with one noise:
+that which the discrepancy of the best leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pellicle.fitting.covariance import Errors, Scaled
+from pellicle.fitting.discrepancy import Discrepancy, Evidence, System, discrepancy
+from pellicle.fitting.noise import student
+from pellicle.fitting.normal_equations import Normal, held_within, times
+from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
+from pellicle.fitting.robust_losses import median
+from pellicle.fitting.status import RIVAL
+
+_REACH = 3.0
+"""Total errors of the best minimum by which the parameters of any may move with the effects."""
+_UNIFORM = 12.0
+"""Inverse variance of a parameter of which the data see nothing, in units of its range."""
+_LINEAR = 4.0
+"""Factor by which effects may explain more at a rival than at the best minimum."""
+_ROUNDS = 3
+
+
+class Marginal(NamedTuple):
+    """−2 ln of the marginal likelihood of minima (...), each at its best parameters, and ln of their shares
+    of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there.
+
+    `explained` (...) is by how much the effects may lower a deviance, as a factor.
+    """
+
+    deviance: Any
+    log_share: Any
+    stderr: np.ndarray
+    explained: Any
+
+
+def marginal(
+    evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray, allowed: Discrepancy
+) -> Marginal:
+    """The marginal likelihood at `unit` (..., parameters) of the unit cube by the evidence there.
+
+    `allowed` is the discrepancy of the best minimum, whose noise counts.
+
+    **Source:** C. Bishop, 2006, Pattern Recognition and Machine Learning, section 3.5; shares by the normal
+    approximation of D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5.
+    """
+    pairs = zip(evidence, allowed.raised, strict=True)
+    system = System([view._replace(sigma=1 / (view.weights * by)) for view, by in pairs], scaled, unit)
+    known, count, fits = system.known, np.shape(unit)[-1], system.fits
+    pull = np.array(np.broadcast_to(scaled.pull, (*system.lead, known))).reshape(fits, known)
+    rows = [system.rows(i) for i in range(len(evidence))]
+    data = [(view.residual / view.sigma).reshape(fits, -1) for view in system.views]
+    matrix, right = system.precision.copy(), np.zeros(system.lower.shape)
+    right[:, :known] = -times(np.swapaxes(system.priors, 1, 2), pull)
+    for own, values in zip(rows, data, strict=True):
+        matrix += own @ np.swapaxes(own, 1, 2)
+        right += times(own, values)
+
+    def stacked(fit: int) -> tuple[np.ndarray, np.ndarray]:
+        prior, at = system.prior_rows(fit)
+        at[:known] = -pull[fit]
+        return np.vstack([*(own[fit].T for own in rows), prior]), np.hstack([*(x[fit] for x in data), at])
+
+    stretch = scaled.stretch.reshape(fits, known, known)
+    steps = np.abs(np.linalg.pinv(stretch)) @ np.broadcast_to(allowed.total, (fits, known))[..., None]
+    reach = _REACH * steps[:, :count, 0]
+    lower, upper = system.lower.copy(), system.upper.copy()
+    lower[:, :count] = np.maximum(lower[:, :count], -reach)
+    upper[:, :count] = np.minimum(upper[:, :count], reach)
+    solution = held_within(*Normal(matrix, right, stacked).solved(), lower, upper)
+    left = [x - times(np.swapaxes(own, 1, 2), solution) for own, x in zip(rows, data, strict=True)]
+    chi2 = sum(np.sum(x**2, axis=1) for x in left) + np.sum(solution[:, known:] ** 2, axis=1)
+    chi2 += np.sum((times(system.priors, solution[:, :known]) + pull) ** 2, axis=1)
+    linear, across = matrix[:, count:, count:], matrix[:, count:, :count]
+    deviance = chi2 + np.linalg.slogdet(linear)[1]
+    information = matrix[:, :count, :count] - np.swapaxes(across, 1, 2) @ np.linalg.solve(linear, across)
+    covariance = np.linalg.inv(information + _UNIFORM * np.eye(count))
+    slope = stretch[:, :count, :count]
+    area = np.linalg.slogdet(slope)[1]  # none in the middle of a disc of directions
+    log_share = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1] + np.where(area > -np.inf, area, 0.0)
+    stderr = np.sqrt(np.einsum("pij,pjk,pik->pi", slope, covariance, slope))
+    effects = matrix[:, known:, known:]
+    explained = np.linalg.eigvalsh(effects)[:, -1] if effects.size else np.ones(fits)
+    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr, explained)))
+
+
+class Ranking(NamedTuple):
+    """Ranked minima of one fit, the best with the effects integrated out in front, and what `data` say there.
+
+    `delta_chi2` (minima,) is twice the fall of the marginal likelihood's logarithm, `share` (minima,) that of
+    the posterior, and `stderr` (minima, parameters) are the standard errors at each. Of a minimum that
+    effects of ordinary size cannot turn the first is that of the noise, the others are 0 and NaN.
+    """
+
+    data: Any
+    ranked: RankedMinima
+    jacobian: Scaled
+    discrepancy: Discrepancy
+    delta_chi2: np.ndarray
+    share: np.ndarray
+    stderr: np.ndarray
+
+    def evidence(self) -> list[Evidence]:
+        """Residuals of each view at the best minimum and what may explain them."""
+        return self.data.evidence(self.ranked, self.jacobian)
+
+
+def ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Ranking:
+    """Rank the minima of one fit by their marginal likelihood.
+
+    `make` returns the measurements of ranked minima. Where another minimum than the first is the best it
+    becomes the first, whose noise then counts.
+    """
+    result = _ranking(make, ranked)
+    for _ in range(_ROUNDS):
+        if (best := int(np.argmin(result.delta_chi2))) == 0:
+            break
+        again = _ranking(make, led_by(result.ranked, best))
+        if np.argmin(again.delta_chi2) != 0:
+            break
+        result = again
+    order = np.argsort(result.delta_chi2, kind="stable")
+    order = np.array([0, *order[order != 0]])
+    minima = result.ranked.minima
+    columns = {name: getattr(minima, name)[order] for name in ("units", "deviance", "converged")}
+    about = {name: getattr(result, name)[order] for name in ("delta_chi2", "share", "stderr")}
+    about["delta_chi2"] = np.maximum(about["delta_chi2"], 0.0)
+    return result._replace(ranked=replace(result.ranked, minima=replace(minima, **columns)), **about)
+
+
+def _ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Ranking:
+    data, units = make(ranked), ranked.minima.units
+    jacobian = linearised(ranked)[0]
+    evidence = data.evidence(ranked, jacobian)
+    allowed = discrepancy(evidence, jacobian, units[0])
+    best = marginal(evidence, jacobian, units[0], allowed)
+    delta = above_best(ranked, allowed.evidence_share)
+    log_share, stderr = np.full(len(units), -np.inf), np.full(units.shape, np.nan)
+    log_share[0], stderr[0] = best.log_share, best.stderr
+    for i in range(1, len(units)):
+        if delta[i] > RIVAL * (1 + _LINEAR * best.explained):
+            continue
+        own = at_minimum(ranked, i)
+        slopes = linearised(own)[0]
+        there = marginal(data.evidence(own, slopes), slopes, units[i], allowed)
+        delta[i] = (there.deviance - best.deviance) / np.asarray(student(ranked.freedom, RIVAL)) ** 2
+        log_share[i], stderr[i] = there.log_share, there.stderr
+    share = np.exp(log_share - log_share.max())
+    return Ranking(data, ranked, jacobian, allowed, delta, share / share.sum(), stderr)
+
+
+def above_best(ranked: RankedMinima, share: Any) -> np.ndarray:
+    """Δχ² (..., minima) of the minima on the effective points, by the noise.
+
+    Of a difference in χ² only a `share` (...) is evidence where residuals are larger than noise. Where few
+    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
+    """
+    deviance = ranked.minima.deviance
+    wider = np.asarray(student(ranked.freedom, RIVAL))[..., None]
+    return np.asarray(share)[..., None] * np.maximum(deviance - deviance[..., :1], 0.0) / wider**2
+
+
+def gains(allowed: Discrepancy) -> list[Any]:
+    """Factors (...) of each view on χ² in the ranking, 1 or more: the residuals count for what remains where
+    effects explain much of them.
+
+    Residuals of a level that is off are as large as that, and correlated over all points: neither is noise.
+    """
+    return [np.maximum(median(raised, (-2, -1)) ** 2, 1.0) for raised in allowed.raised]
+
+
+def by_remaining(ranked: RankedMinima, allowed: Discrepancy) -> RankedMinima:
+    """Ranked minima whose points count with these gains in the covariance, or as much as they did."""
+    rows = zip(ranked.problem.views, ranked.fits, gains(allowed), strict=True)
+    fits = [
+        replace(fit, variance=np.minimum(fit.variance, 1 / (gain * view.independent_fraction)))
+        for view, fit, gain in rows
+    ]
+    return replace(ranked, fits=tuple(fits))
+
+
+def with_shift(covariance: Errors, allowed: Discrepancy) -> Errors:
+    """Errors of one fit about its own values, which a posterior with the effects does not lie around.
+
+    `covariance` is by the noise. The curvature is that of the posterior: with effects, or of uneven noise.
+    """
+    own = allowed.errors if covariance.curvature is None else covariance
+    wider = own.covariance + np.outer(allowed.shift, allowed.shift)
+    return replace(covariance, covariance=wider, curvature=own.by_curvature)
