@@ -63,7 +63,7 @@ def test_weak_fringes_on_a_level_that_is_off_determine_the_film():
 
 
 def test_shares_of_orders_are_those_of_the_posterior():
-    """Noise near the size of the fringes, no effects: against the likelihood on a fine grid of thicknesses, integrated."""
+    """Noise near the size of fringes, no effects: against the likelihood on a fine grid, integrated."""
     noise = 6e-3
     clean = pl.simulate(pl.Scene(pl.Layer(1.48, 3000.0), "SiO2"), wavelength=NM, noise=noise, seed=2)
     data = pl.Spectrum(NM, clean.values, "R", sigma=np.full(NM.shape, noise))

@@ -142,7 +142,7 @@ def _fit(
         parameters=parameters,
         rivals=summary.with_curves(judged.conclusion.rivals, ranked.problem),
         rms=rms,
-        budget=budget(judged.discrepancy, ranked.problem.parameters),
+        budget=budget(judged.best.discrepancy, ranked.problem.parameters),
         warnings=(*notes, *_warnings(samples, surface, judged, status, parameters)),
         scene=surface,
         layer_test=LayerTest(layer.layered, errors["layer"], baselines, residual),
