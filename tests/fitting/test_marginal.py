@@ -75,7 +75,7 @@ def test_shares_of_orders_are_those_of_the_posterior():
     density /= density.sum()
     orders = {fit["thickness"].value: fit.probability}
     orders |= {r.parameters["thickness"]: r.probability or 0.0 for r in fit.rivals}
-    likely = {thickness: share for thickness, share in orders.items() if share > 0.1}
+    likely = {thickness: share for thickness, share in orders.items() if share > 0.05}
     assert len(likely) > 1
     for thickness, share in likely.items():
         assert share == pytest.approx(density[np.abs(grid - thickness) < 100].sum(), abs=0.05)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.batch.data import CODES
-from pellicle.fitting.comparison import compare
+from pellicle.fitting.comparison import Candidate, Comparison
 from pellicle.fitting.result import Estimate, Rival
 from pellicle.recipes.read import read_recipe
 from pellicle.reporting.comparison import comparison_page
@@ -239,7 +239,9 @@ def test_the_page_of_a_map_has_figures_and_tables():
 def test_the_best_of_a_comparison_is_first_and_the_others_curves_can_be_shown(fit, with_part):
     missing = replace(fit.curve, model=fit.curve.model + 0.02)
     worse = replace(with_part(fit, curve=missing), rivals=())
-    page = Page(comparison_page(compare({"<b>a.toml": worse, "b c.toml": fit}), ["a/report.html", None]))
+    pairs = (("<b>a.toml", worse, 30.0), ("b c.toml", fit, 0.0))
+    comparison = Comparison(tuple(Candidate(name, x, 1, d, d + 2, d + 3) for name, x, d in pairs), 20.0)
+    page = Page(comparison_page(comparison, ["a/report.html", None]))
     assert not page.open
     figure = page.figures["data-0"]
     [curve, residual] = figure["rivals"][0]

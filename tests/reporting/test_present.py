@@ -8,7 +8,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.accuracy.registry import Comparison, Cost, Result
-from pellicle.fitting.comparison import compare
+from pellicle.fitting import comparison as fits
 from pellicle.reporting.fit_text import report as fit_report
 from pellicle.sampling.chain import Checks
 from pellicle.sampling.density import mixture
@@ -84,7 +84,10 @@ def test_a_posterior_reports_draws_and_saves_itself(posterior, tmp_path):
 
 def test_a_comparison_reports_and_saves_itself(fit, with_part, tmp_path):
     worse = with_part(fit, curve=replace(fit.curve, model=fit.curve.model + 0.01))
-    comparison = compare({"one": fit, "two": worse})
+    pairs = (("one", fit, 0.0), ("two", worse, 30.0))
+    comparison = fits.Comparison(
+        tuple(fits.Candidate(name, x, 1, d, d + 2, d + 3) for name, x, d in pairs), 20.0
+    )
     assert comparison.report() == pl.report(comparison)
     assert comparison._repr_html_().startswith("<pre>[[Verdict]]")
     comparison.save(tmp_path / "out")

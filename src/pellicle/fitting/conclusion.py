@@ -316,17 +316,20 @@ def conclude(
     about = ranked, covariance, discrepancy, above, around, flat
     numbers = verdicts(*about, misfit=np.array(misfit), binding=binding, amend=amend)
     names = [p.name for p in ranked.problem.parameters]
-    columns = points, above[1:], best.share[1:], best.stderr[1:]
+    columns = (x.tolist() for x in (points, above[1:], best.share[1:], best.stderr[1:]))
+    sole = best.share[0] == 1.0
     rivals = tuple(
-        Rival(dict(zip(names, at, strict=True)), delta)
-        if share == 0.0
-        else Rival(dict(zip(names, at, strict=True)), delta, share, dict(zip(names, stderr, strict=True)))
-        for at, delta, share, stderr in zip(*(column.tolist() for column in columns), strict=False)
+        Rival(
+            dict(zip(names, at, strict=True)),
+            delta,
+            None if sole else share,
+            None if share == 0.0 else dict(zip(names, stderr, strict=True)),
+        )
+        for at, delta, share, stderr in zip(*columns, strict=False)
         if delta < _RULED_OUT
     )
     parameters = estimates(ranked, numbers, covariance, discrepancy, fixed)
     correlated = identifiability.correlated(best.jacobian, parameters)
-    sole = all(rival.probability is None for rival in rivals)
     probability = None if sole else float(best.share[0])
     return Conclusion(ORDER[numbers.status.position], parameters, rivals, probability, correlated)
 

@@ -167,7 +167,7 @@ class Discrepancy:
     implausible: Any
     evidence_shares: tuple[Any, ...]
     evidence_share: Any
-    raised: tuple[np.ndarray, ...]
+    raised: tuple[np.ndarray, ...] = ()
 
     @property
     def total(self) -> np.ndarray:
@@ -200,7 +200,9 @@ def discrepancy(
     weights = [view.data.shape[1] for view in balance.views]
     by_noise = system.by_noise(noises) if contributions else system
     plain = balance if by_noise is system else _Balance(by_noise)
-    counted = list(zip(by_noise.views, plain.views, strict=True))
+    # the σ of a drifting lamp is no noise
+    pairs = zip(views, zip(by_noise.views, plain.views, strict=True), strict=True)
+    counted = [own if own[0].least == 1.0 else drifting for own, drifting in pairs]
     shares = [_evidence_share(*view) for view in counted]
     return Discrepancy(
         errors=Errors(scaled.names, covariance),

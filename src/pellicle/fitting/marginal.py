@@ -27,6 +27,10 @@ _UNIFORM = 12.0
 """Inverse variance of a parameter of which the data see nothing, in units of its range."""
 _LINEAR = 4.0
 """Factor by which effects may explain more at a rival than at the best minimum."""
+_CLEAR = 20.0
+"""Δχ² by which another minimum than the best by noise must be better to take its place."""
+_MUCH = 4.0
+"""Least factor on χ² that chance does not make."""
 _ROUNDS = 3
 
 
@@ -117,15 +121,16 @@ class Ranking(NamedTuple):
 def ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Ranking:
     """Rank the minima of one fit by their marginal likelihood.
 
-    `make` returns the measurements of ranked minima. Where another minimum than the first is the best it
-    becomes the first, whose noise then counts.
+    `make` returns the measurements of ranked minima. Where another minimum than the first is clearly better
+    it becomes the first, whose noise then counts.
     """
     result = _ranking(make, ranked)
     for _ in range(_ROUNDS):
-        if (best := int(np.argmin(result.delta_chi2))) == 0:
+        best = int(np.argmin(result.delta_chi2))
+        if result.delta_chi2[best] > -_CLEAR:
             break
         again = _ranking(make, led_by(result.ranked, best))
-        if np.argmin(again.delta_chi2) != 0:
+        if again.delta_chi2.min() < -_CLEAR:
             break
         result = again
     order = np.argsort(result.delta_chi2, kind="stable")
@@ -175,15 +180,20 @@ def gains(allowed: Discrepancy) -> list[Any]:
 
     Residuals of a level that is off are as large as that, and correlated over all points: neither is noise.
     """
-    return [np.maximum(median(raised, (-2, -1)) ** 2, 1.0) for raised in allowed.raised]
+    every = [median(raised, (-2, -1)) ** 2 for raised in allowed.raised]
+    return [np.where(gain > _MUCH, gain, 1.0) for gain in every]
 
 
 def by_remaining(ranked: RankedMinima, allowed: Discrepancy) -> RankedMinima:
-    """Ranked minima whose points count with these gains in the covariance, or as much as they did."""
-    rows = zip(ranked.problem.views, ranked.fits, gains(allowed), strict=True)
+    """Ranked minima whose points count with these gains in the covariance, or as much as they did.
+
+    Where a lamp drifts that is no noise to be small: errors by noise stay those of its σ.
+    """
     fits = [
-        replace(fit, variance=np.minimum(fit.variance, 1 / (gain * view.independent_fraction)))
-        for view, fit, gain in rows
+        fit
+        if view.noise.drifting
+        else replace(fit, variance=np.minimum(fit.variance, 1 / (gain * view.independent_fraction)))
+        for view, fit, gain in zip(ranked.problem.views, ranked.fits, gains(allowed), strict=True)
     ]
     return replace(ranked, fits=tuple(fits))
 

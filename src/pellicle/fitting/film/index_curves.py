@@ -181,7 +181,7 @@ class _Fits(NamedTuple):
 
 def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | None:
     """The curves of n and k about the best of the ranked minima; None where no absorbing index is free."""
-    scene, ranked, old = targets[0].scene, judged.ranked, judged.ranked.problem
+    scene, ranked, old = targets[0].scene, judged.best.ranked, judged.best.ranked.problem
     medium, shown = reported_medium(scene), reported_layer(scene)
     formula = isinstance(medium, KramersKronigSpline | Oscillators | CauchyUrbach | Spline)
     known = [t.wavelength for t in targets if isinstance(t, Measured)]
@@ -205,7 +205,7 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     above, further, thickness, curves = (np.concatenate(x) for x in zip(*found, strict=True))
     # residuals that no curve explains are no noise either
     left = ranked.chi2_reduced + above.min() / sum(fit.freedom for fit in ranked.fits)
-    share = min(float(judged.discrepancy.evidence_share), 1 / max(left, 1.0))
+    share = min(float(judged.best.discrepancy.evidence_share), 1 / max(left, 1.0))
     above = share / student(ranked.freedom, RIVAL) ** 2 * above + further
     close = above - above.min() < RIVAL
     close[0] = True
