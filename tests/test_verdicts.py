@@ -16,7 +16,10 @@ from .by_tmm import films, ncs
 HERE = Path(__file__).parents[1] / "benchmarks" / "verdicts"
 
 
-NAMES = "transfer_matrix media measurement family families flaws wrong_scenes undecidable detectability suite"
+NAMES = (
+    "transfer_matrix media measurement family families flaws wrong_scenes undecidable detectability causes"
+    " suite"
+)
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,7 @@ from typing import Any
 import absorbers
 import single_colours
 import surfaces
+from causes import score
 from scoring import Answer, changes, failures, goals, read_csv, table, write_csv
 from suite import SEED, Case, Measured, cases, measured, short
 
@@ -47,7 +48,7 @@ def fitted(data: Any, scene: Any, **about: Any) -> Answer:
     except ValueError as error:  # DataError and UsageError too: data that pellicle refuses to fit
         status, verdict = "error", str(error)
     else:
-        found = fit["thickness"]
+        found = next(p for p in fit.free if p.name.endswith("thickness"))
         value, stderr = found.value, found.stderr
         noise = getattr(found, "stderr_noise", None) or stderr
         status, verdict, warnings = str(fit.status), fit.verdict, " / ".join(fit.warnings)
@@ -165,6 +166,7 @@ def main() -> None:
         return
     print("\n" + table(answers) + "\n\n" + "\n".join(goals(answers)))
     print(failures(answers))
+    print("\n" + score(answers))
     if asked.out is not None:
         write_csv(answers, asked.out)
     if asked.compare is not None:

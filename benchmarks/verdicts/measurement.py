@@ -77,10 +77,15 @@ class Conditions:
     depolarisation: float = 0.0
     spikes: tuple[tuple[int, float], ...] = ()  # row and height in standard deviations of the noise
     reverse: bool = False  # values in the wrong order of wavelengths
+    reference: Index | None = None  # bare substrate relative to which R is recorded
+    collected: float = 1.0  # share of the light from the back face
+    convention: str = ""  # of Δ, as "360 - delta"
 
     def __str__(self) -> str:
         said = [(f.name, getattr(self, f.name)) for f in fields(self) if getattr(self, f.name) != f.default]
-        return ", ".join(f"{name} {_short(value)}" for name, value in said if name != "interlayer")
+        return ", ".join(
+            f"{name} {_short(value)}" for name, value in said if name not in ("interlayer", "reference")
+        )
 
 
 def _short(value: Any) -> str:
@@ -102,7 +107,7 @@ def seen(stack: Stack, conditions: Conditions, bandwidth: float, view: View) -> 
     nm = (wavelength + offsets[:, None])[:, None, None, :]
     d = (math.sqrt(3) * conditions.spread * depths)[:, None, None]
     theta = np.deg2rad(view.angle + conditions.angle_error + angles[:, None])
-    values = _intensities(_flawed(stack, conditions), nm, d, np.sin(theta), view)
+    values = _intensities(_flawed(stack, conditions), nm, d, np.sin(theta), view, conditions.collected)
     mean = np.einsum("...abcw,a,b,c->...w", values, weights, depth_weights / 2, angle_weights)
     return mean[:3] / mean[3] if view.signal == "psi-delta" else mean
 
@@ -167,7 +172,7 @@ def _flawed(stack: Stack, conditions: Conditions) -> Stack:
 
 
 def _intensities(
-    stack: Stack, nm: np.ndarray, deeper: np.ndarray, sine: np.ndarray, view: View
+    stack: Stack, nm: np.ndarray, deeper: np.ndarray, sine: np.ndarray, view: View, collected: float
 ) -> np.ndarray:
     """R, T or the four Stokes sums; axes: window, thickness, ray, point."""
     indices = [1.0 + 0j, *(index(nm) for index, _ in stack.layers), stack.substrate(nm)]
@@ -179,7 +184,8 @@ def _intensities(
     letters = {"unpolarised": "sp", "s": "s", "p": "p"}[view.polarisation]
     if not np.any(sine):
         letters = "s"  # s and p are the same
-    values = [power(nm, sine, indices, thicknesses, p, plate_mm=stack.plate_mm)[which] for p in letters]
+    plate = {"plate_mm": stack.plate_mm, "collected": collected}
+    values = [power(nm, sine, indices, thicknesses, p, **plate)[which] for p in letters]
     return np.mean(values, axis=0)
 
 
@@ -193,6 +199,9 @@ def recorded_power(signal: np.ndarray, conditions: Conditions, view: View) -> np
         signal = signal * (1 + c.drift * shape / np.abs(shape).max())
     signal = np.where(view.wavelength > c.step_at, 1 + c.step, 1.0) * signal
     signal = c.factor * signal + c.offset
+    if c.reference is not None:
+        sine = np.sin(np.deg2rad(view.angle))
+        signal = signal / power(view.wavelength, sine, [1.0, c.reference(view.wavelength)], [], "s")[0]
     return signal[::-1] if c.reverse else signal
 
 
@@ -210,4 +219,5 @@ def recorded_angles(ncs: np.ndarray, conditions: Conditions) -> np.ndarray:
     delta = np.rad2deg(plain) + conditions.delta_offset
     if conditions.reverse:
         psi, delta = psi[::-1], delta[::-1]
-    return np.stack([psi, delta])
+    conventions = {"360 - delta": 360 - delta, "180 - delta": 180 - delta}
+    return np.stack([psi, conventions.get(conditions.convention, delta)])

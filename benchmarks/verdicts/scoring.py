@@ -14,7 +14,7 @@ FIRM = "converged"
 """Status of an answer that pellicle vouches for; every other one is a refusal."""
 RIGHT = 0.01
 """Relative error of a thickness that is right."""
-GROUPS = ("clean", "flawed", "budget-only", "hidden", "wrong", "undecidable", "brdf", "colour")
+GROUPS = ("clean", "flawed", "budget-only", "hidden", "wrong", "undecidable", "brdf", "colour", "cause")
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Answer:
     @property
     def failed(self) -> bool:
         """True for a verdict that should have been another one."""
-        if self.group in ("wrong", "undecidable"):
+        if self.group in ("wrong", "undecidable", "cause"):
             return self.firm
         if self.group == "clean":
             return not self.firm or self.outcome == "outside"

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from causes import CAUSES
 from detectability import SHOWN, bound, evidence, least_evidence, rival
 from families import FAMILIES, THIN
 from family import Family, Theta
@@ -85,7 +86,8 @@ def cases() -> list[Case]:
         for given in both
         for number in (1, 2)
     ]
-    return [*clean, *flawed, *wrong, *undecidable, *thin, *hidden]
+    caused = [Case("cause", w.name, w.family, given, wrong=w) for w in CAUSES for given in both]
+    return [*clean, *flawed, *wrong, *undecidable, *thin, *hidden, *caused]
 
 
 def short(chosen: list[Case]) -> list[Case]:
@@ -150,7 +152,7 @@ def _wrong(case: Case, wrong: WrongScene, random: np.random.Generator) -> Measur
     sigma = standard_deviations(values, noise, family.view)
     shown = least_evidence(family, values, sigma, usual)
     data = _spectrum(case, family.view, values, sigma, random)
-    group = "wrong" if shown > SHOWN else "budget-only"
+    group = case.group if shown > SHOWN else "budget-only"
     detail = f"{conditions}; thickness {stack.thickness:.4g}, noise {noise:.2g}".removeprefix("; ")
     return Measured(case, group, data, stack.thickness, np.nan, shown, detail)
 
@@ -205,5 +207,11 @@ def _spectrum(
             angle=view.angle,
         )
     return pl.Spectrum(
-        view.wavelength, noisy, view.signal, sigma=given, calibrated=not case.family.counts, angle=view.angle
+        view.wavelength,
+        noisy,
+        view.signal,
+        sigma=given,
+        polarisation=view.polarisation,
+        calibrated=not case.family.counts,
+        angle=view.angle,
     )

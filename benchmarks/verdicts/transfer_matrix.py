@@ -56,8 +56,10 @@ def power(
     polarisation: str,
     *,
     plate_mm: float | None = None,
+    collected: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """R and T of a stack; with `plate_mm` its substrate is a plate with air behind it.
+    """R and T of a stack; with `plate_mm` its substrate is a plate with air behind it, of whose reflected
+    light a share is `collected`.
 
     Light between the faces of the plate adds as intensities (Macleod, section 2.14).
     """
@@ -72,7 +74,7 @@ def power(
     depth = np.imag(np.sqrt(plate**2 - sine**2)) * plate_mm * 1e6
     passed = np.exp(-4 * np.pi * depth / wavelength)
     several = 1 - inside.R * back.R * passed**2
-    reflected = front.R + front.T * inside.T * back.R * passed**2 / several
+    reflected = front.R + collected * front.T * inside.T * back.R * passed**2 / several
     return reflected, front.T * back.T * passed / several
 
 

@@ -41,7 +41,9 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     assert {"value", "stderr", "stderr_noise", "unit", "lower", "upper", "free"} <= set(thickness)
     assert thickness["stderr"] > thickness["stderr_noise"]  # of usual instruments and samples
     assert thickness["expanded"] == pytest.approx(thickness["coverage_factor"] * thickness["stderr"])
-    assert {"effect", "uncertainty", "unit", "changes", "amount", "explains"} == set(found["budget"][0])
+    assert {"effect", "uncertainty", "unit", "changes", "amount", "explains", "carries"} == set(
+        found["budget"][0]
+    )
     assert (thickness["unit"], thickness["lower"], thickness["upper"]) == ("nm", 10, 800)
     assert {"effect", "on", "why", "error_bound"} <= set(found["plan"][0])
     assert found["correlation"]["names"] == ["thickness"]

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from pellicle.fitting.budget import budget, likely_cause
+from pellicle.fitting.budget import budget, carrier, likely_cause
 from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Contribution, Discrepancy, Effect
 from pellicle.fitting.parameter import Parameter
+from pellicle.fitting.result import Estimate
 
 DEPTH = Parameter("thickness", "thickness", "nm", 300.0, 10.0, 1000.0)
 A = Parameter("A", "A", "", 1.5, 1.2, 3.0)
@@ -56,6 +57,18 @@ def test_an_effect_far_beyond_its_ordinary_size_is_named_before_a_material():
     assert "far beyond its uncertainty of 0.05 deg" in sentence
 
 
+def test_what_refits_have_refuted_is_no_cause():
+    angle = row("angle of incidence", 0.05, "deg", 0.99, 0.489)
+    [sentence] = likely_cause(found(INDEX, OXIDE, angle), [A, DEPTH], {"angle", "index"})
+    assert sentence.startswith("native oxide")
+
+
+def test_an_index_of_another_size_than_materials_have_is_no_cause():
+    """Where an angle is wrong a substrate of 5.7 times its index may explain the residuals."""
+    far = row("index of the substrate", 0.005, "", 0.97, 4.7, material=True)
+    assert likely_cause(found(far), [A, DEPTH]) == []
+
+
 @pytest.mark.parametrize(("explains", "alone"), [(0.25, 2.0), (0.5, 20.0), (0.9, 70.0)])
 def test_noise_and_a_slit_of_no_likely_size_are_no_cause(explains, alone):
     assert likely_cause(found(row("slit", 2.0, "nm", explains, alone)), [A, DEPTH]) == []
@@ -66,3 +79,20 @@ def test_a_budget_begins_with_what_changes_the_thickness_most():
     assert [each.name for each in rows] == ["offset", "native oxide"]
     assert rows[1].changes == {"A": 0.01, "thickness": 1.0}
     assert (rows[0].uncertainty, rows[0].unit) == (0.005, "")
+
+
+@pytest.mark.parametrize(
+    ("carries", "noise", "said"),
+    [(0.9, 0.1, True), (0.5, 0.1, False), (0.9, 0.6, False)],
+)
+def test_the_effect_that_carries_the_error_is_said_with_what_shrinks_it(carries, noise, said):
+    index, scale = (
+        row("index of the layer", 0.005, "", 0.0, 0.0)._replace(carries=np.array([0.0, carries])),
+        row("scale", 0.01, "", 0.0, 0.0)._replace(carries=np.array([0.0, 0.05])),
+    )
+    lead = Estimate("thickness", 300.0, 1.0, "nm", 10, 1000, True, stderr_noise=noise)
+    sentence = carrier(budget(found(index, scale), [A, DEPTH]), lead)
+    assert bool(sentence) == said
+    if said:
+        assert sentence.startswith("index of the layer, 0.5 %, carries 1.9 of these 2 nm")
+        assert "`index_uncertainty`" in sentence

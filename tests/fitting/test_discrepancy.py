@@ -78,6 +78,17 @@ def test_an_effect_that_nobody_allows_for_moves_the_parameters():
     np.testing.assert_allclose(row.changes, [level, slope], rtol=1e-6)
 
 
+def test_what_an_effect_carries_goes_from_the_variance_where_it_is_known():
+    """One effect that residuals see in part, and one that they do not."""
+    level, bend = effect(np.full(X.size, 0.002)), Effect("bend", 1.0, "nm", (BEND + 0.01)[:, None])
+    both, _ = problem(noise(), level, bend)
+    for known, other in ((level, bend), (bend, level)):
+        [row] = [row for row in both.contributions if row.effect.name == known.name]
+        alone, _ = problem(noise(), other)
+        lost = both.errors.variance - alone.errors.variance
+        np.testing.assert_allclose(row.carries, lost, rtol=1e-5, atol=1e-12)
+
+
 def test_an_effect_is_found_at_its_size_and_share():
     structure = without_line(BEND)
     found, _ = problem(noise() + 2 * structure, effect(BEND, size=3.0))

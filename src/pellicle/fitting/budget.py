@@ -1,5 +1,6 @@
 """Uncertainty budget of a fit: the systematic effects that its errors include."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from pellicle.fitting.discrepancy import Contribution, Discrepancy
 from pellicle.fitting.misfit import other_material
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.result import SystematicEffect
+from pellicle.fitting.result import Estimate, SystematicEffect
 
 _STRUCTURE = 0.3
 """Share of the residuals' sum of squares that a named cause explains at least; noise is the rest."""
@@ -19,8 +20,18 @@ _LARGEST = 30.0
 _CLEAR, _MORE = 0.6, 0.1
 """Share of the residuals' sum of squares that an effect of no ordinary size explains at least, and how much
 more than any of ordinary size."""
+_MOST = 0.5
+"""Largest relative change that is named: what is further off has another cause, such as an angle."""
 _EXPOSURE = 0.9
 """Share of the residuals' sum of squares that a wrong exposure or calibration explains at least."""
+_CARRIES, _BEYOND_NOISE = 0.7, 2.0
+"""Share of the variance that an effect carries which is said to carry the error, and how much larger than the
+noise's that error is at least."""
+_STATED = (
+    *("angle_spread", "thickness_spread", "psi", "delta", "wavelength", "bandwidth", "angle", "scale"),
+    *("offset", "depolarisation", "index", "dispersion", "roughness", "mueller"),
+)
+"""Numbers whose uncertainty a recipe states; the first whose words are in the name of an effect counts."""
 
 
 def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[SystematicEffect, ...]:
@@ -40,8 +51,29 @@ def budget(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> tuple[S
             changes=named(row.changes),
             amount=row.amount,
             explains=row.explains,
+            carries=named(np.broadcast_to(row.carries, row.changes.shape)),
         )
         for row in rows
+    )
+
+
+def carrier(effects: Sequence[SystematicEffect], lead: Estimate) -> str:
+    """A sentence on the one effect that carries most of the error of a parameter, with what would shrink it;
+    empty where none does, or the noise is no small part."""
+    row = max(effects, key=lambda e: e.carries.get(lead.name, 0.0), default=None)
+    variance = 0.0 if row is None else row.carries.get(lead.name, 0.0)
+    if row is None or not lead.stderr > _BEYOND_NOISE * lead.stderr_noise:
+        return ""
+    if variance < _CARRIES * lead.stderr**2:
+        return ""
+    own, every = (lead.coverage_factor * min(x, lead.stderr) for x in (math.sqrt(variance), lead.stderr))
+    size = f"{row.uncertainty:.2g} {row.unit}" if row.unit else f"{100 * row.uncertainty:.2g} %"
+    key = next((key for key in _STATED if key.replace("_", " ") in row.name), "interlayer")
+    more = ", or add an angle of incidence" if key == "index" else ""
+    of = f"{every:.2g} {lead.unit}".rstrip()
+    return (
+        f"{row.name}, {size}, carries {own:.2g} of these {of}: state `{key}_uncertainty` in the recipe if it"
+        f" is known better{more}"
     )
 
 
@@ -50,11 +82,16 @@ def _lead(parameters: Sequence[Parameter]) -> int:
     return next((i for i, p in enumerate(parameters) if p.key == "thickness"), 0)
 
 
-def likely_cause(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> list[str]:
+def likely_cause(
+    discrepancy: Discrepancy, parameters: Sequence[Parameter], refuted: Iterable[str] = ()
+) -> list[str]:
     """A sentence on the effect that alone explains most of the residuals: one of ordinary size, one clearly
-    beyond that, or the index of another material; none without any."""
-    at = _lead(parameters)
-    rows, lead = discrepancy.contributions, parameters[at]
+    beyond that, or the index of another material; none without any.
+
+    Effects whose names begin with one that is `refuted` by a refit are not the cause, nor is a relative one
+    of more than `_MOST`."""
+    at, others = _lead(parameters), tuple(refuted)
+    rows, lead = [c for c in discrepancy.contributions if not _ruled_out(c, others)], parameters[at]
 
     def most(some: Iterable[Contribution]) -> Contribution | None:
         return max(some, key=lambda c: c.explains, default=None)
@@ -89,6 +126,11 @@ def likely_cause(discrepancy: Discrepancy, parameters: Sequence[Parameter]) -> l
     if best is None:
         return []
     return [f"{_cause(best, at, lead)}: describe it in the scene if it is real"]
+
+
+def _ruled_out(row: Contribution, refuted: tuple[str, ...]) -> bool:
+    relative = not row.effect.unit and row.effect.power == 1
+    return row.effect.name.startswith(refuted) or bool(relative and abs(row.alone) > _MOST)
 
 
 def _cause(row: Contribution, at: int, lead: Parameter) -> str:

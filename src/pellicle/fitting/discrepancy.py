@@ -137,7 +137,8 @@ class Contribution(NamedTuple):
     `changes` (..., parameters and nuisances) are those of the fitted parameters by one standard uncertainty.
     `amount` (...) is the size at which the effect explains the residuals best, with the others at their own.
     `explains` is the share of the sum of squares that the effect alone takes from the residuals, whatever its
-    size, `alone` the size that it then has, and `shift` what that adds to the parameters.
+    size, `alone` the size that it then has, and `shift` what that adds to the parameters. `carries` (...,
+    parameters and nuisances) is what their variances would lose if the effect were known.
     """
 
     effect: Effect
@@ -146,6 +147,7 @@ class Contribution(NamedTuple):
     explains: Any
     alone: Any
     shift: np.ndarray
+    carries: Any = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -500,6 +502,8 @@ def _contributions(system: System, balance: _Balance, by_noise: _Balance) -> Ite
     known, normal, stretch = system.known, balance.normal(), system.stretch
     _, covariance = normal.of(np.arange(known)).solved()
     changes = -covariance @ normal.matrix[:, :known, known:]
+    together = balance.covariance[:, :known, known:]
+    own = np.maximum(np.einsum("pii->pi", balance.covariance)[:, known:], 1e-300)
     explains, alone, shift = by_noise.one_by_one()
     for i, effect in enumerate(system.effects):
         yield Contribution(
@@ -509,4 +513,5 @@ def _contributions(system: System, balance: _Balance, by_noise: _Balance) -> Ite
             system.led(explains[:, i]),
             system.led(effect.amount(alone[:, i])),
             times(stretch, system.led(shift[:, i])),
+            times(stretch, system.led(together[:, :, i])) ** 2 / system.led(own[:, i])[..., None],
         )

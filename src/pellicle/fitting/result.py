@@ -102,7 +102,8 @@ class SystematicEffect:
     `uncertainty` is its standard uncertainty in `unit` (relative where that is empty). `changes` are those of
     the free parameters by one of it, if nobody allows for it. `amount` is the size at which the effect
     explains the residuals best, together with all others; `explains` is the share of their sum of squares
-    that it would take away alone, whatever its size.
+    that it would take away alone, whatever its size. `carries` is what the variances of the free parameters
+    would lose if it were known, as far as residuals do not tell it.
     """
 
     name: str
@@ -111,6 +112,7 @@ class SystematicEffect:
     changes: dict[str, float]
     amount: float
     explains: float
+    carries: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 
+from pellicle.fitting.budget import carrier
 from pellicle.fitting.curves import BIREFRINGENCE, BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.lack_of_fit import lack_of_fit
 from pellicle.fitting.result import LEVEL, Estimate, Fit, Part, Status
@@ -284,7 +285,7 @@ def budget(fit: Fit) -> list[str]:
         *wrapped(f"{lead.name}: standard uncertainties, and what each alone would change"),
         *table(lines),
         *([f"{INDENT}... and {smaller} smaller in the JSON"] if smaller else []),
-        *wrapped(together(lead)),
+        *wrapped(together(fit, lead)),
     ]
 
 
@@ -304,12 +305,13 @@ def budget_rows(fit: Fit) -> list[tuple[str, str, str]]:
     return rows
 
 
-def together(lead: Estimate) -> str:
-    """The combined and the expanded uncertainty of the leading parameter."""
+def together(fit: Fit, lead: Estimate) -> str:
+    """The combined and the expanded uncertainty of the leading parameter, and what carries it."""
     stderr, expanded = (with_unit(f"{error:.2g}", lead.unit) for error in (lead.stderr, lead.expanded))
     freedom = lead.effective_degrees_of_freedom
     of = f", {freedom:.3g} degrees of freedom" if freedom < 100 else ""
+    most = carrier(fit.budget, lead) if fit.status is Status.CONVERGED else ""
     return (
         f"together, less what the residuals exclude: {stderr}; expanded, {100 * LEVEL:.0f} %:"
-        f" {expanded} (coverage factor {lead.coverage_factor:.3g}{of})"
+        f" {expanded} (coverage factor {lead.coverage_factor:.3g}{of}){f'. The {most}' if most else ''}"
     )

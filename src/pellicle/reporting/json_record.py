@@ -51,7 +51,10 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
         **({"index": _index(index)} if (index := fit.index_in_short) is not None else {}),
         "correlation": {"names": fit.correlation_names, "matrix": fit.correlation},
         "budget": [
-            {"effect": effect.name, **taken(effect, "uncertainty", "unit", "changes", "amount", "explains")}
+            {
+                "effect": effect.name,
+                **taken(effect, "uncertainty", "unit", "changes", "amount", "explains", "carries"),
+            }
             for effect in fit.budget
         ],
         "plan": [

@@ -86,7 +86,7 @@ def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():
     signs = np.array([1, 1, 1, -1, -1])
     found = pl.fit(replace(data, values=data.values * signs), scene())
     assert found.status == "misfit"
-    words = r"with the opposite signs of m34, m43 it would fit, with thickness ([\d.]+) nm"
+    words = r"with the opposite signs of m34, m43 it would fit, with thickness ([\d.]+) "
     [thickness] = [match[1] for warning in found.warnings if (match := re.match(words, warning))]
     assert float(thickness) == pytest.approx(THICKNESS, abs=0.05)
 

@@ -18,16 +18,17 @@ from pellicle.fitting.assembly import Assembly, assemble
 from pellicle.fitting.budget import budget, likely_cause
 from pellicle.fitting.conclusion import ranked_minima
 from pellicle.fitting.curves import Curve
+from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film import (
     backface,
     default_bounds,
     messages,
-    other_readings,
     parts,
     summary,
 )
 from pellicle.fitting.film.colour_measurements import measured_colours
 from pellicle.fitting.film.colour_view import ColoursView
+from pellicle.fitting.film.explanations import explanations
 from pellicle.fitting.film.index_curves import IndexCurves, index_curves
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.search import search
@@ -44,6 +45,8 @@ from pellicle.fitting.status import expanded, verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, remembered
 
+_REFUSED = (Status.MISFIT, Status.NOT_CONVERGED)
+"""Statuses of a fit of which causes are looked for by refits."""
 Film: TypeAlias = Spectrum | Colours | Sequence[Spectrum | Colours]
 """Measurements of one film."""
 
@@ -91,22 +94,26 @@ def fitted(
     with jax.enable_x64(True):
         targets = measurements(data, scene)
         spectra = listed(data)
-        fit, ranked = _fit(spectra, targets, tolerance, loss, progress)
+        fit, ranked, discrepancy = _fit(spectra, targets, tolerance, loss, progress)
         if loss == LEAST_SQUARES and (spikes := summary.spikes(ranked)):
             robust = _fit(spectra, targets, tolerance, ROBUST, progress)[0]
             lead = next(p for p in robust.parameters.values() if p.free)
             gives = f"{expanded(lead)} ({robust.status})"
             remark = f'{spikes}: `loss="{ROBUST}"` lets them count less, and gives {lead.name} {gives}'
             fit = replace(fit, warnings=(remark, *fit.warnings))
-        if fit.status is not Status.MISFIT:
+        if fit.status not in _REFUSED:
             return fit, ranked
 
-        def fitted_as(other: list[Spectrum | Colours]) -> Fit:
-            read = other[0] if isinstance(data, Spectrum | Colours) else other
-            return _fit(other, measurements(read, scene), tolerance, loss, progress, False)[0]
+        def measure(other: list[Spectrum | Colours]) -> list[Target]:
+            return measurements(other[0] if isinstance(data, Spectrum | Colours) else other, scene)
 
-        remarks = other_readings.remarks(spectra, [part.rms for part in fit.parts], fitted_as)
-        return replace(fit, warnings=(*remarks, *fit.warnings)), ranked
+        def refit(other: list[Spectrum | Colours], changed: list[Target]) -> Fit:
+            return _fit(other, changed, tolerance, loss, quiet, False)[0]
+
+        rows = discrepancy.contributions
+        said, refuted = explanations(spectra, targets, fit, ranked, rows, measure, refit, progress)
+        causes = said or likely_cause(discrepancy, ranked.problem.parameters, refuted)
+        return replace(fit, warnings=(*causes, *fit.warnings)), ranked
 
 
 def listed(data: Film) -> list[Spectrum | Colours]:
@@ -175,7 +182,7 @@ def _fit(
     loss: str,
     progress: Progress,
     other_curves: bool = True,
-) -> tuple[Fit, RankedMinima]:
+) -> tuple[Fit, RankedMinima, Discrepancy]:
     began = time.perf_counter()
     targets, ranked, wider = _searched(targets, tolerance, loss, progress)
     progress("errors", 0, 1)
@@ -193,7 +200,7 @@ def _fit(
         # the few residuals of colours have a cause in any case, where they are noise
         *(
             likely_cause(judged.best.discrepancy, ranked.problem.parameters)
-            if judged.missed or not colours
+            if judged.conclusion.status not in _REFUSED and (judged.missed or not colours)
             else []
         ),
         *default_bounds.remarks(ranked, wider.binding),
@@ -211,7 +218,7 @@ def _fit(
         budget=budget(judged.best.discrepancy, ranked.problem.parameters),
         scene=targets[0].scene if len(targets) == 1 else tuple(target.scene for target in targets),
     )
-    return fit, ranked
+    return fit, ranked, judged.best.discrepancy
 
 
 def _searched(

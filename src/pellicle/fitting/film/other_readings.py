@@ -1,7 +1,7 @@
-"""Other readings of the data, where a scene does not explain them as they stand.
+"""Other readings of Δ and of Mueller matrices, where a scene does not explain them as they stand.
 
 The sign of Δ may not have been measured, a file may follow another convention of Δ, or another sign of the
-fourth Stokes parameter. A reading by which the scene would explain the data is named, with what to change.
+fourth Stokes parameter.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +13,9 @@ import numpy as np
 
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.result import Fit, Status
 from pellicle.signals.folded_delta import can_be_folded
 from pellicle.signals.mueller import reversed_elements
 
-_NO_FIT = (Status.FAILED, Status.NOT_CONVERGED, Status.MISFIT)
 _LARGE = 3.0
 """Residual of Ψ in degrees, rms, below which no other convention is tried: a wrong one leaves 10 to 30."""
 _CONVENTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -29,39 +27,26 @@ _CONVENTIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 Data = list[Spectrum | Colours]
 
 
-def remarks(spectra: Data, rms: Sequence[float], fitted: Callable[[Data], Fit]) -> list[str]:
-    """Sentences on readings that would explain the data, and what to change.
+def readings(spectra: Data, rms: Sequence[float]) -> Iterator[tuple[str, str, Data]]:
+    """Each other reading in words, what states it, and the data in it.
 
-    `rms` has the residuals of each spectrum, in its own unit; `fitted` fits the data of another reading.
+    `rms` has the residuals of each spectrum, in its own unit.
     """
-    sentences = []
-    if (other := _read_as(as_folded, spectra)) and (value := _explaining(fitted(other))):
-        sentences.append(
-            f"delta lies within 0 to 180, and read as folded it would fit, with {value}: give `folded=True`"
-        )
-    if (other := _read_as(_reversed, spectra)) and (value := _explaining(fitted(other))):
+    if other := _read_as(_reversed, spectra):
         elements = [reversed_elements(s.elements) for s in other if isinstance(s, Spectrum)]
         names = ", ".join(dict.fromkeys(chain.from_iterable(elements)))
-        sentences.append(
-            f"with the opposite signs of {names} it would fit, with {value}: the file follows the other "
-            "convention of the fourth Stokes parameter; reverse the signs of these columns"
-        )
-    for words, other in conventions(spectra, rms) if not sentences else ():
-        if value := _explaining(fitted(other)):
-            return [
-                f"with {words} in place of delta it would fit, with {value}: the file follows another"
-                " convention of delta (near 180 degrees on bare silicon at small angles is ours); convert its"
-                " column"
-            ]
-    return sentences
+        of = "the file follows the other convention of the fourth Stokes parameter"
+        yield f"the opposite signs of {names}", f"{of}; reverse the signs of these columns", other
+    for words, other in conventions(spectra, rms):
+        ours = "near 180 degrees on bare silicon at small angles is ours"
+        of = f"the file follows another convention of delta ({ours}); convert its column"
+        yield f"{words} in place of delta", of, other
 
 
-def _explaining(other: Fit) -> str:
-    """`thickness 123.4 nm` of the fit of another reading that explains the data; empty where it does not."""
-    if other.status in _NO_FIT:
-        return ""
-    named = [p for p in other.free if p.name.split(".")[-1] == "thickness"] or list(other.free)
-    return f"{named[0].name} {named[0].value:.6g} {named[0].unit}".rstrip()
+def folded(spectra: Data) -> Iterator[tuple[str, str, Data]]:
+    """The reading of Δ as folded where it can be, which takes a program of its own."""
+    if other := _read_as(as_folded, spectra):
+        yield "delta read as folded", "give `folded=True`", other
 
 
 def _read_as(reading: Callable[[Spectrum], Spectrum], spectra: Data) -> Data:

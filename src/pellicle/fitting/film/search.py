@@ -27,7 +27,7 @@ log = getLogger(__name__)
 
 _MOST_STEPS, _MOST_CANDIDATES = 4000, 400_000
 """Values of the thickness that are scanned at most: so many, or more while all candidates are not as many."""
-_MOST_DESIGNS = 1200
+_MOST_DESIGNS, _FEW_DESIGNS = 1200, 40
 _COARSE = 1e-3
 """Share of its distance to the best deviance within which a minimum is computed at first; those that remain
 are computed to the end when they are ranked."""
@@ -53,22 +53,24 @@ _MOST_POLISHED = 2048
 """Starts after which no more are polished."""
 
 
-def search(problem: Problem, progress: Progress) -> Minima:
-    """Scan the box, polish the best distinct local minima, sort them."""
+def search(problem: Problem, progress: Progress, quick: bool = False) -> Minima:
+    """Scan the box, polish the best distinct local minima, sort them; `quick` with few values of parameters
+    other than the thickness, and the lowest orders alone."""
     thinned, depth = problem.thinned(), problem.thickness_axis
-    design = design_points(problem)
+    design = design_points(problem, _FEW_DESIGNS if quick else _MOST_DESIGNS)
     grid = thickness_grid(problem, len(design))
     units = np.repeat(design, max(len(grid), 1), axis=0)
     if depth is not None:
         units[:, depth] = np.tile(grid, len(design))
     table = scanned(thinned, units, progress).reshape(len(design), max(len(grid), 1), -1)
     total = table.sum(-1)
-    batches = 1 if len(design) == 1 else 3 if len(problem.parameters) < 4 else 6
+    batches = 1 if len(design) == 1 or quick else 3 if len(problem.parameters) < 4 else 6
     lowest = np.flatnonzero(_lowest_within(total, 1).ravel())
     lowest = lowest[np.argsort(total.ravel()[lowest])]
     first = np.union1d(lowest[: batches * MOST], _near_fringes(problem, units, lowest))
-    polished, tried = _every_order(problem, units, total, first, progress)
-    more = _from_best(problem, polished, units, lowest)
+    most = len(first) if quick else _MOST_POLISHED
+    polished, tried = _every_order(problem, units, total, first, progress, most)
+    more = first[:0] if quick else _from_best(problem, polished, units, lowest)
     if len(more):
         polished, tried = _joined(polished, solve(problem, more, coarse=_COARSE)), tried + len(more)
     result = settled(problem, polished, coarse=_COARSE)
@@ -108,9 +110,15 @@ def _near_fringes(problem: Problem, units: np.ndarray, lowest: np.ndarray) -> np
 
 
 def _every_order(
-    problem: Problem, units: np.ndarray, total: np.ndarray, first: np.ndarray, progress: Progress
+    problem: Problem,
+    units: np.ndarray,
+    total: np.ndarray,
+    first: np.ndarray,
+    progress: Progress,
+    most: int = _MOST_POLISHED,
 ) -> tuple[Minima, int]:
-    """The candidates `first` polished, then those of all other orders that could be better; and how many.
+    """The candidates `first` polished, then those of all other orders that could be better, till there are
+    `most`; and how many.
 
     `total` (design, thickness) are deviances of the candidates `units`. Residuals obey the triangle
     inequality, ‖r(polished)‖ ≥ ‖r(start)‖ − ‖change of the model‖: an order is excluded where the best
@@ -125,7 +133,7 @@ def _every_order(
     orders = np.flatnonzero(_lowest_within(profile, 2 if len(total) > 1 else 1))
     rest = np.setdiff1d(row[orders] * total.shape[1] + orders, first)
     rest, tried = rest[np.argsort(deviance[rest])], first
-    while len(rest) and len(tried) < _MOST_POLISHED:
+    while len(rest) and len(tried) < most:
         reached = _root(polished.deviance)
         fall = np.max(_root(deviance[tried]) - reached, where=np.isfinite(reached), initial=0.0)
         best = polished.deviance.min()

@@ -82,7 +82,7 @@ def fit_page(
         parameters=_parameters(fit),
         matrix=dict(zip(fit.correlation_names, np.asarray(fit.correlation).tolist(), strict=True)),
         budget=Table(caption, ("effect", "uncertainty", "change"), fit_text.budget_rows(fit)),
-        together=fit_text.together(lead) if fit.budget and lead else "",
+        together=fit_text.together(fit, lead) if fit.budget and lead else "",
         layer=Table("Error on samples that were held out", (), fit_text.layer_test_rows(fit)),
         plans=[_plan(part) for part in fit.parts],
         statistics=_statistics(fit),

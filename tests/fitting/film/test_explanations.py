@@ -1,0 +1,61 @@
+"""Causes of misfits, found by refits without one usual mistake each; data by an independent code."""
+
+import re
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+from ...by_tmm import films
+
+NM = np.linspace(420.0, 800.0, 60)
+OXIDE, SILICON, GLASS = (np.asarray(pl.refractive_index(NM, name)) for name in ("SiO2", "Si", "BK7"))
+DEPTH, NOISE = 320.0, 5e-4
+
+
+def reflectance(angle=60.0, substrate=SILICON, depth=DEPTH):
+    return films("s", NM, [1.0, OXIDE, substrate], [depth], angle)
+
+
+def spectrum(values, seed=0):
+    noisy = values + np.random.default_rng(seed).normal(0, NOISE, NM.size)
+    return pl.Spectrum(NM, noisy, "R", polarisation="s", angle=np.full(NM.size, 60.0))
+
+
+SCENE = pl.Scene(pl.Layer("SiO2", pl.Free(100, 600)), "Si", light=pl.Light(polarisation="s"))
+BARE = films("s", NM, [1.0, SILICON], [], 60.0)
+
+
+@pytest.mark.slow  # twenty searches each
+@pytest.mark.parametrize(
+    ("values", "cause", "remedy"),
+    [
+        (
+            reflectance(63.0),
+            r"with an angle of incidence that is \+[23]\.?\d* degrees off",
+            "`angle_shift = ",
+        ),
+        (reflectance() / BARE, "with values relative to bare Si", 'substrate = "Si"'),
+        (0.01 * reflectance(), "with values times 100", 'signal_unit="fraction"'),
+        (reflectance() + 0.05, r"with an offset of 0\.0[45]\d*", '`offset="free"`'),
+        (reflectance(substrate=GLASS), "with BK7 as the substrate", 'substrate="BK7"'),
+    ],
+)
+def test_a_refusal_names_its_cause_and_the_thickness_without_it(values, cause, remedy):
+    fit = pl.fit(spectrum(values), SCENE)
+    assert fit.status == "misfit"
+    assert re.match(f"{cause} it would fit, with thickness", fit.warnings[0])
+    assert remedy in fit.warnings[0]
+    assert float(re.findall(r"thickness ([\d.]+)", fit.warnings[0])[0]) == pytest.approx(DEPTH, rel=3e-3)
+    assert not any("would explain" in warning for warning in fit.warnings)
+
+
+@pytest.mark.slow  # two fits of one program
+def test_files_of_other_spots_are_told_apart():
+    data = [spectrum(reflectance(depth=300.0)), spectrum(reflectance(depth=330.0), seed=1)]
+    fit = pl.fit(data, [SCENE, SCENE])
+    assert fit.status == "misfit"
+    [said] = [warning for warning in fit.warnings if warning.startswith("the files disagree")]
+    depths = [float(x) for x in re.findall(r"alone gives ([\d.]+) nm", said)]
+    assert depths == pytest.approx([300.0, 330.0], rel=3e-3)
