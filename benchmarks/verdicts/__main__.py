@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import absorbers
+import comparisons
 import single_colours
 import surfaces
 from causes import score
@@ -133,7 +134,7 @@ def main() -> None:
         "--only",
         nargs="+",
         default=[],
-        help=f"groups, families, kinds or names of cases; or {', '.join(OTHER_KINDS)}, absorbers",
+        help=f"groups, families, kinds or names of cases; {', '.join(OTHER_KINDS)}, absorbers, comparisons",
     )
     parser.add_argument("--limit", type=int, help="only the first cases")
     parser.add_argument("--short", action="store_true", help="about 24 cases of all groups")
@@ -145,6 +146,9 @@ def main() -> None:
     start()
     if asked.only == ["absorbers"]:
         absorbers.report(asked.seed, asked.limit)
+        return
+    if asked.only == ["comparisons"]:
+        comparisons.report(asked.seed)
         return
     answers: list[Answer] = []
 

@@ -4,6 +4,10 @@ With L the likelihood, in which scale, offset and systematic effects are integra
 k the free numbers and n the points that count,
 AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
 BIC = −2 ln L + k ln n (G. Schwarz 1978, Ann. Stat. 6, 461).
+
+Where effects and not the noise set the error of a number, it is as uncertain as by fewer points, which stand
+for n: information, not points, is what the prior of this criterion counts (R. Kass and L. Wasserman 1995, J.
+Am. Stat. Assoc. 90, 928).
 """
 
 import math
@@ -23,7 +27,7 @@ from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, marginal
 from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import Fit, Status
+from pellicle.fitting.result import Estimate, Fit, Status
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Scene
 
@@ -39,6 +43,10 @@ _CLEAR = 3.5
 BIC counts noise alone, which the usual errors of instruments exceed."""
 _COMPATIBLE = 1.96
 """Standard errors within which a number is compatible with 0, at 95 %."""
+
+
+_FEWEST = 2.0
+"""Points that a number costs at least."""
 
 
 AXIS, TILTED = "axis_", "a tilted optic axis"
@@ -126,7 +134,7 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
         raise UsageError("a comparison needs two descriptions or more")
     _check_same(fits)
     with jax.enable_x64(True):
-        explained = {name: _Explained(fit.ranking, fit.ranking.evidence()) for name, fit in fits.items()}
+        explained = dict(zip(fits, _explained([fit.ranking for fit in fits.values()]), strict=True))
         nearest = max(explained.values(), key=lambda one: one.information)
         points, weights = nearest.points, nearest.weights
         wider = float(student(nearest.best.ranked.freedom, STRONG)) ** 2
@@ -134,7 +142,7 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     candidates = []
     for name, fit in fits.items():
         free, deviance = len(fit.free), deviances[name]
-        bic = deviance + free * math.log(max(points, 2.0))
+        bic = deviance + sum(math.log(max(points * _share(p), _FEWEST)) for p in fit.free)
         log.info(
             "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: BIC %.6g",
             *(name, free, deviance, points, bic),
@@ -203,6 +211,25 @@ class _Explained(NamedTuple):
         return float(marginal(self.evidence, self.best.jacobian, unit, allowed).deviance)
 
 
+def _explained(every: Sequence[Ranking]) -> list[_Explained]:
+    """Evidence of each candidate, with the effects that all of them leave out.
+
+    One that a candidate describes is what the comparison is about: the others have it not at all.
+    """
+    evidence = [best.evidence() for best in every]
+    # one layer and several name an effect with and without its layer: `index of the layer`, `index of film`
+    kinds = [{effect.name.split(" of ")[0] for view in own for effect in view.effects} for own in evidence]
+    common = set.intersection(*kinds)
+    return [
+        _Explained(best, [_with(view, common) for view in own])
+        for best, own in zip(every, evidence, strict=True)
+    ]
+
+
+def _with(view: Evidence, kinds: set[str]) -> Evidence:
+    return view._replace(effects=[e for e in view.effects if e.name.split(" of ")[0] in kinds])
+
+
 def _matrices(fit: Fit) -> int:
     """Size of the matrices of anisotropic media, 0 where nothing is birefringent."""
     rows = (row for part in fit.parts for row in part.plan.rows if row.effect == "anisotropy")
@@ -234,6 +261,13 @@ def _beyond_errors(one: Fit, other: Fit) -> bool:
     return not further or any(abs(p.value) > _CLEAR * p.stderr for p in further)
 
 
+def _share(number: Estimate) -> float:
+    """Information on a number that effects leave, as a share of that by noise alone."""
+    if not math.isfinite(number.stderr):
+        return 0.0
+    return (number.stderr_noise / number.stderr) ** 2 if number.stderr > 0 else 1.0
+
+
 def _layers(fit: Fit) -> list[str]:
     """Names of the layers of a film, or of their materials."""
     scene = fit.scene[0] if isinstance(fit.scene, tuple) else fit.scene
@@ -248,7 +282,10 @@ def _extra(one: Fit, other: Fit) -> list[str]:
     layers = [name for name in more if name and name not in less]
     if layers and len(layers) == len(more) - len(less):
         return [f"the layer `{name}`" for name in layers]
-    names = [p.name for p in one.free if p.name not in {q.name for q in other.free}]
+    # the numbers of an only layer are not named for it
+    single = len(more) == 1 < len(less)
+    known = {q.name.split(".")[-1] if single else q.name for q in other.free}
+    names = [p.name for p in one.free if p.name not in known]
     if names:
         return names[:4]
     on = [{row.effect for row in part.plan.rows if row.on} for fit in (one, other) for part in fit.parts[:1]]
