@@ -70,7 +70,7 @@ def deviance(views: list[View]) -> float:
     shares, evidence = [view.share for view in views], [view.evidence for view in views]
     with jax.enable_x64(True):
         effects = systematics(evidence, shares, [1] * len(views), 0)
-        return float(effects.deviance([view.explained for view in views]))
+        return float(effects.deviance([view.explained for view in views]) - effects.volume)
 
 
 def residual(seed: int) -> np.ndarray:
@@ -84,12 +84,20 @@ def test_the_likelihood_is_that_of_a_dense_covariance(nuisances, share):
     assert deviance([view]) == pytest.approx(explicit([view], [[0, 1]]), rel=1e-9)
 
 
+def test_the_volume_is_that_of_a_dense_covariance():
+    view = View(residual(1), (effect("shift"), effect("bend")), np.zeros((ROWS, 0)), 1.0)
+    columns = np.stack([CHANGES["shift"], CHANGES["bend"]], axis=1) / SIGMA
+    expected = np.linalg.slogdet(np.eye(ROWS) + columns @ columns.T)[1]
+    assert systematics([view.evidence], [1.0], [1], 0).volume == pytest.approx(expected, rel=1e-9)
+
+
 def test_effects_explain_no_more_than_there_is():
     """Far from the best fit the scale follows another signal than the one that the effects were taken at."""
     here = View(0.0 * X, (effect("shift"), effect("bend")), 100 * NUISANCES, 1.0)
     far = here._replace(residual=X**2, nuisances=100 * np.stack([X**3, np.cos(9 * X)], axis=1))
     with jax.enable_x64(True):
-        assert systematics([here.evidence], [1.0], [1], 0).deviance([far.explained]) > 0
+        effects = systematics([here.evidence], [1.0], [1], 0)
+        assert effects.deviance([far.explained]) > effects.volume
 
 
 def test_without_effects_the_likelihood_is_that_of_the_noise():

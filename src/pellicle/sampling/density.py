@@ -27,18 +27,19 @@ from pellicle.signals.base import Signal
 
 
 class Systematics(NamedTuple):
-    """Effects on all views, taken at the best minimum.
+    """Effects on all views, taken at one minimum.
 
     Of the deviance of each view only a share (`shares`, (views,)) is evidence where residuals are larger than
     noise. `changes` of each view (effects, data values) are those of its weighted data by one standard
     uncertainty. `columns` (effects, data values and nuisances), times its weighted residuals and those of the
     priors of its nuisances, added over the views, are what the effects explain: the sum of their squares is
-    no misfit.
+    no misfit. `volume` is the logarithm of the determinant of I + E Eᵀ.
     """
 
     changes: tuple[Any, ...]
     columns: tuple[Any, ...]
     shares: Any
+    volume: Any = 0.0
 
     def deviance(self, views: Sequence[Explained]) -> Any:
         """−2 ln likelihood with the effects integrated out over their normal priors, up to a constant.
@@ -54,13 +55,37 @@ class Systematics(NamedTuple):
             explained += columns[:, :points] @ view.residual[:points]
             explained += columns[:, points:] @ view.residual[len(view.residual) - priors :]
         total = sum(share * view.deviance for share, view in zip(self.shares, views, strict=True))
-        return total - jnp.sum(jnp.square(explained))
+        return total - jnp.sum(jnp.square(explained)) + self.volume
 
 
-def without_effects(problem: Problem) -> Systematics:
+class Nearest(NamedTuple):
+    """Systematic effects at several minima: `centre` (minima, parameters) in the unit cube of the affine
+    problem, and `each`, with the minima first in all its arrays."""
+
+    each: Systematics
+    centre: Any
+
+    def at(self, unit: Any) -> Systematics:
+        """The effects at the minimum that is nearest to a point (parameters,)."""
+        which = jnp.argmin(jnp.sum(jnp.square(self.centre - unit), axis=1))
+        return jax.tree_util.tree_map(lambda x: jnp.asarray(x)[which], self.each)
+
+
+def nearest(every: Sequence[Systematics], centre: np.ndarray) -> Nearest:
+    """The effects at minima `centre` (minima, parameters); those of no minimum are zero there."""
+    most = max(len(own.changes[0]) for own in every)
+
+    def stacked(*arrays: np.ndarray) -> np.ndarray:
+        return np.stack([np.pad(x, [(0, most - len(x)), (0, 0)]) if x.ndim == 2 else x for x in arrays])
+
+    return Nearest(jax.tree_util.tree_map(stacked, *every), centre)
+
+
+def without_effects(problem: Problem) -> Nearest:
     """No systematic effects: the likelihood is that of the noise."""
     none = tuple(np.zeros((0, view.rows * view.channels)) for view in problem.views)
-    return Systematics(none, none, np.ones(len(problem.views)))
+    own = Systematics(none, none, np.ones(len(problem.views)), np.zeros(()))
+    return nearest([own], np.zeros((1, len(problem.parameters))))
 
 
 def systematics(
@@ -97,7 +122,8 @@ def systematics(
         columns.append(share * rest)
     factor = np.linalg.cholesky(information)
     columns = tuple(np.linalg.solve(factor, linear) for linear in columns)
-    return Systematics(tuple(every), columns, np.array(shares))
+    volume = 2 * np.sum(np.log(np.diag(factor)))
+    return Systematics(tuple(every), columns, np.array(shares), np.array(volume))
 
 
 LogDensity = Callable[[np.ndarray], np.ndarray]
@@ -111,7 +137,7 @@ class Density(NamedTuple):
 
 
 @kept
-def density(static: Static, arrays: tuple[Any, ...], box: Box, effects: Systematics, units: Any) -> Density:
+def density(static: Static, arrays: tuple[Any, ...], box: Box, effects: Nearest, units: Any) -> Density:
     """ln posterior at `units` (points, parameters): the likelihood of every view, nuisances and systematic
     effects integrated out, times the priors. A prior is one on the parameter in its own unit."""
     coordinates, _ = static
@@ -119,13 +145,13 @@ def density(static: Static, arrays: tuple[Any, ...], box: Box, effects: Systemat
     def one(unit):
         views, values = explained(static, arrays, box, unit)
         prior = box.log_prior(values) + coordinates.log_area(box, unit)
-        log = -0.5 * effects.deviance(views) + prior
+        log = -0.5 * effects.at(unit).deviance(views) + prior
         return jnp.where(jnp.all((unit >= 0) & (unit <= 1)) & jnp.isfinite(log), log, -jnp.inf)
 
     return Density(jax.vmap(one)(units))
 
 
-def log_density(problem: Problem, effects: Systematics | None = None) -> LogDensity:
+def log_density(problem: Problem, effects: Nearest | None = None) -> LogDensity:
     """ln posterior of a ranked, affine problem; without `effects` that of the noise alone."""
     static = problem.static
     arrays, box, known = jax.device_put((problem.arrays, problem.box, effects or without_effects(problem)))
@@ -274,8 +300,9 @@ class _Expansion(NamedTuple):
     chi2: float
 
 
-def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Expansion:
+def _expansion(problem: Problem, nearby: Nearest, unit: np.ndarray) -> _Expansion:
     """Linearisation of an affine problem at a point (parameters,) of the unit cube."""
+    effects = jax.device_get(nearby.at(unit))
     values = np.asarray(problem.values(unit))
     parts = [view.local(problem.seen_by(view, values)) for view in problem.views]
     counted = np.array([view.independent_fraction for view in problem.views])
@@ -289,16 +316,17 @@ def _expansion(problem: Problem, effects: Systematics, unit: np.ndarray) -> _Exp
     residual = np.zeros(len(jacobian))
     residual[len(matrix) - width : len(matrix)] -= pull
     explained = np.zeros(count)
-    for changes, columns, share, weighted in zip(*effects, rest, strict=True):
+    for changes, columns, share, weighted in zip(*effects[:3], rest, strict=True):
         rows = slice(first, first + len(weighted))
         jacobian[rows, width:], residual[rows] = share**0.5 * changes.T, share**0.5 * weighted
         several = columns.shape[1] - len(weighted)
         explained += columns @ np.concatenate([weighted, pull[priors : priors + several]])
         first, priors = first + len(weighted), priors + several
-    return _Expansion(jacobian, residual, float(np.sum(residual**2) - np.sum(explained**2)))
+    chi2 = np.sum(residual**2) - np.sum(explained**2) + effects.volume
+    return _Expansion(jacobian, residual, float(chi2))
 
 
-def modes(ranked: RankedMinima, effects: Systematics | None = None) -> Modes:
+def modes(ranked: RankedMinima, effects: Nearest | None = None) -> Modes:
     """The minima of a fit in affine coordinates, each with the covariance of its own Jacobian; nuisances and
     systematic effects are integrated out. With effects a minimum moves by steps of least squares."""
     problem = ranked.problem.affine()

@@ -28,7 +28,7 @@ from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.marginal import by_remaining, ranking, with_shift
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
-from pellicle.fitting.reweighting import RankedMinima, linearised
+from pellicle.fitting.reweighting import RankedMinima, at_minimum, linearised
 from pellicle.sampling import density
 from pellicle.sampling.chain import Chain, ChainFile, Checks, check, missing
 from pellicle.sampling.result import Posterior, Prediction, predictions
@@ -123,6 +123,10 @@ STEPS = 20_000
 FEWEST_WALKERS = 32
 _LIVE = 40
 """Numbers of float64 that one point of the data of one walker keeps alive at once, roughly."""
+
+
+_MATTERS = 1e-4
+"""Share of the posterior from which a minimum has systematic effects of its own."""
 
 
 class Subject(NamedTuple):
@@ -295,12 +299,20 @@ def _subject(
     `measurements` makes those of the fit from its minima, `identity` is the hash of all that the posterior
     depends on, `assumption` what it assumes beyond the fit.
     """
-    ranked = by_remaining(ranked, ranking(measurements, ranked).discrepancy).counted
+    best = ranking(measurements, ranked)
+    ranked = by_remaining(best.ranked, best.discrepancy).counted
     jacobian, covariance = linearised(ranked)
-    residuals, problem = measurements(ranked).evidence(ranked, jacobian), ranked.problem.affine()
-    allowed = discrepancy(residuals, jacobian, ranked.minima.units[0])
-    channels = [view.channels for view in problem.views]
-    effects = density.systematics(residuals, allowed.evidence_shares, channels, len(problem.parameters))
+    data, problem = measurements(ranked), ranked.problem.affine()
+    allowed = discrepancy(data.evidence(ranked, jacobian), jacobian, ranked.minima.units[0])
+    channels, every = [view.channels for view in problem.views], []
+    some = np.flatnonzero(best.share > _MATTERS)
+    for i in some.tolist():
+        own = at_minimum(ranked, i)
+        evidence = data.evidence(own, linearised(own)[0])
+        about = evidence, allowed.evidence_shares, channels, len(problem.parameters)
+        every.append(density.systematics(*about))
+    centre = np.array([ranked.problem.in_affine(unit) for unit in ranked.minima.units[some]])
+    effects = density.nearest(every, centre)
     mixture = density.modes(ranked, effects)
     slope = problem.coordinates.slope(problem.box, mixture.centre[0])
     return Subject(
