@@ -64,12 +64,14 @@ def explanations(
 
     `rows` are the systematic effects of the fit, `measure` the targets of other data, and `refit` fits them.
     """
+    every = [target for target in targets if isinstance(target, Measured)]
+    if len(every) < len(targets):  # the residuals of colours are too few
+        return [], frozenset()
     lead, trials = next(p for p in fit.parameters.values() if p.free), _Trials(data, ranked, progress)
     layers = range(len(targets[0].scene.layers))
     depth = next((i for i in layers if thickness_name(targets[0].scene, i) == lead.name), None)
-    every = [target for target in targets if isinstance(target, Measured)]
     trials.read(readings(data, [part.rms for part in fit.parts]), measure)
-    if len(every) == len(targets) and not trials.explained:
+    if not trials.explained:
         trials.all_of([*mistakes.of_light(every), *mistakes.of_media(every, depth)], every)
         trials.all_of(_pointed_to(mistakes.of_structure(every), rows, trials.explained), every, True)
     # within 0 to 180 degrees 360 - delta may be delta whose sign was not measured
