@@ -21,10 +21,11 @@ def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_
     points, size = again["effective_points"], 100
     for found, free in ((first, 1), (second, 2)):
         assert found["free"] == free
-        assert found["bic"] - found["aic"] == pytest.approx(free * (math.log(points) - 2), rel=1e-9)
+        # of the points those count that effects leave, and at least e², the price in AIC
+        assert -1e-9 < found["bic"] - found["aic"] <= free * (math.log(points) - 2) + 1e-9
     assert 0.5 * size < points <= size
     assert second["delta_bic"] == 0
-    assert first["delta_bic"] > 100
+    assert first["delta_bic"] > 6  # an index of 4 % more is eight uncertainties of it
     assert (tmp_path / "out" / "a" / "result.json").exists()
     text = (tmp_path / "out" / "report.txt").read_text()
     assert text.startswith("[[Verdict]]\n    b.toml is better")

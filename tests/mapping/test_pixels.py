@@ -127,22 +127,24 @@ def test_pixels_are_those_of_fit(name):
     assert [STATUSES[code] for code in found.status] == [str(fit.status) for fit in fits]
     assert words <= {str(fit.status) for fit in fits}
     for i, fit in enumerate(fits):
+        determined = all(np.isfinite(p.stderr) for p in fit.free)
         for j, p in enumerate(model.parameters):
             own = fit[p.name]
             # effects are interpolated between thicknesses 1/96 of a fringe apart: within 10 %
-            assert found.stderr[i, j] == pytest.approx(own.stderr, rel=0.1), (i, p.name)
-            assert found.stderr_noise[i, j] == pytest.approx(own.stderr_noise, rel=0.1), (i, p.name)
-            if np.isfinite(own.stderr):
+            if determined or p.key == "thickness":  # on a plateau any point is a minimum
+                assert found.stderr[i, j] == pytest.approx(own.stderr, rel=0.1), (i, p.name)
+                assert found.stderr_noise[i, j] == pytest.approx(own.stderr_noise, rel=0.1), (i, p.name)
+            if determined:  # on a plateau any point is a minimum
                 assert found.values[i, j] == pytest.approx(own.value, abs=1e-2 * own.stderr_noise)
                 assert found.chi2_reduced[i] == pytest.approx(fit.chi2_reduced, rel=1e-4)
                 assert found.rms[i] == pytest.approx(fit.rms, rel=1e-4)
         thickness = found.minima[i, :, model.problem.thickness_axis]
-        determined = all(np.isfinite(p.stderr) for p in fit.free)
         for rival in fit.rivals if determined else ():  # those that both have polished
             away = np.abs(thickness - rival.parameters["thickness"])
             order = np.nanargmin(away)
             if away[order] < 0.01 and rival.delta_chi2 < 20:
-                assert found.delta_chi2[i, order] == pytest.approx(rival.delta_chi2, rel=0.02), i
+                # a fit integrates the systematic effects out, of pixels the noise alone ranks minima
+                assert found.delta_chi2[i, order] == pytest.approx(rival.delta_chi2, rel=0.3), i
 
 
 TRUTH = np.linspace(30, 880, 60)

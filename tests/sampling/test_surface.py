@@ -16,6 +16,8 @@ from pellicle.scene.surface import Surface
 
 from ..fitting.brdf.known_surface import BOUNDS, FREE, TRUTH, arcs, from_all_sides, noisy, search_from
 
+EXACT = dataclasses.replace(FREE, uncertainty=pl.SurfaceUncertainty.none())
+"""Without systematic effects, which a posterior takes to be normal and an error bounds at zero."""
 UNITS = [0.32, *np.log([60, 25]) / np.log(1000), 0.015, 0.05]
 """The truth in the unit cube of the search."""
 
@@ -32,14 +34,14 @@ def known():
     samples = noisy(pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values, 3)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fitting, "search", search_from(UNITS))
-        return Known(samples, *fitting.fitted(samples, FREE, 0.0, quiet))
+        return Known(samples, *fitting.fitted(samples, EXACT, 0.0, quiet))
 
 
 @pytest.mark.slow  # fits and samples for 6 s; tests/sampling/test_sample.py samples a film
 def test_a_posterior_is_as_wide_as_the_errors_say(monkeypatch, known, tmp_path):
     """Every number is determined and far from its bounds: the posterior is normal."""
     monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (known.fit, known.ranked))
-    posterior = pl.sample(known.samples, FREE, chain=tmp_path / "chain.h5")
+    posterior = pl.sample(known.samples, EXACT, chain=tmp_path / "chain.h5")
     assert posterior.trusted
     assert list(posterior.parameters) == [p.name for p in known.fit.free]
     for name in BOUNDS:
@@ -62,7 +64,7 @@ def test_without_sigma_a_posterior_is_as_wide_as_the_errors_too(monkeypatch):
     clean = pl.simulate(Surface("granier-heidrich", TRUTH), directions=arcs()).values
     noise = 1 + 0.03 * np.random.default_rng(8).standard_normal(clean.shape)
     monkeypatch.setattr(fitting, "search", search_from(UNITS))
-    posterior = pl.sample(dataclasses.replace(arcs(), values=clean * noise), FREE)
+    posterior = pl.sample(dataclasses.replace(arcs(), values=clean * noise), EXACT)
     assert posterior.trusted
     for name in BOUNDS:
         assert posterior[name].sd == pytest.approx(posterior.fit[name].stderr, rel=0.15), name
@@ -78,7 +80,7 @@ def test_without_evidence_of_a_layer_a_posterior_assumes_one(monkeypatch, known,
     layer_test = dataclasses.replace(known.fit.layer_test, layered=False)
     blind = dataclasses.replace(known.fit, layer_test=layer_test, status=status)
     monkeypatch.setattr(fitting, "fitted", lambda *args, **options: (blind, known.ranked))
-    posterior = pl.sample(known.samples, FREE, steps=20)
+    posterior = pl.sample(known.samples, EXACT, steps=20)
     assert posterior.assumption == assumption
 
 

@@ -45,8 +45,8 @@ _COMPATIBLE = 1.96
 """Standard errors within which a number is compatible with 0, at 95 %."""
 
 
-_FEWEST = 2.0
-"""Points that a number costs at least."""
+_FEWEST = math.e**2
+"""Points that a number costs at least: as much as AIC charges."""
 
 
 AXIS, TILTED = "axis_", "a tilted optic axis"

@@ -68,6 +68,9 @@ def verdicts(
     parameters, values, freedom = ranked.problem.parameters, ranked.values, np.asarray(ranked.freedom)
     noise, converged = _by_noise(ranked, covariance, around, flat, misfit)
     noise, linear = amend(noise), covariance.stderr[..., : len(parameters)]
+    # on a plateau, as of an opaque film or of none, a solver has no point to settle at
+    depths = [i for i, p in enumerate(parameters) if p.key == "thickness"]
+    converged = converged | (~np.asarray(misfit) & np.isinf(noise.stderr[..., depths]).any(axis=-1))
     lower, upper = (np.array([getattr(p, side) for p in parameters]) for side in ("lower", "upper"))
     # a profile likelihood has corrected the error of the noise; what is not noise adds to it
     more = np.maximum(discrepancy.variance - covariance.variance, 0.0)[..., : len(parameters)]
@@ -99,7 +102,6 @@ def _by_noise(
     profiled = Limits(*(x.reshape(shape) for x in limits(around(), flat, usable.ravel())))
     if covariance.curvature is not None:
         profiled = _stretched(profiled, ranked.values, covariance.widening[..., : shape[-1]], (lower, upper))
-    # on a plateau, as of an opaque film, a solver has no point to settle at
     depths = [i for i, p in enumerate(parameters) if p.key == "thickness"]
     converged = converged | (usable & np.isinf(profiled.stderr[..., depths]).any(axis=-1))
     used = (usable & converged)[..., None]

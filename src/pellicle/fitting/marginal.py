@@ -201,8 +201,10 @@ def by_remaining(ranked: RankedMinima, allowed: Discrepancy) -> RankedMinima:
 def with_shift(covariance: Errors, allowed: Discrepancy) -> Errors:
     """Errors of one fit about its own values, which a posterior with the effects does not lie around.
 
-    `covariance` is by the noise. The curvature is that of the posterior: with effects, or of uneven noise.
+    `covariance` is by the noise, whose unevenness the posterior does not see. The curvature is that of the
+    posterior, with effects.
     """
-    own = allowed.errors if covariance.curvature is None else covariance
-    wider = own.covariance + np.outer(allowed.shift, allowed.shift)
-    return replace(covariance, covariance=wider, curvature=own.by_curvature)
+    own = allowed.errors.covariance
+    wider = own + np.outer(allowed.shift, allowed.shift)
+    factor = np.sqrt(np.maximum(covariance.variance / np.maximum(np.diag(wider), 1e-300), 1.0))
+    return replace(covariance, covariance=wider * np.outer(factor, factor), curvature=own)

@@ -21,7 +21,7 @@ from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.targets import Measured, drifts
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.marginal import above_best
+from pellicle.fitting.marginal import above_best, by_remaining, gains
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.misfit import misfit, other_material
 from pellicle.fitting.problem import Problem
@@ -120,7 +120,7 @@ class BatchErrors:
         candidates = Minima(minima.units[who], minima.deviance[who], minima.converged[who])
         ranked = ranked_by_factor(problem, candidates, minima.misfit[who], at)
         [after], [fit] = ranked.problem.views, ranked.fits
-        jacobian, covariance = linearised(ranked)
+        jacobian = linearised(ranked)[0]
         effects = [
             replace(effect, change=group.measured(effect.change))
             for effect in self.effects.changes(whole, every, ranked.values)
@@ -137,11 +137,12 @@ class BatchErrors:
         if len(doubtful):
             again = discrepancy([evidence.of(doubtful)], jacobian.of(doubtful), units[doubtful])
             wrong[doubtful] = other_material(again.contributions) >= 0
-        models = LocalModels(self.problem, whole, ranked)
+        counted = by_remaining(ranked, systematic)
+        covariance, models = linearised(counted)[1], LocalModels(self.problem, whole, counted)
         numbers = verdicts(
             *(ranked, covariance, systematic, above_best(ranked, systematic.evidence_share)),
             lambda: models.neighbourhood(covariance.covariance),
-            self._flat_sides(minima, who, ranked, models, ~wrong),
+            self._flat_sides(minima, who, gains(systematic)[0], models, ~wrong),
             misfit=wrong,
             amend=lambda limits: self._amended(limits, ranked, models, systematic.errors.covariance),
         )
@@ -192,15 +193,16 @@ class BatchErrors:
         self,
         minima: BatchMinima,
         who: np.ndarray,
-        ranked: RankedMinima,
+        gain: np.ndarray,
         models: LocalModels,
         usable: np.ndarray,
     ) -> dict[int, np.ndarray]:
-        """On which sides (spectra, 2) of the best thickness the misfit never rises, or only to a plateau."""
+        """On which sides (spectra, 2) of the best thickness the misfit, times a `gain` (spectra,), never
+        rises, or only to a plateau."""
         depth = self.problem.thickness_axis
         if depth is None or minima.profile.shape[1] < 2:
             return {}
-        scan = _resampled(self.grid, minima.thickness, minima.profile[who])
+        scan = gain[:, None] * _resampled(self.grid, minima.thickness, minima.profile[who])
         return {depth: models.flat_sides(depth, self.grid, scan, usable)}
 
     def _amended(self, limits: Any, ranked: RankedMinima, models: LocalModels, covariance: np.ndarray) -> Any:
