@@ -27,7 +27,7 @@ from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, marginal
 from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import Estimate, Fit, Status
+from pellicle.fitting.result import Estimate, Fit, Part, Status
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Scene
 
@@ -138,7 +138,7 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
         nearest = max(explained.values(), key=lambda one: one.information)
         points, weights = nearest.points, nearest.weights
         wider = float(student(nearest.best.ranked.freedom, STRONG)) ** 2
-        deviances = {name: one.deviance(weights) / wider for name, one in explained.items()}
+        deviances = {name: one.deviance(weights, fits[name].parts) / wider for name, one in explained.items()}
     candidates = []
     for name, fit in fits.items():
         free, deviance = len(fit.free), deviances[name]
@@ -191,9 +191,10 @@ class _Explained(NamedTuple):
         return [raised * view.weights * view.unit for view, raised in pairs]
 
     @property
-    def information(self) -> float:
-        """Logarithm of these weights, added over all points."""
-        return sum(float(np.sum(np.log(np.maximum(own, 1e-300)))) for own in self.weights)
+    def information(self) -> tuple[int, float]:
+        """Channels of all views, and the logarithm of these weights, added over all points."""
+        channels = sum(own.shape[1] for own in self.weights)
+        return channels, sum(float(np.sum(np.log(np.maximum(own, 1e-300)))) for own in self.weights)
 
     @property
     def points(self) -> float:
@@ -202,13 +203,20 @@ class _Explained(NamedTuple):
         pairs = zip(ranked.problem.views, ranked.fits, strict=True)
         return sum(view.independent / max(fit.variance, 1.0) for view, fit in pairs)
 
-    def deviance(self, weights: Sequence[np.ndarray]) -> float:
-        """−2 ln of the marginal likelihood up to a constant, with these weights of the points."""
-        rows = zip(self.evidence, weights, strict=True)
-        raised = tuple(own / (view.weights * view.unit) for view, own in rows)
-        allowed = replace(self.best.discrepancy, raised=raised)
+    def deviance(self, weights: Sequence[np.ndarray], parts: Sequence[Part]) -> float:
+        """−2 ln of the marginal likelihood up to a constant, with these weights of the points.
+
+        A depolarisation that the scene has not is a residual as a whole.
+        """
+        raised, missed = [], 0.0
+        for view, own, part in zip(self.evidence, weights, parts, strict=True):
+            known = view.residual.shape[-1]
+            raised.append(own[:, :known] / (view.weights * view.unit))
+            if known < own.shape[1] and (share := part.spectrum.kind.share):
+                missed += float(np.sum((own[:, known:] * share.measured(part.spectrum)[:, None]) ** 2))
+        allowed = replace(self.best.discrepancy, raised=tuple(raised))
         unit = self.best.ranked.minima.units[0]
-        return float(marginal(self.evidence, self.best.jacobian, unit, allowed).deviance)
+        return missed + float(marginal(self.evidence, self.best.jacobian, unit, allowed).deviance)
 
 
 def _explained(every: Sequence[Ranking]) -> list[_Explained]:
