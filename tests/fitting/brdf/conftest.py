@@ -38,9 +38,10 @@ START = [0.32, np.log(60) / np.log(1000), 0.015]
 
 
 def grey(**changes) -> Surface:
-    """The surface with three free numbers, some of them changed."""
+    """The surface with three free numbers, some of them changed, and no systematic effects."""
     free = {key: Free(*ends) for key, ends in FREE.items()}
-    return Surface("granier-heidrich", {**GREY, **free, **changes}, (550.0,))
+    exact = pl.SurfaceUncertainty.none()
+    return Surface("granier-heidrich", {**GREY, **free, **changes}, (550.0,), uncertainty=exact)
 
 
 def grey_samples(noise: float = 0.02, seed: int = 1, incidences=(15.0, 35.0, 55.0)) -> BrdfSamples:

@@ -30,7 +30,8 @@ TRUTH = GREY | {"n": (1.5,), "exponent_transmission": 1000.0, "diffuse": 0.3, "w
 BOUNDS = {"exponent_transmission": (1.0, 1000.0), "deviation": (0.0, 20.0), "specular": (0.0, 100.0)}
 FREE = {key: Free(lower, upper) for key, (lower, upper) in BOUNDS.items()}
 FIXED = {key: x for key, x in TRUTH.items() if key not in (*FREE, "wavelengths")}
-SURFACE = Surface("granier-heidrich", {**FIXED, **FREE}, (550.0,))
+EXACT = pl.SurfaceUncertainty.none()
+SURFACE = Surface("granier-heidrich", {**FIXED, **FREE}, (550.0,), uncertainty=EXACT)
 WIDE = {"exponent_transmission": 100.0, "specular": 1.5}
 SIGMA = 0.1
 
@@ -108,7 +109,7 @@ def turned():
 )
 def test_the_azimuth_of_a_tilt(monkeypatch, turned, tilt, azimuth, stderr):
     free = {"deviation": Free(0, 20), "azimuth": Free(-180, 180)}
-    surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,))
+    surface = Surface("granier-heidrich", {**FIXED, **WIDE, **free}, (550.0,), uncertainty=EXACT)
     monkeypatch.setattr(module, "search", search_from([0.6, 0.7]))
     of_one_fit = [np.array([pair], float) for pair in zip(tilt, azimuth, strict=True)]
     monkeypatch.setattr(shared, "limits", lambda *arguments: Limits(*of_one_fit))
