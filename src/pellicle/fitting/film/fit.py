@@ -212,6 +212,7 @@ def _fit(
         verdict=_verdict(films, judged, parameters, rivals, dark, curves),
         parameters=parameters,
         rivals=parts.with_curves(rivals, judged.parts, ranked),
+        probability=judged.conclusion.probability or (1.0 if colours else None),
         rms=parts.together(judged.parts),
         warnings=(*wider.warnings, *summary.warnings(films, unclear)),
         profile=next(iter(judged.scans.values()), None),

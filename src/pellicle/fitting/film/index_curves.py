@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import equinox as eqx
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from pellicle.dispersion.base import HC, known_index
 from pellicle.dispersion.empirical import CauchyUrbach, Constant
@@ -163,6 +162,8 @@ class _Fits(NamedTuple):
 
     def of_spline(self, knots: int, guesses: Sequence[np.ndarray]) -> tuple[Any, ...]:
         """The same of a spline with all numbers free, from curves near to the `guesses` (2, wavelengths)."""
+        from scipy.optimize import lsq_linear  # SciPy's linear algebra takes longer to load than most fits
+
         ends = _BEYOND[0] * HC / self.nm.min(), HC / self.nm.max() / _BEYOND[1]
         sites = (HC / np.linspace(*ends, knots)).tolist()
         rows, upper = np.eye(knots + 3), [_LARGEST[0]] * knots + [*_LARGEST[1:]]
