@@ -39,6 +39,7 @@ def each(command: str, names: str) -> list[str]:
 
 
 EXIT_4 = (
+    "pellicle fit docs/examples/wedge.png --region 98,5,5,14 --layer SiO2 --substrate Si --thickness 10:800",
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
 )
