@@ -25,7 +25,7 @@ from pellicle.fitting.discrepancy import discrepancy
 from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_measurements import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
-from pellicle.fitting.marginal import by_remaining, ranking, with_shift
+from pellicle.fitting.marginal import by_remaining, with_shift
 from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, linearised
@@ -299,8 +299,8 @@ def _subject(
     `measurements` makes those of the fit from its minima, `identity` is the hash of all that the posterior
     depends on, `assumption` what it assumes beyond the fit.
     """
-    best = ranking(measurements, ranked)
-    ranked = by_remaining(best.ranked, best.discrepancy).counted
+    best = fit.ranking
+    ranked = by_remaining(ranked, best.discrepancy).counted
     jacobian, covariance = linearised(ranked)
     data, problem = measurements(ranked), ranked.problem.affine()
     allowed = discrepancy(data.evidence(ranked, jacobian), jacobian, ranked.minima.units[0])

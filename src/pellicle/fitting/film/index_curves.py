@@ -144,7 +144,7 @@ class _Fits(NamedTuple):
         return deviance - self.ranked.minima.deviance[0], np.full(len(curves), further), at, curves
 
     def at_thicknesses(self, problem: Problem, medium: Any, starts: np.ndarray) -> tuple[Any, ...]:
-        """The same of fits from each start, at each thickness and from the best of these."""
+        """Fits from each start, described so: at each thickness, and from the best of these."""
         lower, span = problem.box.lower, problem.box.upper - problem.box.lower
         axis = next((i for i, p in enumerate(problem.parameters) if p.name == self.depth), None)
         if axis is None:
@@ -161,7 +161,7 @@ class _Fits(NamedTuple):
         return self.described(problem, medium, np.append(found.deviance, again.deviance), both)
 
     def of_spline(self, knots: int, guesses: Sequence[np.ndarray]) -> tuple[Any, ...]:
-        """The same of a spline with all numbers free, from curves near to the `guesses` (2, wavelengths)."""
+        """Fits of a spline with all numbers free, described so, from curves near to `guesses`."""
         from scipy.optimize import lsq_linear  # SciPy's linear algebra takes longer to load than most fits
 
         ends = _BEYOND[0] * HC / self.nm.min(), HC / self.nm.max() / _BEYOND[1]
