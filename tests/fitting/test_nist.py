@@ -19,9 +19,8 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.covariance import errors, scaled
-from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.nuisance import Data
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Noise, Problem

@@ -7,14 +7,13 @@ import numpy as np
 
 from pellicle.fitting.discrepancy import Effect
 from pellicle.fitting.film.extended_scene import Program, simulated_side_by_side
-from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.systematic_effects import (
     SimulatedEffect,
     change_of_data,
     effects_on_signal,
     simulations_of,
 )
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.programs.cache import in_chunks
 from pellicle.scene.film import Scene
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from pellicle.fitting.covariance import scaled
 from pellicle.fitting.film import nuisance
-from pellicle.fitting.film.form import Local, SpectrumForm
 from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.search import thickness_grid
 from pellicle.fitting.film.summary import like_substrate, thinnest
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumForm, SpectrumView
 from pellicle.fitting.noise import student
 from pellicle.fitting.normal_equations import solve, times
 from pellicle.fitting.problem import Problem

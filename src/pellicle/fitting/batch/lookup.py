@@ -15,10 +15,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.nuisance import chebyshev, offset_prior, scale_prior
 from pellicle.fitting.film.search import design_points, thickness_grid
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import SpectrumForm, SpectrumView
 from pellicle.fitting.problem import Problem
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene

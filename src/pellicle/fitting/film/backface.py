@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting.film.colour_measurements import MeasuredColours
-from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.targets import Target
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import RankedMinima

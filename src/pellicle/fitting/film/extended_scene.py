@@ -15,10 +15,9 @@ from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
 from pellicle.effects.film_plan import exact
 from pellicle.effects.presence import computes_roughness, scene_media
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
-from pellicle.fitting.film.form import SpectrumForm
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene, thickness_spread

@@ -16,9 +16,8 @@ from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film.colour_measurements import accuracy as colours_accuracy
 from pellicle.fitting.film.colour_measurements import colour_curve, colours_part, unlike
 from pellicle.fitting.film.colour_view import ColoursView
-from pellicle.fitting.film.form import Local
 from pellicle.fitting.film.fringes import Fringes
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.reported_layer import layer_errors, principal_indices
 from pellicle.fitting.result import Part, Rival

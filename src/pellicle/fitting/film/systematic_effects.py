@@ -11,8 +11,7 @@ from pellicle.dispersion.effective_medium import AbstractMixture
 from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.extended_scene import ExtendedScene, Number, extended
-from pellicle.fitting.film.form import Local
-from pellicle.fitting.film.view import SpectrumView
+from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.optics.orders import FWHM
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
