@@ -42,8 +42,7 @@ import numpy as np
 
 import pellicle as pl
 from pellicle.fitting.evaluation import deviances
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import make, measured
 
 jax.config.update("jax_enable_x64", True)
 

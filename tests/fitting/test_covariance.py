@@ -11,7 +11,7 @@ from scipy import stats
 import pellicle as pl
 from pellicle.fitting.covariance import Scaled, errors, scaled
 from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured as as_numbers
+from pellicle.fitting.film.problem import measured as as_numbers
 from pellicle.simulation.functions import reflectance
 from pellicle.simulation.spectra import simulate_signal
 

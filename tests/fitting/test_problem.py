@@ -12,7 +12,7 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import make as make_surface
 from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.film.problem import make as make_scene
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import measured
 from pellicle.fitting.problem import Explained, Form, Problem, View
 from pellicle.scene.surface import Surface
 

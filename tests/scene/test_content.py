@@ -3,8 +3,7 @@
 import numpy as np
 
 import pellicle as pl
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import make, measured
 from pellicle.scene.free import KEPT, Content, constant, remembered
 
 NM = np.linspace(400.0, 800.0, 64)

@@ -22,8 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.accuracy.case import Case, Program, Variant, compiled
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import Measured
+from pellicle.fitting.film.problem import Measured, make
 from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Form, Problem
 from pellicle.fitting.progress import Progress

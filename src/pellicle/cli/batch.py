@@ -242,7 +242,7 @@ def measurement(
     The notes of the readers go to stderr, unless `notes` is false.
     """
     from pellicle.data.spectrum import Spectrum
-    from pellicle.fitting.film.targets import without_scale
+    from pellicle.fitting.film.problem import without_scale
     from pellicle.scene.film import Scene
     from pellicle.scene.surface import Surface
 

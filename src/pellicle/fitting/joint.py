@@ -27,8 +27,8 @@ from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fit as of_film
+from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.summary import FilmMeasurements
-from pellicle.fitting.film.targets import Target
 from pellicle.fitting.minima import minima
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem

@@ -14,8 +14,7 @@ from pellicle.fitting.batch.data import BatchFits, batch_data
 from pellicle.fitting.batch.errors import BatchErrors
 from pellicle.fitting.batch.search import BatchSearch, minima, prepared
 from pellicle.fitting.film.fit import measurements
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import Measured
+from pellicle.fitting.film.problem import Measured, make
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.scene.film import Scene

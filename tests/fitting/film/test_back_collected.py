@@ -8,7 +8,7 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured as as_numbers
+from pellicle.fitting.film.problem import measured as as_numbers
 from pellicle.forward_model.film_signal import build
 from pellicle.optics.ellipsometry import psi_delta
 from pellicle.scene.film import with_wavelength

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import make, measured
 
 CANDIDATES, POINTS = 16, 64
 FREE = {"parameter", "constant", "broadcast", "bitcast", "copy", "reshape", "slice", "transpose", "tuple"}

@@ -8,7 +8,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting.film.other_readings import conventions
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import measured
 
 from ...differences import derivative
 

@@ -8,8 +8,8 @@ import pytest
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import UsageError
+from pellicle.fitting.film.problem import measured, seen_as
 from pellicle.fitting.film.sweeps import sweeps
-from pellicle.fitting.film.targets import measured, seen_as
 from pellicle.reporting import figures
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.figures import draw_spectrum as draw_data

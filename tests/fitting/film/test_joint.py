@@ -11,8 +11,7 @@ from pellicle.dispersion.empirical import CauchyUrbach
 from pellicle.errors import UsageError
 from pellicle.fitting.evaluation import deviances, total_deviance
 from pellicle.fitting.film.fit import labels, measurements
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import measured
+from pellicle.fitting.film.problem import make, measured
 from pellicle.reporting.figures import draw_fit as draw
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json

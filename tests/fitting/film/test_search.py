@@ -9,8 +9,8 @@ import pytest
 import pellicle as pl
 from pellicle.fitting import minima as solver
 from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.problem import measured as as_numbers
 from pellicle.fitting.film.search import search
-from pellicle.fitting.film.targets import measured as as_numbers
 from pellicle.fitting.progress import quiet
 
 

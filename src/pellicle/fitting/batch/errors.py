@@ -15,10 +15,9 @@ from pellicle.fitting.conclusion import verdicts
 from pellicle.fitting.discrepancy import DOUBTFUL, discrepancy
 from pellicle.fitting.film.evidence import spectrum_evidence
 from pellicle.fitting.film.parts import accuracy
-from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.problem import Measured, drifts, shortest_wavelength
 from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
-from pellicle.fitting.film.targets import Measured, drifts
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.marginal import above_best, by_remaining, gains
 from pellicle.fitting.minima import Minima

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting.film.colour_measurements import MeasuredColours
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import Target
+from pellicle.fitting.film.problem import Target, make
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem

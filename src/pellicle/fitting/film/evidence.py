@@ -11,8 +11,8 @@ import numpy as np
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_evidence
+from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.film.targets import Target
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima

@@ -13,9 +13,8 @@ from pellicle.fitting.film import mistakes
 from pellicle.fitting.film.mistakes import Mistake
 from pellicle.fitting.film.other_readings import Data, folded, readings
 from pellicle.fitting.film.parameters import thickness_name
-from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.problem import Measured, Target, make
 from pellicle.fitting.film.search import search
-from pellicle.fitting.film.targets import Measured, Target
 from pellicle.fitting.minima import minima
 from pellicle.fitting.noise import short_range_noise
 from pellicle.fitting.problem import Problem

@@ -30,11 +30,10 @@ from pellicle.fitting.film.colour_measurements import measured_colours
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.explanations import explanations
 from pellicle.fitting.film.index_curves import IndexCurves, index_curves
-from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.problem import Target, make, measured, without_scale
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.sweeps import with_sweeps
-from pellicle.fitting.film.targets import Target, measured, without_scale
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet

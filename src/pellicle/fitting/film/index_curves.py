@@ -22,8 +22,7 @@ from pellicle.fitting.assembly import Assembly
 from pellicle.fitting.conclusion import Conclusion
 from pellicle.fitting.curves import at_each_wavelength
 from pellicle.fitting.film.parameters import thickness_name
-from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.targets import Measured, Target
+from pellicle.fitting.film.problem import Measured, Target, make
 from pellicle.fitting.minima import solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem

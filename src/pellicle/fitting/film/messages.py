@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.fitting.film.colour_measurements import MeasuredColours
-from pellicle.fitting.film.targets import Target
+from pellicle.fitting.film.problem import Target
 from pellicle.fitting.problem import Problem
 from pellicle.forward_model.plan import Plan
 from pellicle.materials import Material

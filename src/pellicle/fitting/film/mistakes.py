@@ -13,7 +13,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.dispersion.base import AbstractDispersion, known_index
-from pellicle.fitting.film.targets import Measured
+from pellicle.fitting.film.problem import Measured
 from pellicle.materials import Material, material
 from pellicle.optics.pair import Pair, imag, is_real, real, to_complex
 from pellicle.scene.film import Scene, with_wavelength

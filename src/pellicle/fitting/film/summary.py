@@ -18,8 +18,7 @@ from pellicle.fitting.film import fringes, parts, residual_structure
 from pellicle.fitting.film.evidence import evidence
 from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
-from pellicle.fitting.film.problem import shortest_wavelength
-from pellicle.fitting.film.targets import Target, drifts
+from pellicle.fitting.film.problem import Target, drifts, shortest_wavelength
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import local_noise, rounding, student
 from pellicle.fitting.profile_likelihood import Limits
