@@ -1,4 +1,4 @@
-"""Spectra and colours of a sample and their scenes as a least-squares problem."""
+"""Spectra and colours of a sample, their targets and scenes, as a least-squares problem."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias

@@ -1,4 +1,4 @@
-"""A spectrum as a view of a least-squares problem: simulated by a plan, scaled, compared with data."""
+"""A spectrum as a view of a least-squares problem: its simulation by a plan, scaled, compared with data."""
 
 from __future__ import annotations
 
