@@ -25,7 +25,7 @@ from pellicle.data.half_angles import angles, vectors
 from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
-from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import Appearance
 from pellicle.rendering.targets import Material, Target, write_grey_image
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples

@@ -12,8 +12,7 @@ from pellicle.accuracy.case import Program
 from pellicle.accuracy.colour_methods import Films, compiled, one_film
 from pellicle.accuracy.registry import Method
 from pellicle.dispersion.base import AbstractDispersion
-from pellicle.rendering.appearance import appearance
-from pellicle.rendering.formula import effective, physical
+from pellicle.rendering.formula import appearance, effective, physical
 from pellicle.rendering.targets import target
 from pellicle.scene.film import Scene
 from pellicle.scene.layers import Layer

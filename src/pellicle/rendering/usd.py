@@ -14,7 +14,7 @@ import numpy as np
 
 from pellicle.colour import linear_srgb, sensor
 from pellicle.files import replacing
-from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import Appearance
 from pellicle.rendering.materialx import bsdf_of, formula
 from pellicle.rendering.targets import Material, Target
 
