@@ -15,9 +15,8 @@ from pellicle.brdf.lobes import Evaluate, two_lobes
 from pellicle.brdf.models import model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
-from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import correlation_length
-from pellicle.fitting.problem import Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
 from pellicle.programs.cache import kept

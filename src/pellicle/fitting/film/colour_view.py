@@ -18,8 +18,7 @@ from pellicle.colour.spaces import Encoding
 from pellicle.data.colours import Colours
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.coordinates import Array
-from pellicle.fitting.problem import Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan

@@ -11,12 +11,11 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION
-from pellicle.fitting.problem import Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
