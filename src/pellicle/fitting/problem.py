@@ -1,4 +1,4 @@
-"""A least-squares problem: parameters with bounds and priors, and the data that they explain.
+"""A least-squares problem: parameters, bounds and priors, coordinates of a search, and the data to explain.
 
 Spectra (`fitting.film.problem`) and BRDF samples (`fitting.brdf.problem`) are two kinds of `View`;
 whatever comes after the search takes a `Problem` and depends on neither.

@@ -1,4 +1,4 @@
-"""Columns of a table by their names, in the languages that instruments write.
+"""Columns of a table by their names and units, in the languages that instruments write.
 
 Names are matched without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
 after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`).
