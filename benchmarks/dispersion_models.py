@@ -1,11 +1,10 @@
 """Every dispersion model from its default bounds: `python benchmarks/dispersion_models.py [MODEL...]`.
 
 Twenty random clean films of each model of the catalogue are simulated by formulas written out here and the
-transfer matrices of `benchmarks/verdicts` (Kramers-Kronig integrals are numerical ones), and fitted with the
-bare name of the model, so within its default bounds. A film is found if the misfit is that of the noise and
-the thickness is right within three of its standard errors. Prints the films that were not found.
-
-Splines are left out: their knots describe many films equally well.
+transfer matrices of `benchmarks/verdicts` (Kramers-Kronig integrals are numerical ones, splines are SciPy's),
+and fitted with the bare name of the model, so within its default bounds. A film is found if the misfit is
+that of the noise and the thickness is right within three of its standard errors. Prints the films that were
+not found.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 sys.path.insert(0, str(Path(__file__).parent / "verdicts"))
 
@@ -26,32 +26,34 @@ from media import HC, Index, cauchy, lorentz
 
 import pellicle as pl
 from pellicle.cli.session import start
-from pellicle.recipes.dispersion_models import free_model
+from pellicle.recipes.dispersion_models import KNOTS, free_model
 
 FILMS = 20
 NOISE = 2e-3
-GRID = np.linspace(0.005, 150.0, 15000)
+GRID = np.linspace(1e-6, 150.0, 15000)
 """Photon energies (eV) of the Kramers-Kronig integrals."""
 FOUND = 1.3
 """Largest reduced χ² of a film that is found: that of the truth is 1 ± 0.1."""
 
 
+def conjugated(loss: Callable[[np.ndarray], np.ndarray], wavelength: np.ndarray) -> np.ndarray:
+    """A function with the imaginary part `loss` of the photon energy (eV), and what Kramers and Kronig add to
+    its real part."""
+    table = loss(GRID)
+    energies, inverse = np.unique(HC / np.asarray(wavelength), return_inverse=True)
+    own = np.interp(energies, GRID, table)
+    # P∫ dξ/(ξ² − E²) over all energies is 0: subtracted, the integrand has no pole
+    top = GRID[None] * table - (energies * own)[:, None]
+    below = GRID**2 - energies[:, None] ** 2
+    integrand = np.where(np.abs(below) > 1e-9, top / np.where(below == 0, 1.0, below), 0.0)
+    rest = energies * own * np.log((GRID[-1] + energies) / (GRID[-1] - energies)) / (2 * energies)
+    real = 2 / np.pi * (np.trapezoid(integrand, GRID, axis=1) - rest)
+    return (real + 1j * loss(energies))[inverse].reshape(np.shape(wavelength))
+
+
 def absorbing(eps_inf: float, loss: Callable[[np.ndarray], np.ndarray]) -> Index:
     """Index of a permittivity with the imaginary part `loss` of the photon energy (eV)."""
-    table = loss(GRID)
-
-    def index(wavelength: np.ndarray) -> np.ndarray:
-        energies, inverse = np.unique(HC / np.asarray(wavelength), return_inverse=True)
-        own = np.interp(energies, GRID, table)
-        # P∫ dξ/(ξ² − E²) over all energies is 0: subtracted, the integrand has no pole
-        top = GRID[None] * table - (energies * own)[:, None]
-        below = GRID**2 - energies[:, None] ** 2
-        integrand = np.where(np.abs(below) > 1e-9, top / np.where(below == 0, 1.0, below), 0.0)
-        rest = energies * own * np.log((GRID[-1] + energies) / (GRID[-1] - energies)) / (2 * energies)
-        real = eps_inf + 2 / np.pi * (np.trapezoid(integrand, GRID, axis=1) - rest)
-        return np.sqrt(real + 1j * loss(energies))[inverse].reshape(np.shape(wavelength))
-
-    return index
+    return lambda wavelength: np.sqrt(eps_inf + conjugated(loss, wavelength))
 
 
 def gaussian(a: float, e0: float, fwhm: float, eps_inf: float) -> Index:
@@ -89,6 +91,32 @@ def sellmeier(b: float, c: float) -> Index:
     return lambda wavelength: np.sqrt(1 + b * wavelength**2 / (wavelength**2 - c) + 0j)
 
 
+def knotted(n: np.ndarray, k: np.ndarray) -> Index:
+    """B-splines of n and k that belong to the default knots (C. de Boor's averages)."""
+    inner = [np.mean(KNOTS[i : i + 3]) for i in range(1, len(KNOTS) - 3)]
+    around = [KNOTS[0]] * 4 + inner + [KNOTS[-1]] * 4
+    return BSpline(around, n + 1j * k, 3)
+
+
+def knotted_absorption(n_inf: float, k: np.ndarray) -> Index:
+    """A B-spline of k in photon energy that belongs to the default knots and falls to zero beyond them."""
+    sites = HC / np.array(KNOTS[::-1])
+    below = sites[0] * (sites[0] / sites[1]) ** np.array([3, 2, 1])
+    above = sites[-1] * (sites[-1] / sites[-2]) ** np.array([1, 2, 3])
+    around, coefficients = np.concatenate([below, sites, above]), [k[-1], *k[::-1], k[0]]
+    elements = [BSpline.basis_element(around[i : i + 5], extrapolate=False) for i in range(len(coefficients))]
+
+    def loss(energy: np.ndarray) -> np.ndarray:
+        return sum(c * np.nan_to_num(own(energy)) for c, own in zip(coefficients, elements, strict=True))
+
+    return lambda wavelength: n_inf + conjugated(loss, wavelength)
+
+
+def falling(random: np.random.Generator) -> np.ndarray:
+    """Extinction at the default knots, which falls towards the red."""
+    return random.uniform(0.02, 0.8) * np.exp(-np.arange(len(KNOTS)) / random.uniform(0.4, 1.5))
+
+
 Draw = Callable[[np.random.Generator], Index]
 MODELS: dict[str, Draw] = {
     "constant": lambda r: cauchy(r.uniform(1.3, 2.6), 0.0),
@@ -115,6 +143,10 @@ MODELS: dict[str, Draw] = {
         r.uniform(0.5, 3.0),
         r.uniform(1.0, 2.5),
     ),
+    "spline": lambda r: knotted(
+        r.uniform(1.4, 2.4) + r.uniform(0.05, 0.5) * np.exp(-np.arange(len(KNOTS)) / 2), falling(r)
+    ),
+    "spline-kk": lambda r: knotted_absorption(r.uniform(1.4, 2.2), falling(r)),
 }
 """Films of ordinary numbers; TCO-like ones for drude."""
 GLASS = 1.52

@@ -27,22 +27,26 @@ LAMP = Accuracy(weighted=0.6)
 @pytest.mark.parametrize(
     ("rows", "remaining", "accuracy", "expected"),
     [
-        ([row()], (2.4, 0.1, 1.0), FILM, False),  # noise
-        ([row()], (40.0, 0.01, 1.0), FILM, False),  # structured, but small: below 1.5 % of the range
-        ([row()], (2.6, 0.016, 1.0), FILM, True),
-        ([row()], (2.6, 0.016, 1.0), Accuracy(0.02, 2.0), False),
-        ([row()], (2.6, 0.021, 1.0), Accuracy(0.02, 2.0), True),  # larger than any instrument makes
-        ([row()], (2.6, 0.021, 1.0), Accuracy(0.02, math.inf), True),
+        ([row()], (2.4, 0.1, 0.1, 1.0), FILM, False),  # noise
+        ([row()], (40.0, 0.01, 0.01, 1.0), FILM, False),  # structured, but small: below 1.5 % of the range
+        ([row()], (2.6, 0.016, 0.016, 1.0), FILM, True),
+        ([row()], (2.6, 0.016, 0.016, 1.0), Accuracy(0.02, 2.0), False),
+        ([row()], (2.6, 0.021, 0.021, 1.0), Accuracy(0.02, 2.0), True),  # larger than any instrument makes
+        ([row()], (2.6, 0.021, 0.021, 1.0), Accuracy(0.02, math.inf), True),
         # an index 25 % lower explains what usual effects do not
-        ([row(0.9, -0.25)], (2.0, 1e-4, 1.0), FILM, True),
-        ([row(0.5, -0.25)], (2.0, 1e-4, 1.0), FILM, False),
-        ([row(0.9, -0.02)], (2.0, 1e-4, 1.0), FILM, False),  # four of its standard uncertainties
-        ([row(0.9, -0.25)], (1.4, 1e-4, 1.0), FILM, False),
-        ([row(0.9, -0.25), SCALE], (2.0, 1e-4, 1.0), FILM, False),  # a scale explains as much
-        ([SLIT], (2.0, 1e-4, 1.0), FILM, False),  # of any size, but no wrong material
+        ([row(0.9, -0.25)], (2.0, 1e-4, 1e-4, 1.0), FILM, True),
+        ([row(0.5, -0.25)], (2.0, 1e-4, 1e-4, 1.0), FILM, False),
+        ([row(0.9, -0.02)], (2.0, 1e-4, 1e-4, 1.0), FILM, False),  # four of its standard uncertainties
+        ([row(0.9, -0.25)], (1.4, 1e-4, 1e-4, 1.0), FILM, False),
+        ([row(0.9, -0.25), SCALE], (2.0, 1e-4, 1e-4, 1.0), FILM, False),  # a scale explains as much
+        ([SLIT], (2.0, 1e-4, 1e-4, 1.0), FILM, False),  # of any size, but no wrong material
+        # a given σ is contradicted by fringes of a wrong order, some of which differ between neighbours
+        ([row()], (0.05, 0.013, 0.04, 18.0), FILM, True),
+        ([row()], (0.05, 0.013, 0.04, 9.0), FILM, False),
+        ([row()], (0.05, 0.013, 0.014, 18.0), FILM, False),
         # a drifting lamp is judged by the error that it is allowed
-        ([row()], (20.0, 1.0, 0.5), LAMP, False),
-        ([row()], (20.0, 1.0, 0.7), LAMP, True),
+        ([row()], (20.0, 1.0, 1.0, 0.5), LAMP, False),
+        ([row()], (20.0, 1.0, 1.0, 0.7), LAMP, True),
     ],
 )
 def test_what_is_a_misfit(rows, remaining, accuracy, expected):

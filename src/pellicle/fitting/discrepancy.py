@@ -121,12 +121,14 @@ class Remaining(NamedTuple):
     """Residuals of one view that no effect explains.
 
     `typical` is their size in the unit of the data, of most points, and `ratio` that to the noise of
-    neighbouring points; `weighted` is their root mean square in units of the σ of the points. `variance` is
-    the factor on σ² that stands for them and for their correlation.
+    neighbouring points; `rms` is their root mean square in the unit of the data, outliers aside, and
+    `weighted` in units of the σ of the points. `variance` is the factor on σ² that stands for them and for
+    their correlation.
     """
 
     ratio: Any
     typical: Any
+    rms: Any
     weighted: Any
     variance: Any
 
@@ -478,9 +480,12 @@ def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.nda
     large = np.flatnonzero(typical > DOUBTFUL * noise)
     if view.exact_noise is not None and len(large):
         noise[large] = np.maximum(noise[large], view.exact_noise(large))
-    rests = [balance.rest[..., own] for own in signals]
-    weighted = np.max([np.sqrt(np.mean((huber_roots(x) * x) ** 2, axis=(1, 2))) for x in rests], axis=0)
-    return Remaining(typical / noise, typical, weighted, balance.variance), noise
+    roots = [(own, huber_roots(balance.rest[..., own])) for own in signals]
+    rms, weighted = (
+        np.max([np.sqrt(np.mean((root * x[..., own]) ** 2, axis=(1, 2))) for own, root in roots], axis=0)
+        for x in (left, balance.rest)
+    )
+    return Remaining(typical / noise, typical, rms, weighted, balance.variance), noise
 
 
 def _evidence_share(view: Evidence, balance: _ViewBalance) -> np.ndarray:

@@ -48,9 +48,11 @@ def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -
 
 def beyond_accuracy(remaining: Remaining, accuracy: Accuracy) -> Any:
     """True (...) where residuals that no effect explains are larger than instruments make."""
-    large = remaining.typical > np.minimum(accuracy.largest, SPAN * accuracy.span)
-    structured = (remaining.ratio > STRUCTURED) & (large | (remaining.weighted > accuracy.weighted))
-    return structured | (large & (remaining.weighted > CONTRADICTED))
+    largest = np.minimum(accuracy.largest, SPAN * accuracy.span)
+    large = (remaining.typical > largest) | (remaining.weighted > accuracy.weighted)
+    # the misfit of a wrong order may be in some of the fringes alone
+    contradicted = (remaining.rms > largest) & (remaining.weighted > CONTRADICTED)
+    return (large & (remaining.ratio > STRUCTURED)) | contradicted
 
 
 def other_material(contributions: Sequence[Contribution]) -> Any:

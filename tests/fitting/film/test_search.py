@@ -10,8 +10,9 @@ import pellicle as pl
 from pellicle.fitting import minima as solver
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.problem import measured as as_numbers
-from pellicle.fitting.film.search import search
+from pellicle.fitting.film.search import design_points, search
 from pellicle.fitting.progress import quiet
+from pellicle.recipes.dispersion_models import free_model
 
 
 def built(scene, data):
@@ -146,3 +147,15 @@ def test_a_transparent_conductor_is_found_from_default_bounds(thickness, eps_inf
     assert fit.status is pl.Status.CONVERGED
     assert fit["Ep"].value == pytest.approx(plasma, rel=0.01)
     assert fit["thickness"].value == pytest.approx(thickness, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["lorentz", "gaussian", "tauc-lorentz", "cody-lorentz"])
+def test_some_start_is_near_any_energy_of_a_resonance(name):
+    """A gaussian resonance of 3.7 eV was missed from 2.5, 5.5 and 8.5 eV."""
+    nm = np.linspace(400.0, 800.0, 20)
+    scene = pl.Scene(pl.Layer(free_model(name), pl.Free(10, 300)), 1.5)
+    problem = built(scene, pl.Spectrum(nm, np.full(20, 0.1), "R"))
+    at = [p.key for p in problem.parameters].index("E0")
+    energies = np.unique(np.asarray(problem.values(design_points(problem)))[:, at])
+    for energy in np.linspace(2.0, 7.0, 11):
+        assert np.abs(np.log(energies / energy)).min() < np.log(1.2)

@@ -68,6 +68,9 @@ _DRUDE = {"eps_inf": 6, "Ep": 7}
 """Levels beside free charges: their reflection edge is where their plasma energy and eps_inf put it together.
 Found of 14 simulated spectra of transparent conductors, 0.8 to 2.3 eV: 12 with 3 even levels, 14 with
 these."""
+_RESONANCE = {"E0": 7}
+"""Levels of the energy of the only resonance, by decades: n and k on its two sides differ. Found of 20 films
+of `benchmarks/dispersion_models.py` with a gaussian one: 19 with 3 even levels, 20 with these."""
 
 
 def parameters(scene: Scene) -> tuple[Parameter, ...]:
@@ -118,6 +121,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     group = full.removesuffix(key) + field if owner in (Spline, KramersKronigSpline, FreeProfile) else full
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
     drude = any(isinstance(x, Drude) for x in [location.owner, *getattr(location.owner, "terms", ())])
+    resonances = sum(getattr(steps[-1], "name", "") == "E0" for steps, _ in free_leaves(scene))
+    levels = (_DRUDE if drude else _RESONANCE if resonances == 1 else {}).get(key, _FEW)
     return Parameter(
         name=full,
         key=key,
@@ -134,8 +139,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         resolution=_RESOLUTION if key == "thickness" else None,
         searched=key in _SEARCHED or owner in (Spline, FreeProfile) or group.split(".")[-1] == "k",
         group=group,
-        levels=(_DRUDE if drude else {}).get(key, _FEW) if oscillator else None,
-        decades=drude and key == "Ep",
+        levels=levels if oscillator else None,
+        decades=oscillator and levels > _FEW and key != "eps_inf",
     )
 
 
