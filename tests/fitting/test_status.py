@@ -185,8 +185,9 @@ def test_status_of_a_fit_that_has_converged_and_is_no_misfit(parameters, more, s
 
 LEAD = estimate(value=300.0, stderr=1.0)
 RIVALS = (Rival({"thickness": 500.0}, 1.0), Rival({"thickness": 700.0}, 2.0))
-RESTING_N = {"n": estimate("n", 1.5, 0.1, True)}
-DEFAULT_N = {"n": estimate("n", 1.5, 0.1, True, default_bounds=True)}
+RESTING_N = {"n": estimate("n", 1.5, 0.1, True, binding=True)}
+DEFAULT_N = {"n": estimate("n", 1.5, 0.1, True, default_bounds=True, binding=True)}
+NO_K = {"k": estimate("k", 0.0, 0.1, True)} | DEFAULT_N
 OTHER_N = {"rivals": (Rival({"thickness": 300.1, "n": 2.5}, 1.0),)}
 TRADING = {"trading": ["n and thickness are correlated", "another"]}
 EXPANDED = "300.0 ± 2.0 nm (95 %)"
@@ -203,6 +204,9 @@ def unseen(**limits):
         (Status.CONVERGED, {}, TRADING, f"{EXPANDED}. But n and thickness are correlated."),
         (Status.AT_BOUND, RESTING_N, {}, "lies on a bound that was set: n (1.5 nm). Widen the bound"),
         (Status.AT_BOUND, DEFAULT_N, {}, "lies on a default bound: n (1.5 nm). Give it bounds."),
+        (Status.AT_BOUND, NO_K, {}, "lies on a default bound: n (1.5 nm). Give it bounds."),
+        (Status.AT_BOUND, RESTING_N, {"found": "n and k"}, "The best fit, n and k, lies on a bound"),
+        (Status.MISFIT, {}, {"found": "n and k"}, "Its n and k should not be used."),
         (Status.AMBIGUOUS, {}, {"rivals": RIVALS}, "but 500 nm fits nearly as well."),
         (Status.AMBIGUOUS, {"n": estimate("n", 1.5, 0.01)}, OTHER_N, "but n 2.5 nm fits nearly as well."),
         (Status.NOT_IDENTIFIABLE, unseen(), {}, "it may be anything between 0 and 1000 nm."),

@@ -169,7 +169,7 @@ def _status(
     close: np.ndarray,
     binding: Container[str],
 ) -> Judged:
-    """The status of fits by their parameters (..., parameters), the leading one first."""
+    """The status of fits by their parameters (..., parameters), with all of these `at_bound`."""
     order = sorted(range(len(parameters)), key=lambda i: parameters[i].key != "thickness")
     sample = [i for i in order if not parameters[i].name.startswith("instrument.")]
     about = [parameters[i] for i in sample]
@@ -199,7 +199,9 @@ def _status(
         ):
             log.info("status: %s %s", question, answer)
         log.info("status: %s", ORDER[status.position])
-    return status
+    at_bound = np.zeros(values.shape, bool)
+    at_bound[..., sample] = status.at_bound
+    return status._replace(at_bound=at_bound)
 
 
 def neighbourhood(ranked: RankedMinima, covariance: np.ndarray, others: np.ndarray) -> Neighbourhood:
@@ -346,11 +348,13 @@ def estimates(
     """Every parameter of one fit by name: free ones first, thickness before all; then nuisances and fixed
     numbers."""
     parameters, freedom, free = ranked.problem.parameters, max(float(ranked.freedom), 1.0), []
-    columns = ranked.values, *numbers.limits, numbers.noise.stderr
-    for p, value, stderr, *ends, noise in zip(parameters, *(x.tolist() for x in columns), strict=True):
+    columns = ranked.values, *numbers.limits, numbers.noise.stderr, numbers.status.at_bound
+    for p, value, stderr, *ends, noise, binding in zip(
+        parameters, *(x.tolist() for x in columns), strict=True
+    ):
         lower, upper = (None if math.isnan(end) else end for end in ends)
         bounds = p.lower, p.upper, True, bool(p.on_bound(value)), lower, upper, p.limits is not None
-        free.append(Estimate(p.name, value, stderr, p.unit, *bounds, noise, freedom))
+        free.append(Estimate(p.name, value, stderr, p.unit, *bounds, noise, freedom, binding))
     free.sort(key=lambda e: e.name.split(".")[-1] != "thickness")
     pairs = zip(ranked.problem.views, ranked.fits, strict=True)
     nuisances = [c for view, fit in pairs for c in view.nuisances(fit.at)]

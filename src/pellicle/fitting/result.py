@@ -49,7 +49,8 @@ class Estimate:
     `stderr` is the combined standard uncertainty of the GUM: it includes systematic effects and what the
     model misses. `stderr_noise` is that of the noise alone, with its `degrees_of_freedom` (infinite where σ
     is given). `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded. With
-    `default_bounds` nobody chose `lower` and `upper` for this sample.
+    `default_bounds` nobody chose `lower` and `upper` for this sample. A value that is `at_bound` is `binding`
+    unless physics sets the bound or the answer stands beside it.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Estimate:
     default_bounds: bool = False
     stderr_noise: float = math.nan  # not given: that of `stderr`
     degrees_of_freedom: float = math.inf
+    binding: bool = False
 
     def __post_init__(self):
         if math.isnan(self.stderr_noise):

@@ -106,8 +106,9 @@ def verdict(
     where: str = "",
     opaque: Container[str] = (),
     trading: Sequence[str] = (),
+    found: str = "",
 ) -> str:
-    """The verdict in one or two sentences.
+    """The verdict in one or two sentences, on the leading parameter or what is `found` instead.
 
     `missed`, `rms` with its `unit` behind a space, and `where` name the data that a misfit does not explain,
     by how much and at which wavelengths; `opaque` are thicknesses of layers that absorb, and `trading`
@@ -116,18 +117,19 @@ def verdict(
     lead = next((p for p in parameters.values() if p.free), None)
     if lead is None:
         return "Nothing was free to fit."
-    value, best = expanded(lead), f"{lead.name} {lead.value:.4g}{_unit(lead)}"
+    value, best = expanded(lead), found or f"{lead.name} {lead.value:.4g}{_unit(lead)}"
     besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
         return f"The data determine {lead.name}: {value}.{besides}"
     if status is Status.AT_BOUND:
-        resting = [p for p in parameters.values() if p.free and p.at_bound]
+        resting = [p for p in parameters.values() if p.binding]
         given = [p for p in resting if not p.default_bounds]
         names = " and ".join(f"{p.name} ({p.value:.6g}{_unit(p)})" for p in given or resting)
+        best = found or f"{lead.name} {value}"
         if not given:
-            return f"The best fit, {lead.name} {value}, lies on a default bound: {names}. Give it bounds."
+            return f"The best fit, {best}, lies on a default bound: {names}. Give it bounds."
         return (
-            f"The best fit, {lead.name} {value}, lies on a bound that was set: {names}."
+            f"The best fit, {best}, lies on a bound that was set: {names}."
             " Widen the bound; if the best value moves with it, the scene may be wrong."
         )
     if status is Status.AMBIGUOUS:

@@ -267,6 +267,7 @@ def _verdict(
         structure.place if structure else "",
         dark,
         [] if curves else identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
+        "n and k" if curves and not curves.depth else "",
     )
     return (
         sentence

@@ -80,7 +80,8 @@ class IndexCurves(NamedTuple):
 
     def conclusion(self, before: Conclusion, parts: Sequence[Part]) -> Conclusion:
         """The conclusion with the spread in the error of the thickness. Where nothing but the thickness and
-        the formula's numbers is ambiguous, the status is that of the thickness, else of n + ik."""
+        the formula's numbers is ambiguous, or rests on a default bound, the status is that of the thickness,
+        else of n + ik."""
         parameters, status, lead = dict(before.parameters), before.status, before.parameters.get(self.depth)
         every = [part.spectral for part in parts]
         errors = [np.hypot(x.n_stderr, x.k_stderr) / np.hypot(x.n, x.k) for x in every]
@@ -90,8 +91,11 @@ class IndexCurves(NamedTuple):
             parameters[self.depth], known = replace(lead, stderr=stderr), stderr <= WELL_KNOWN * lead.value
         rivals = distinct_rivals(parameters, before.rivals)
         apart = {name for rival in rivals for name in apart_from(parameters, rival)}
-        if status in (Status.CONVERGED, Status.AMBIGUOUS) and apart <= self.medium | {self.depth}:
-            status = Status.CONVERGED if known else Status.AMBIGUOUS
+        binding = [p for p in parameters.values() if p.binding]
+        bound = bool(binding) and all(p.default_bounds and p.name in self.medium for p in binding)
+        judged = status in (Status.CONVERGED, Status.AMBIGUOUS)
+        if (judged or (bound and status is Status.AT_BOUND)) and apart <= self.medium | {self.depth}:
+            status = Status.AMBIGUOUS if not known else Status.CONVERGED if judged else status
         return before._replace(parameters=parameters, status=status)
 
     def verdict(self, status: Status, lead: Estimate, parts: Sequence[Part]) -> str:
