@@ -107,7 +107,7 @@ def knotted_absorption(n_inf: float, k: np.ndarray) -> Index:
     elements = [BSpline.basis_element(around[i : i + 5], extrapolate=False) for i in range(len(coefficients))]
 
     def loss(energy: np.ndarray) -> np.ndarray:
-        return sum(c * np.nan_to_num(own(energy)) for c, own in zip(coefficients, elements, strict=True))
+        return np.nan_to_num([own(energy) for own in elements]).T @ np.array(coefficients)
 
     return lambda wavelength: n_inf + conjugated(loss, wavelength)
 
