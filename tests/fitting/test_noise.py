@@ -12,6 +12,7 @@ from pellicle.fitting.noise import (
     local_noise,
     student,
     typical_noise,
+    uneven_noise,
 )
 
 RANDOM = np.random.default_rng(8)
@@ -89,3 +90,17 @@ def test_correlation_times_by_sums_of_products_are_those_by_a_fourier_transform(
         closed = np.flatnonzero(np.arange(100) >= 5 * times)
         expected.append(max(times[closed[0]], 1.0) if len(closed) else 20.0)
     assert integrated_time(series[..., None]) == pytest.approx(expected)
+
+
+def test_noise_that_differs_along_a_spectrum():
+    """A detector that is 20 times noisier at one end; even noise, and a bump, which is no noise, are not."""
+    rows = [np.arange(400)]
+    sigma = np.where(np.arange(400) > 300, 20.0, 1.0)
+    white = RANDOM.normal(size=(20, 400))
+    for each in white:
+        ratio = uneven_noise(sigma * each, rows)
+        assert np.all(ratio[:280] == 1)
+        assert np.median(ratio[310:]) == pytest.approx(20, rel=0.6)
+        assert np.min(ratio[302:]) > 4
+        assert np.all(uneven_noise(each, rows) == 1)
+        assert np.all(uneven_noise(each + 300 * np.exp(-((np.arange(400) - 200.0) ** 2) / 50), rows) == 1)

@@ -21,6 +21,9 @@ WINDOW = 5
 statistical mechanics)."""
 _STEPS, _WHOLE = tuple(10.0**-k for k in range(-1, 7)), 1e-6
 """Steps to which files are rounded, and how near to a whole number of them values lie."""
+_UNEVEN, _REGION, _BESIDE, _WHITE = 4.0, 15, 6, 1.5
+"""Ratio to the noise of the quieter half at which noise differs along a spectrum, the fewest points where it
+does, points beside them that count with them, and the ratio of residuals to it above which they are more."""
 _LAGS = 12
 """Lags within which that window is looked for first, by sums of products, ten times as fast as a Fourier
 transform: that of white noise closes at 5."""
@@ -95,6 +98,23 @@ def _roughness(values: np.ndarray) -> np.ndarray:
     """Size of the second differences around each point (..., points), in units of the noise's own."""
     rough = np.abs(values[..., :-2] - 2 * values[..., 1:-1] + values[..., 2:]) / np.sqrt(6)
     return np.concatenate([rough[..., :1], rough, rough[..., -1:]], axis=-1)
+
+
+def uneven_noise(residual: np.ndarray, parts: Sequence[np.ndarray]) -> np.ndarray:
+    """White noise at each residual (rows,) over that of the quieter half, 1 where it is less than a few times
+    as large, or hardly anywhere larger: a detector may be noisier at one end.
+
+    Residuals that are larger than their neighbours differ have structure, which is no noise.
+    """
+    ratio = np.ones(len(residual))
+    for part in parts:
+        padded = np.pad(local_noise(residual[part], 2 * _REGION + 1), _BESIDE, mode="edge")
+        noise = np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1).max(axis=-1)
+        quiet = max(float(np.quantile(noise, 0.25)), 1e-300)
+        far = noise > _UNEVEN * quiet
+        if np.sum(far) >= _REGION and np.mean((residual[part][far] / noise[far]) ** 2) < _WHITE**2:
+            ratio[part] = np.where(far, noise / quiet, 1.0)
+    return ratio
 
 
 def typical_noise(values: np.ndarray, window: int = 51) -> np.ndarray:

@@ -237,6 +237,10 @@ class View(Protocol):
         """
         ...
 
+    def by_local_noise(self, at: Any) -> View:
+        """The view with weights by the noise of neighbouring points, where σ is not given and differs."""
+        ...
+
     def jacobian(self, at: Any) -> np.ndarray:
         """Weighted ∂ model / ∂ parameter in its own unit, then by each nuisance in units of its prior:
         (rows · channels, its parameters and nuisances)."""

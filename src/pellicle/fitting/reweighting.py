@@ -131,6 +131,8 @@ def rank(
     weighs each point by its residual, and takes σ from the bulk of them.
     """
     robust, scan = LOSSES.get(loss), candidates.scan
+    at = zip(problem.views, _local(problem, candidates.units[0]), strict=True)
+    problem = problem._replace(views=tuple(view.by_local_noise(local) for view, local in at))
     unit = candidates.units[0] if robust is None else _typical(problem, candidates, robust)
     noise = _noise(problem, unit, robust)
     for _ in range(_ROUNDS if robust is None else _ROBUST_ROUNDS):

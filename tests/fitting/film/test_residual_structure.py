@@ -56,3 +56,18 @@ def test_a_band_that_is_no_films_enlarges_the_error(film, measured):
     assert wrong.status == "misfit"
     assert "usual errors of instruments and samples would. Its thickness" in wrong.verdict
     assert any("structure over most of the spectrum (by 0.0" in warning for warning in wrong.warnings)
+
+
+def test_a_noisy_end_counts_for_less_and_is_no_structure(film, measured):
+    """The error by noise is that with the true σ of each point; with equal weights it is four times that."""
+    clean = measured(film(), 430.0, sigma=False)
+    sigma = np.where(clean.wavelength > 600, 0.02, 0.0)
+    values = clean.values + sigma * np.random.default_rng(4).normal(size=sigma.size)
+    data = dataclasses.replace(clean, values=values)
+    fit = pl.fit(data, film())
+    [told] = [warning for warning in fit.warnings if "noise differs along the spectrum" in warning]
+    assert "these points count for less" in told
+    assert not any("misses structure" in warning for warning in fit.warnings)
+    known = pl.fit(dataclasses.replace(data, sigma=np.hypot(sigma, 0.003)), film())["thickness"]
+    assert fit["thickness"].stderr_noise == pytest.approx(known.stderr_noise, rel=0.6)  # σ is that of few points
+    assert fit["thickness"].value == pytest.approx(known.value, abs=3 * known.stderr_noise)

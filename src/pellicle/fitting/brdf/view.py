@@ -156,6 +156,10 @@ class SamplesView:
         """Weighted residuals (rows, channels)."""
         return np.asarray(at.residual)[: self.rows]
 
+    def by_local_noise(self, at: Local) -> SamplesView:
+        """The view itself: its points are not neighbours along a spectrum."""
+        return self
+
     def at_model(self, at: Local) -> Any:
         """Weights of a relative noise of the model's values over those of the measured ones (rows, channels).
 

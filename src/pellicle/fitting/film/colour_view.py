@@ -150,6 +150,10 @@ class ColoursView:
         """Weighted residuals (colours, 3), of the model as the camera clips it."""
         return np.asarray(at.residual)
 
+    def by_local_noise(self, at: Local) -> ColoursView:
+        """The view itself: its points are not neighbours along a spectrum."""
+        return self
+
     def at_model(self, at: Local) -> float:
         """1: the noise does not depend on the model."""
         return 1.0

@@ -74,7 +74,7 @@ def spectrum_evidence(view: SpectrumView, at: Local, block: np.ndarray, effects:
         if not group.known:
             # the weights have the rms of all residuals: noise is no larger than that
             noise = np.minimum(noise, typical)
-            sigma[..., own] = noise[..., None, None]
+            sigma[..., own] *= (noise / typical)[..., None, None]
         elif given:
             noise = np.maximum(noise, typical)
         noises[..., own] = noise[..., None]

@@ -7,7 +7,7 @@ import numpy as np
 
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import local_noise
+from pellicle.fitting.noise import local_noise, uneven_noise
 from pellicle.fitting.reweighting import ViewFit
 
 _NARROWEST = 5
@@ -87,16 +87,17 @@ def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
     """Structure in the residuals of the best fit, None where they may be noise, and for colours."""
     if isinstance(view, ColoursView):
         return None
-    shape, columns = (view.rows, view.channels), slice(view.measured_channels)
-    weight = np.asarray(view.data.weight)[: view.points].reshape(shape)[:, columns]
-    residuals = (view.data.values - np.asarray(fit.at.model))[: view.points].reshape(shape)[:, columns]
-    nm = np.asarray(view.scene.light.wavelength)[: view.rows]
+    nm, residuals = np.asarray(view.scene.light.wavelength)[: view.rows], _residuals(view, fit)
+    weight = np.asarray(view.data.weight)[: view.points].reshape(view.rows, view.channels)
+    known = view.noise.given or view.noise.drifting
     stretches, covered = [], 0
     parts = [part for part in view.sweeps if len(part) >= 2 * _NARROWEST]
     for part in parts:
-        for column, inverse in zip(residuals[part].T, weight[part].T, strict=True):
-            known = view.noise.given or view.noise.drifting
-            scale = inverse if known else 1 / max(np.median(local_noise(column)), 1e-300)
+        for column, inverse in zip(residuals[part].T, weight[part].T, strict=False):
+            # a detector may have more noise at one end: that is no structure
+            ratio = uneven_noise(column, [np.arange(len(column))])
+            noise = ratio * max(np.median(local_noise(column / ratio)), 1e-300)
+            scale = np.minimum(inverse, 1 / noise) if known else 1 / noise
             for w in windows(column * scale, len(parts) * view.measured_channels):
                 inside = nm[part][w.first : w.last + 1]
                 size = float(np.mean(np.abs(column[w.first : w.last + 1])))
@@ -109,3 +110,26 @@ def missed(view: SpectrumView | ColoursView, fit: ViewFit) -> Missed | None:
     return Missed(
         spans, None if view.signal.ellipsometric else stretches[0][2], covered > _EVERYWHERE * residuals.size
     )
+
+
+def uneven(view: SpectrumView | ColoursView, fit: ViewFit) -> str:
+    """Words on wavelengths at which a spectrum of one column is much noisier than σ and other points say."""
+    if isinstance(view, ColoursView) or view.measured_channels > 1:
+        return ""
+    nm, [column] = np.asarray(view.scene.light.wavelength)[: view.rows], _residuals(view, fit).T
+    sigma = 1 / np.asarray(view.data.weight)[: view.points] if view.noise.known else 1.0
+    far = uneven_noise(column / sigma, view.sweeps) > 1
+    if not np.any(far):
+        return ""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], far, [False]])))
+    regions = sorted(edges.reshape(-1, 2).tolist(), key=lambda ends: ends[0] - ends[1])[:_SHOWN]
+    at = " and ".join(f"{nm[first:last].min():.0f}-{nm[first:last].max():.0f} nm" for first, last in regions)
+    high, low = (float(np.std(column[which])) for which in (far, ~far))
+    does = "its σ is too small there" if view.noise.given else "these points count for less"
+    return f"noise differs along the spectrum: {high:.2g} at {at}, {low:.2g} elsewhere; {does}"
+
+
+def _residuals(view: SpectrumView, fit: ViewFit) -> np.ndarray:
+    """Residuals (rows, measured channels) of a spectrum at the best fit, in the unit of the data."""
+    residuals = (view.data.values - np.asarray(fit.at.model))[: view.points]
+    return residuals.reshape(view.rows, view.channels)[:, : view.measured_channels]

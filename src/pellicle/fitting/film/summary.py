@@ -205,6 +205,8 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
             )
         if structure is not None:
             messages.append(f"{own}the model misses structure {structure.words}")
+        if words := residual_structure.uneven(view, fit):
+            messages.append(own + words)
         spectral = isinstance(view, SpectrumView)
         step = float(rounding(np.asarray(view.data.values)[: view.points])[0]) if spectral else 0.0
         if spectral and step > _ROUNDED * view.rms(fit.at.model):

@@ -14,7 +14,7 @@ from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
-from pellicle.fitting.noise import DRIFT_CORRELATION
+from pellicle.fitting.noise import DRIFT_CORRELATION, uneven_noise
 from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
@@ -167,6 +167,14 @@ class SpectrumView:
     def at_model(self, at: Any) -> float:
         """1: the noise of a spectrum does not depend on the model."""
         return 1.0
+
+    def by_local_noise(self, at: Local) -> SpectrumView:
+        """The view with weights by the noise of neighbouring points, where σ is not given and differs."""
+        if self.noise.known:
+            return self
+        columns = self.residuals(at).T
+        ratio = np.stack([uneven_noise(column, self.sweeps) for column in columns], axis=-1)
+        return self.reweighted(1 / ratio, self.independent_fraction) if np.any(ratio > 1) else self
 
     def jacobian(self, at: Local) -> np.ndarray:
         """Weighted ∂ model / ∂ parameter, then by each coefficient of scale and offset in units of its prior,
