@@ -69,5 +69,5 @@ def test_a_noisy_end_counts_for_less_and_is_no_structure(film, measured):
     assert "these points count for less" in told
     assert not any("misses structure" in warning for warning in fit.warnings)
     known = pl.fit(dataclasses.replace(data, sigma=np.hypot(sigma, 0.003)), film())["thickness"]
-    assert fit["thickness"].stderr_noise == pytest.approx(known.stderr_noise, rel=0.6)  # σ is that of few points
+    assert fit["thickness"].stderr_noise == pytest.approx(known.stderr_noise, rel=0.6)  # of few points
     assert fit["thickness"].value == pytest.approx(known.value, abs=3 * known.stderr_noise)
