@@ -14,7 +14,7 @@ from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_e
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.view import Local, SpectrumView
-from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, short_range_noise
+from pellicle.fitting.noise import DRIFT_CORRELATION, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import median
 
@@ -56,8 +56,7 @@ def spectrum_evidence(view: SpectrumView, at: Local, block: np.ndarray, effects:
     residual, sigma = (view.residuals(at) * inverse)[..., :keep], inverse[..., :keep]
     counted = np.sqrt(view.data.independent_fraction)[..., None, None] / sigma
     sigma, noises, exact = np.array(sigma), np.empty((*lead, keep)), None
-    step = rounding(np.asarray(view.data.values)[..., : view.points])[..., 0]
-    least, many = np.maximum(LEAST_NOISE * np.asarray(view.data.level), step), len(lead) > 0
+    least, many = np.maximum(LEAST_NOISE * np.asarray(view.data.level), view.rounding), len(lead) > 0
 
     def short(channels: list[int], which: Any = ...) -> Any:
         return short_range_noise(residual[which][..., channels], view.sweeps, least[which])

@@ -174,7 +174,7 @@ class _Trials:
         if problem.static != self.static and not compiled:
             return trial
         starts = [self.starts] if problem.parameters == self.parameters else []
-        if thorough:
+        if thorough or not starts:
             starts.append(search(problem, quiet, quick=True).units)
         found = minima(problem, np.concatenate(starts))
         return trial._replace(deviance=float(found.deviance[0]), excess=_excess(problem, found.units[0]))

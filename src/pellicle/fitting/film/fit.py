@@ -110,6 +110,7 @@ def fitted(
             return _fit(other, changed, tolerance, loss, quiet, False)[0]
 
         rows = discrepancy.contributions
+        targets = default_bounds.measured_within(targets, ranked, ranked.problem.parameters)
         said, refuted = explanations(spectra, targets, fit, ranked, rows, measure, refit, progress)
         causes = said or likely_cause(discrepancy, ranked.problem.parameters, refuted)
         return replace(fit, warnings=(*causes, *fit.warnings)), ranked

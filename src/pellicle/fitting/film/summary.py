@@ -20,7 +20,7 @@ from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import Target, drifts, shortest_wavelength
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import local_noise, rounding, student
+from pellicle.fitting.noise import local_noise, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima
@@ -208,13 +208,13 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
         if words := residual_structure.uneven(view, fit):
             messages.append(own + words)
         spectral = isinstance(view, SpectrumView)
-        step = float(rounding(np.asarray(view.data.values)[: view.points])[0]) if spectral else 0.0
+        step = float(view.rounding) if spectral else 0.0
         if spectral and step > _ROUNDED * view.rms(fit.at.model):
             messages.append(
                 f"{own}the values are rounded to {step * math.sqrt(12):.1g}, and {step:.2g} of the noise is"
                 " that: export more digits"
             )
-        white = spectral and view.noise.given and length < _WHITE
+        white = spectral and view.noise.given and length < _WHITE and structure is None
         if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
             messages.append(
                 f"{own}residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is"

@@ -14,7 +14,7 @@ from pellicle.effects.film_plan import full_plan
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
-from pellicle.fitting.noise import DRIFT_CORRELATION, uneven_noise
+from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
 from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
@@ -252,6 +252,13 @@ class SpectrumView:
         at = np.asarray(values)[None]
         planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
         return largest_difference(planned, whole, self.signal.degrees)
+
+    @property
+    def rounding(self) -> Any:
+        """Standard deviation (...) of the rounding of the values; 0 of components in a frame of each point,
+        which are whole numbers."""
+        step = rounding(np.asarray(self.data.values)[..., : self.points])[..., 0]
+        return step if self.data.frame is None else np.zeros_like(step)
 
     def in_columns(self, values: Any) -> np.ndarray:
         """Data values or a model of them (..., data values) as columns of the signal, such as N, C and S,
