@@ -160,6 +160,7 @@ _KINDS: tuple[tuple[str, str, Draw, str], ...] = (
     ("bandwidth", r"bandwidth", _flaw(slit=(18, 30)), "parylene on glass"),
     ("thickness spread", r"thickness.spread", _flaw(spread=(60, 110)), "oxide-R;parylene on glass"),
     ("roughness", r"rough", _flaw(roughness=(15, 22)), "nitride-R"),
+    ("rough surface", r"rough", _flaw(roughness=(3, 5)), "oxide-psi3;polymer-psi3"),
     ("another oxide", r"Al2O3|index of the layer", _sample(catalogued("Al2O3")), "oxide-R;oxide-psi2"),
     ("another oxide, denser", r"TiO2|index of the layer", _sample(catalogued("TiO2")), "oxide-psi2"),
     ("native oxide", r"oxide|SiO2", _sample(under=(OXIDE, 4, 7)), "polymer-psi3"),

@@ -7,7 +7,7 @@ import pytest
 
 import pellicle as pl
 
-from ...by_tmm import films
+from ...by_tmm import films, ncs, psi_delta
 
 NM = np.linspace(420.0, 800.0, 60)
 OXIDE, SILICON, GLASS = (np.asarray(pl.refractive_index(NM, name)) for name in ("SiO2", "Si", "BK7"))
@@ -49,6 +49,27 @@ def test_a_refusal_names_its_cause_and_the_thickness_without_it(values, cause, r
     assert remedy in fit.warnings[0]
     assert float(re.findall(r"thickness ([\d.]+)", fit.warnings[0])[0]) == pytest.approx(DEPTH, rel=3e-3)
     assert not any("would explain" in warning for warning in fit.warnings)
+
+
+@pytest.mark.slow  # twenty searches, and programs of three more scenes
+def test_a_rough_surface_is_named_for_psi_and_delta():
+    """Ten layers in which a film gives way to air, mixed by Maxwell Garnett's rule: 20 nm in all."""
+    share = (np.arange(10) + 0.5) / 10
+    fall = (1.65**2 - 1) / (1.65**2 + 2)
+    mixed = [np.sqrt((1 + 2 * f * fall) / (1 - f * fall)) for f in share]
+    angle, random = 65.0, np.random.default_rng(3)
+    stack = [1.0, *mixed, 1.65, SILICON], [*np.full(10, 2.0), 690.0]
+    values = [x + random.normal(0, 0.01, NM.size) for x in psi_delta(*ncs(NM, *stack, angle).T)]
+    data = pl.Spectrum(NM, values[0], "psi-delta", delta=values[1], angle=np.full(NM.size, angle))
+    fit = pl.fit(data, pl.Scene(pl.Layer(1.65, pl.Free(100, 900)), "Si"))
+    assert fit.status == "misfit"
+    said = re.match(
+        r"with ([\d.]+) nm of rough surface it would fit, with layer2.thickness ([\d.]+)", fit.warnings[0]
+    )
+    assert said
+    rough, depth = (float(x) for x in said.groups())
+    assert 8 < rough < 20
+    assert depth + rough / 2 == pytest.approx(700.0, abs=1.0)
 
 
 @pytest.mark.slow  # two fits of one program

@@ -31,7 +31,7 @@ _NOISE, _CLEARLY = 1.5, 0.3
 mistake which is named may leave."""
 _COMPILED, _POINTS = 3, 0.15
 """Most refits that compile a program of their own, and the share of the residuals that an effect explains at
-least that points to one."""
+least that points to one beside what explains the data already."""
 _STARTS, _REFINED, _FALLS, _NAMED = 6, 7, 0.8, 3
 """Minima from which a number is followed; steps of successive parabolas that refine it from its grid, if the
 deviance has fallen to that share; most mistakes that are named where data do not tell them apart."""
@@ -98,8 +98,8 @@ def explanations(
 def _pointed_to(
     every: Iterable[Mistake], rows: Sequence[Contribution], explained: list[Tried]
 ) -> list[Mistake]:
-    """Mistakes to which those effects point that explain most of the residuals; where something explains the
-    data, only those that act alike."""
+    """The few mistakes to which those effects point that explain most of the residuals; where something
+    explains the data, only those that act alike and explain some."""
     alike = {name for x in explained for name in x.mistake.effects}
     effects = [(row.effect.name, row.explains) for row in rows]
     shares = [
@@ -108,7 +108,7 @@ def _pointed_to(
         if not explained or alike & {*mistake.effects}
     ]
     shares.sort(key=lambda pair: -pair[0])
-    return [mistake for share, mistake in shares[:_COMPILED] if share > _POINTS]
+    return [mistake for share, mistake in shares[:_COMPILED] if share > _POINTS or not explained]
 
 
 class _Trials:

@@ -18,7 +18,7 @@ from pellicle.materials import Material, material
 from pellicle.optics.pair import Pair, imag, is_real, real, to_complex
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, free_leaves, is_free
-from pellicle.scene.layers import Layer, Substrate
+from pellicle.scene.layers import Interface, Layer, Substrate
 
 _FAMILIES = (
     ("SiO2", "Al2O3", "Si3N4", "TiO2", "Ta2O5", "HfO2", "ZrO2", "Nb2O5", "Y2O3", "AlN", "MgF2", "ZnO"),
@@ -172,13 +172,20 @@ def of_structure(targets: list[Measured]) -> list[Mistake]:
         )
     if isinstance(first, Layer) and first.roughness is None:
         rough, remedy = Free(0, 30, start=3), "set `roughness = {{ lower = 0, upper = 30 }}` of the layer"
-        row(
+        words, key, change = (
             "a roughness of {:.3g} nm",
-            remedy,
-            lambda s: _with_layer(s, 0, roughness=rough),
             "roughness",
-            key="roughness",
+            lambda s: _with_layer(s, 0, roughness=rough),
         )
+        if not power:  # less light, by which a roughness shows in R and T, changes no ratio
+            zone = Interface(Free(0, 60, start=5), name="rough")
+            words, key, change = (
+                "{:.3g} nm of rough surface",
+                "rough.thickness",
+                lambda s: replace(s, layers=(zone, *s.layers)),
+            )
+            remedy = 'add a `[[scene.layer]]` on top, with `between = "bruggeman"`'
+        row(words, remedy, change, "roughness", "overlayer", key=key)
     oxide, remedy = Layer("SiO2", Free(0, 300), "oxide"), "add a `[[scene.layer]]` of SiO2"
     words = "{:.3g} nm of SiO2 under the layer"
     row(words, remedy, lambda s: replace(s, layers=(*s.layers, oxide)), "native oxide", key="oxide.thickness")
