@@ -5,8 +5,9 @@ import pytest
 
 import pellicle as pl
 from pellicle.dispersion.spline import Spline
-from pellicle.fitting.film.index_curves import IndexCurves
-from pellicle.fitting.result import Status
+from pellicle.fitting.conclusion import Conclusion
+from pellicle.fitting.film.index_curves import IndexCurves, apart
+from pellicle.fitting.result import Estimate, Status
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.json_record import to_json
 
@@ -17,10 +18,9 @@ KNOTS = (400.0, 520.0, 640.0, 780.0)
 SIGMA = 0.004
 
 
-def curves(above, thickness, curves, depth="thickness"):
-    return IndexCurves(
-        np.array(above), np.array(thickness), np.array(curves), NM, depth, frozenset({"k1", "k2"})
-    )
+def curves(above, thickness, curves, depth="thickness", left=1.0):
+    arrays = np.array(above), np.array(thickness), np.array(curves)
+    return IndexCurves(*arrays, NM, depth, frozenset({"k1", "k2"}), left)
 
 
 def test_a_curve_that_fits_as_well_counts_in_full_and_one_that_fits_worse_by_its_parabola():
@@ -28,6 +28,40 @@ def test_a_curve_that_fits_as_well_counts_in_full_and_one_that_fits_worse_by_its
     assert made.spread(made.thickness) == pytest.approx(5.0)
     made = curves([0.0, 5.0, 0.5], [100.0, 101.0, 108.0], np.zeros((3, 2, 64)))
     assert made.spread(made.thickness) == pytest.approx(8.0)
+
+
+RESTING = {"at_bound": True, "binding": True}
+SET, DEFAULT = (
+    Estimate("k1", 2.0, 0.1, "", 0.0, 2.0, True, default_bounds=x, **RESTING) for x in (False, True)
+)
+
+
+@pytest.mark.parametrize(
+    ("before", "resting", "other", "left", "after"),
+    [
+        (Status.CONVERGED, (), 104.0, 1.0, Status.CONVERGED),
+        (Status.CONVERGED, (), 140.0, 1.0, Status.AMBIGUOUS),
+        # a curve of n and k that leaves the noise alone: it was the formula
+        (Status.MISFIT, (), 104.0, 1.2, Status.CONVERGED),
+        (Status.MISFIT, (), 140.0, 1.2, Status.AMBIGUOUS),
+        (Status.MISFIT, (), 104.0, 3.0, Status.MISFIT),
+        # a default bound of the formula is no cause where the thickness is open
+        (Status.AT_BOUND, (DEFAULT,), 140.0, 1.0, Status.AMBIGUOUS),
+        (Status.AT_BOUND, (DEFAULT,), 104.0, 1.0, Status.AT_BOUND),
+        (Status.AT_BOUND, (SET,), 140.0, 1.0, Status.AT_BOUND),
+    ],
+)
+def test_the_status_is_that_of_the_thickness(before, resting, other, left, after):
+    numbers = [Estimate("thickness", 100.0, 1.0, "nm", 10.0, 1000.0, True), *resting]
+    conclusion = Conclusion(before, {p.name: p for p in numbers}, (), None, [])
+    made = curves([0.0, 0.5], [100.0, other], np.zeros((2, 2, 64)), left=left)
+    assert made.conclusion(conclusion, []).status is after
+
+
+def test_each_thickness_is_followed_once_and_every_curve_of_a_given_one():
+    above, thickness = np.array([3.0, 1.0, 2.0, 9.0]), np.array([100.0, 103.0, 200.0, 50.0])
+    assert apart(above, thickness) == [1, 2, 3]
+    assert apart(above, np.full(4, np.nan)) == [1, 2, 0, 3]
 
 
 @pytest.fixture(scope="module")

@@ -270,8 +270,10 @@ def _verdict(
         [] if curves else identifiability.naming(next(iter(parameters)), judged.conclusion.correlated),
         "n and k" if curves and not curves.depth else "",
     )
+    # within the errors for other curves many an index is that of the substrate
+    unneeded = not curves or judged.conclusion.status is Status.NOT_IDENTIFIABLE
     return (
         sentence
-        + films.unneeded(judged.parts)
+        + (films.unneeded(judged.parts) if unneeded else "")
         + backface.sentence(backface.comparison(films.targets, films.ranked))
     )

@@ -2,8 +2,9 @@
 
 One spectrum seldom determines n, k and a thickness, and the formula chosen for the index decides what its own
 errors cannot show. Splines of k with the n of Kramers and Kronig are fitted too, from several starts and at
-many thicknesses. Those that explain the data about as well, where each further number must lower χ² by one,
-and the fitted formula at other thicknesses, enlarge the errors of n, k and the thickness.
+many thicknesses; and splines of n and k without that relation where none of these explains the data. Those
+that explain them about as well, where each further number must lower χ² by one, and the fitted formula at
+other thicknesses, enlarge the errors of n, k and the thickness.
 """
 
 import math
@@ -40,10 +41,16 @@ _LARGEST = 10.0, 6.0, 100.0, 30.0
 """Largest coefficient of k, n_inf, and strengths of the poles (eV²) of the splines."""
 _GUESSES = ((1.7, 0.05), (2.3, 0.4), (3.0, 0.05), (2.5, 1.5))
 """n, and k at the blue end, from which splines start; k falls evenly to zero at the red end."""
-_FACTORS = (*np.geomspace(1 / 6, 6, 13).tolist(), 0.95, 0.98, 1.02, 1.05)
-"""Thicknesses that are tried, by the best one."""
-_POLISHED = 16
-"""Best of the fits at given thicknesses that are fitted on with a free one."""
+_NEAR = (1.0, 0.95, 0.98, 1.02, 1.05)
+"""Thicknesses that are tried, by that of the start."""
+_STEP, _FRINGE, _MOST = 0.3, 16.0, 48
+"""Further ones between the bounds are apart by this share of the thickness and by the shortest wavelength
+over `_FRINGE` together, up to so many of them: steps of a third alone missed 210 nm of CuO in Ψ and Δ."""
+_POLISHED, _FOLLOWED = 16, 6
+"""Best of the fits at given thicknesses that are fitted on with a free one, and thicknesses at which a spline
+of more knots follows."""
+_EXPLAINED = 1.5
+"""Reduced χ², by a given σ, up to which a curve explains the data."""
 
 
 class IndexCurves(NamedTuple):
@@ -51,7 +58,7 @@ class IndexCurves(NamedTuple):
 
     `above` (curves,) is χ² above the best, `thickness` (curves,) in nm, NaN where it is given, `curves`
     (curves, 2, wavelengths) n and k at wavelengths `nm`. `depth` is the name of the layer's thickness, empty
-    where that is given, `medium` those of the formula's numbers.
+    where that is given, `medium` those of the formula's numbers. `left` is the reduced χ² of the best curve.
     """
 
     above: np.ndarray
@@ -60,6 +67,7 @@ class IndexCurves(NamedTuple):
     nm: np.ndarray
     depth: str
     medium: frozenset[str]
+    left: float
 
     def spread(self, values: np.ndarray) -> Any:
         """Standard error for what differs between the curves, of `values` (curves, ...) of them."""
@@ -81,7 +89,7 @@ class IndexCurves(NamedTuple):
     def conclusion(self, before: Conclusion, parts: Sequence[Part]) -> Conclusion:
         """The conclusion with the spread in the error of the thickness. Where nothing but the thickness and
         the formula's numbers is ambiguous, or rests on a default bound, the status is that of the thickness,
-        else of n + ik."""
+        else of n + ik; a misfit of the formula alone is none of the scene."""
         parameters, status, lead = dict(before.parameters), before.status, before.parameters.get(self.depth)
         every = [part.spectral for part in parts]
         errors = [np.hypot(x.n_stderr, x.k_stderr) / np.hypot(x.n, x.k) for x in every]
@@ -94,6 +102,7 @@ class IndexCurves(NamedTuple):
         binding = [p for p in parameters.values() if p.binding]
         bound = bool(binding) and all(p.default_bounds and p.name in self.medium for p in binding)
         judged = status in (Status.CONVERGED, Status.AMBIGUOUS)
+        judged = judged or (status is Status.MISFIT and self.left < _EXPLAINED)
         if (judged or (bound and status is Status.AT_BOUND)) and apart <= self.medium | {self.depth}:
             status = Status.AMBIGUOUS if not known else Status.CONVERGED if judged else status
         return before._replace(parameters=parameters, status=status)
@@ -108,7 +117,8 @@ class IndexCurves(NamedTuple):
         decide = f" {', '.join([*more, 'a film of another thickness'])}: any of these may decide it."
         if self.depth and status is Status.AMBIGUOUS:
             low, high = (f"{end(self.thickness):.3g}" for end in (np.min, np.max))
-            fits = f"{expanded(lead)} fits best, but {low} to {high} nm fit about as well with other n and k"
+            best = expanded(lead) if lead.stderr < lead.value else f"{lead.value:.3g} {lead.unit}"
+            fits = f"{best} fits best, but {low} to {high} nm fit about as well with other n and k"
             return f"The data do not determine {lead.name}: {fits}.{decide}"
         if self.depth or status not in (Status.CONVERGED, Status.AMBIGUOUS):
             return ""
@@ -121,10 +131,11 @@ class IndexCurves(NamedTuple):
 
     @property
     def remark(self) -> list[str]:
-        """A sentence where a spline explains the data clearly better than the fitted formula."""
-        better = f"a spline-kk of {_KNOTS[0]} to {_KNOTS[-1]} knots explains the data better"
+        """A sentence where a spline explains the data clearly better than the fitted formula does."""
+        better = f"a spline of n and k with {_KNOTS[0]} to {_KNOTS[-1]} knots explains the data better"
+        at = f", {self.depth} {self.thickness[np.argmin(self.above)]:.4g} nm" if self.depth else ""
         what = "the errors of n and k include the difference, those of the formula's numbers do not"
-        return [f"{better} (Δχ² {self.above[0]:.3g}): {what}"] if self.above[0] > RIVAL else []
+        return [f"{better} (Δχ² {self.above[0]:.3g}{at}): {what}"] if self.above[0] > RIVAL else []
 
 
 class _Fits(NamedTuple):
@@ -146,16 +157,22 @@ class _Fits(NamedTuple):
         at = values[:, names.index(self.depth)] if self.depth in names else np.full(len(curves), math.nan)
         return deviance - self.ranked.minima.deviance[0], np.full(len(curves), further), at, curves
 
-    def at_thicknesses(self, problem: Problem, medium: Any, starts: np.ndarray) -> tuple[Any, ...]:
-        """Fits from each start, described so: at each thickness, and from the best of these."""
+    def at_thicknesses(
+        self, problem: Problem, medium: Any, starts: np.ndarray, near: bool = False
+    ) -> tuple[Any, ...]:
+        """Fits from each start, described so: at all or `near` thicknesses, and from the best of these."""
         lower, span = problem.box.lower, problem.box.upper - problem.box.lower
         axis = next((i for i, p in enumerate(problem.parameters) if p.name == self.depth), None)
         if axis is None:
             found = solve(problem, np.clip((starts - lower) / span, 1e-4, 1 - 1e-4))
             return self.described(problem, medium, found.deviance, np.asarray(problem.values(found.units)))
-        every = np.tile(starts, (len(_FACTORS), 1))
-        held = np.outer(_FACTORS, starts[:, axis]).ravel()
-        every[:, axis] = np.clip(held, lower[axis], lower[axis] + span[axis])
+        fine = np.geomspace(max(lower[axis], 1.0), max(lower[axis] + span[axis], 2.0), 500)
+        steps = np.log(fine) / _STEP + fine * _FRINGE / self.nm.min()
+        count = 0 if near else min(math.ceil(np.ptp(steps)), _MOST)
+        wide = np.interp(np.linspace(steps[0], steps[-1], count), steps, fine)
+        held = np.vstack([np.outer(_NEAR, starts[:, axis]), np.tile(wide[:, None], len(starts))])
+        every = np.tile(starts, (len(held), 1))
+        every[:, axis] = np.clip(held.ravel(), lower[axis], lower[axis] + span[axis])
         found = solve(problem, np.clip((every - lower) / span, 1e-4, 1 - 1e-4), fixed=(axis, every[:, axis]))
         values = np.array(problem.values(found.units))
         values[:, axis] = every[:, axis]
@@ -163,16 +180,29 @@ class _Fits(NamedTuple):
         both = np.concatenate([values, np.asarray(problem.values(again.units))])
         return self.described(problem, medium, np.append(found.deviance, again.deviance), both)
 
-    def of_spline(self, knots: int, guesses: Sequence[np.ndarray]) -> tuple[Any, ...]:
-        """Fits of a spline with all numbers free, described so, from curves near to `guesses`."""
+    def of_spline(
+        self,
+        knots: int,
+        guesses: Sequence[np.ndarray],
+        depths: np.ndarray | None = None,
+        related: bool = True,
+    ) -> tuple[Any, ...]:
+        """Fits of a spline with all numbers free, described so, from curves near to `guesses`, at all
+        thicknesses or near those of the guesses, `depths`; of n and k that are not `related` by Kramers and
+        Kronig too."""
         from scipy.optimize import lsq_linear  # SciPy's linear algebra takes longer to load than most fits
 
         ends = _BEYOND[0] * HC / self.nm.min(), HC / self.nm.max() / _BEYOND[1]
         sites = (HC / np.linspace(*ends, knots)).tolist()
-        rows, upper = np.eye(knots + 3), [_LARGEST[0]] * knots + [*_LARGEST[1:]]
-        curves = [_complex(KramersKronigSpline(sites, x[:knots], *x[knots:]), self.nm).ravel() for x in rows]
-        free = [Free(0.0, x) for x in upper]
-        spline, before = KramersKronigSpline(sites, free[:knots], *free[knots:]), self.ranked.problem
+        upper = [_LARGEST[0]] * knots + ([*_LARGEST[1:]] if related else [_LARGEST[0]] * knots)
+
+        def build(x: Sequence[Any]) -> Any:
+            if related:
+                return KramersKronigSpline(sites, x[:knots], *x[knots:])
+            return Spline(sites, x[:knots], x[knots:])
+
+        curves = [_complex(build(x.tolist()), self.nm).ravel() for x in np.eye(len(upper))]
+        spline, before = build([Free(0.0, x) for x in upper]), self.ranked.problem
         problem = make(*_with_medium(self.targets, spline))
         views = zip(problem.views, before.views, strict=True)
         problem = problem._replace(views=tuple(replace(view, data=own.data) for view, own in views))
@@ -180,7 +210,9 @@ class _Fits(NamedTuple):
         starts = np.array([[known.get(p.name, 0.0) for p in problem.parameters]] * len(guesses))
         near = [lsq_linear(np.transpose(curves), x.ravel(), (0.0, upper)).x for x in guesses]
         starts[:, [p.name not in self.others for p in problem.parameters]] = near
-        return self.at_thicknesses(problem, spline, starts)
+        if depths is not None and self.depth:
+            starts[:, [p.name for p in problem.parameters].index(self.depth)] = depths
+        return self.at_thicknesses(problem, spline, starts, depths is not None)
 
 
 def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | None:
@@ -205,15 +237,35 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     found.append(fits.at_thicknesses(old, medium, minima[:1]))
     fall = (1 / nm - 1 / nm.max()) / max(1 / nm.min() - 1 / nm.max(), 1e-12)
     guesses = [found[0][3][0], *(np.stack([np.full(nm.size, n), k * fall]) for n, k in _GUESSES)]
-    found += [fits.of_spline(knots, guesses) for knots in _KNOTS]
+    found.append(fits.of_spline(_KNOTS[0], guesses))
+    best = apart(found[-1][0], found[-1][2])
+    found.append(fits.of_spline(_KNOTS[1], list(found[-1][3][best]), found[-1][2][best]))
+    deviance = float(ranked.minima.deviance[0])
+    left = ranked.chi2_reduced * (1 + min(x[0].min() for x in found) / deviance)
+    # measured n and k obey Kramers and Kronig as well as they are measured
+    if left > _EXPLAINED and sum(view.rows * view.measured_channels for view in old.views) >= 2 * nm.size:
+        found.append(fits.of_spline(_KNOTS[0], guesses, None, False))
+        left = min(left, ranked.chi2_reduced * (1 + found[-1][0].min() / deviance))
     above, further, thickness, curves = (np.concatenate(x) for x in zip(*found, strict=True))
     # residuals that no curve explains are no noise either
-    left = ranked.chi2_reduced + above.min() / sum(fit.freedom for fit in ranked.fits)
     share = min(float(judged.best.discrepancy.evidence_share), 1 / max(left, 1.0))
     above = share / student(ranked.freedom, RIVAL) ** 2 * above + further
     close = above - above.min() < RIVAL
     close[0] = True
-    return IndexCurves(above[close] - above.min(), thickness[close], curves[close], nm, depth, names - others)
+    left = left if all(view.noise.given for view in old.views) else math.inf
+    about = above[close] - above.min(), thickness[close], curves[close]
+    return IndexCurves(*about, nm, depth, names - others, left)
+
+
+def apart(above: np.ndarray, thickness: np.ndarray) -> list[int]:
+    """Positions of the best fits by χ², those of one thickness once."""
+    chosen: list[int] = []
+    for i in np.argsort(above).tolist():
+        if len(chosen) < _FOLLOWED and not any(
+            abs(np.log(thickness[i] / thickness[j])) < _NEAR[-1] - 1 for j in chosen
+        ):
+            chosen.append(i)
+    return chosen
 
 
 def _complex(medium: Any, nm: np.ndarray) -> np.ndarray:
