@@ -1,7 +1,9 @@
 """Errors that a user can act on: each message is one sentence that ends with the remedy."""
 
 import difflib
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class DataError(ValueError):
@@ -27,3 +29,33 @@ def did_you_mean(word: str, known: Iterable[str], cutoff: float = 0.5) -> str:
 def install_command(extra: str) -> str:
     """The command that installs the packages of an extra, for an installed pellicle and for a clone."""
     return f"pip install 'pellicle[{extra}]' (in a clone of the repository: pip install -e '.[{extra}]')"
+
+
+@contextmanager
+def needs(
+    extra: str, what: str, remedy: str = "", kind: type[DataError | UsageError] = UsageError
+) -> Iterator[None]:
+    """Turn the failing import of a package of an extra into an error, with the command that installs it.
+
+    `what` begins the sentence, as in "maps of cubes need"; `remedy` ends it.
+    """
+    try:
+        yield
+    except ImportError as missing:
+        package = (missing.name or "").partition(".")[0]
+        raise kind(f"{what} {package}: {install_command(extra)}{remedy}") from None
+
+
+@contextmanager
+def decoding(what: str, remedy: str) -> Iterator[None]:
+    """Turn an error of any kind, as readers of other packages raise on damaged files, into a DataError:
+    `what`, the reason in brackets, `remedy`."""
+    try:
+        yield
+    except (ImportError, DataError, UsageError):
+        raise
+    except Exception as error:
+        # without hints at options of the other package, and addresses of buffers
+        plain = re.sub(r" (\(hint.*|<_io\.BytesIO.*?>)", "", " ".join(str(error).split()))
+        reason = plain[:200].rstrip(".")
+        raise DataError(f"{what} ({reason or type(error).__name__}); {remedy}") from None

@@ -22,7 +22,7 @@ _HEAD = 65_536
 _STATED = re.compile(r"signal (rgb|srgb|xyz|lab)\b")
 _SIGHT = re.compile(r"observer (1931|1964) under (E|A|D50|D55|D65|D75)")
 """Comment of pellicle's own files on the observer and the illuminant."""
-_MEANING = {
+MEANING = {
     "srgb": "display values of sRGB",
     "rgb": "channels of a camera",
     "xyz": "CIE XYZ",
@@ -123,7 +123,7 @@ def read_colour_rows(
     where = [table.places(position) for position in chosen.channels]
     values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
     shown = ", ".join(cells.names[i].strip() for i in chosen.channels)
-    notes = [*table.notes, f"{shown} read as {_MEANING[space]}", *([note] if note else [])]
+    notes = [*table.notes, f"{shown} read as {MEANING[space]}", *([note] if note else [])]
     notes += [f"ignored: {', '.join(chosen.ignored)}"] if chosen.ignored else []
     films = np.array(["" if chosen.name is None else row[chosen.name] for row in cells.cells])
     lines = np.array([row.number for row in cells.rows])

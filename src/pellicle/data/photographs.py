@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.data.tabular.text import open_binary, read_bytes
-from pellicle.errors import DataError, UsageError, install_command
+from pellicle.data.tabular.text import in_file, open_binary, read_bytes
+from pellicle.errors import DataError, UsageError, decoding, needs
 
 _SIGNATURES = {
     "PNG": (b"\x89PNG",),
@@ -72,15 +72,10 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
     log = getLogger("tifffile")  # without its messages on damaged files, which one error reports
     level = log.level
     log.setLevel(CRITICAL + 1)
+    damaged = decoding(f"{path}: the {kind} cannot be decoded", "save it again")
     try:
-        values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
-    except ImportError as error:
-        raise UsageError(f"{path}: photographs need {error.name}: {install_command('images')}") from None
-    except DataError as error:
-        raise DataError(f"{path}: {error}") from None
-    except Exception as error:  # decoders raise errors of every kind on damaged files
-        reason = re.sub(r" <_io\.BytesIO.*?>", "", str(error).split("\n")[0].rstrip("."))
-        raise DataError(f"{path}: the {kind} cannot be decoded ({reason}); save it again") from None
+        with in_file(path), needs("images", f"{path}: photographs need"), damaged:
+            values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
     finally:
         log.setLevel(level)
     if values.ndim != 3 or values.shape[2] not in (3, 4):

@@ -15,7 +15,7 @@ from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Axis, Reading, Rows
 from pellicle.data.tabular import column_selection as selection
-from pellicle.data.tabular.columns import MUELLER, Column, listed
+from pellicle.data.tabular.columns import MUELLER, SIGNAL_UNITS, Column, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
@@ -58,23 +58,16 @@ def ellipsometry_columns(
             f"{table.path}: psi and delta, N, C and S, alpha and beta, or tan_psi and cos_delta are not all "
             f"among {listed(columns)}; name the columns in order, as in {_EXAMPLE}"
         )
-    for column in values:
-        if column.unknown_unit or column.unit == "percent":
-            known = "convert both to degrees" if form == PSI_DELTA else "write plain numbers, as 0.5"
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit or '%'!r}; {known}"
-            )
+    known = "convert both to degrees" if form == PSI_DELTA else "write plain numbers, as 0.5"
+    selection.refuse_units(table, values, known, "percent")
     errors = selection.error_columns(table, columns, values, _SOME) if form == PSI_DELTA else ()
     analyser = selection.only(table, columns, "analyser") if form == ALPHA_BETA else None
     share, error = (selection.only(table, columns, role) for role in _SHARES)
     shares = [column for column in (share, error) if column] if share else []
     notes = [f"{listed(errors)} read as the standard deviation of psi and delta"] if errors else []
+    fraction = "write a depolarisation as a fraction, or in percent with % in the column's name"
+    selection.refuse_units(table, shares, fraction)
     for column, meaning in zip(shares, ("the depolarisation", "its standard deviation"), strict=False):
-        if column.unknown_unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write a "
-                "depolarisation as a fraction, or in percent with % in the column's name"
-            )
         unit = "in percent" if column.unit == "percent" else "a fraction"
         notes.append(f"{column.name!r} read as {meaning}, {unit}")
     others, meaning = [*shares, analyser], ", ".join(form)
@@ -238,12 +231,8 @@ def mueller_columns(
             f"{table.path}: no element of a Mueller matrix (m12 to m44) is among {listed(columns)}; name the "
             f"columns in order, as in {_ELEMENTS}"
         )
-    for column in values:
-        if column.unknown_unit or column.unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in "
-                f"{column.unknown_unit or column.unit!r}; write elements as fractions of m11, without a unit"
-            )
+    fractions = "write elements as fractions of m11, without a unit"
+    selection.refuse_units(table, values, fractions, *SIGNAL_UNITS)
     errors = selection.error_columns(table, columns, values, _SOME_OF.format("elements"))
     one = any(column.role == "sigma" for column in errors)
     meaning = "the standard deviation of each" if one else "their standard deviations"
@@ -282,12 +271,7 @@ def generalised_columns(
             f"{listed(columns)}; name the columns in order, as in {_RATIOS}"
         )
     values = [column for name, pair in pairs.items() if ratios is None or name in ratios for column in pair]
-    for column in values:
-        if column.unknown_unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; write psi and "
-                "delta in degrees"
-            )
+    selection.refuse_units(table, values, "write psi and delta in degrees")
     errors = selection.error_columns(table, columns, values, _SOME_OF.format("columns"))
     notes = [f"{listed(errors)} read as their standard deviations"] if errors else []
     signal, noun = Generalised.word, Generalised.noun

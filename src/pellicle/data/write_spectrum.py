@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import UsageError, needs
 from pellicle.files import replacing
 
 _POLARISED = {"s": "s", "p": "p", "unpolarised": ""}
@@ -139,10 +139,8 @@ def _group(parent: Any, name: str, kind: str, **attributes: Any) -> Any:
 def _imported(package: str) -> Any:
     import importlib
 
-    try:
+    with needs("formats", "NetCDF and NeXus need"):
         return importlib.import_module(package)
-    except ImportError:
-        raise UsageError(f"NetCDF and NeXus need {package}: {install_command('formats')}") from None
 
 
 _WRITERS: dict[str, Callable[[Path, Spectrum], None]] = {

@@ -12,7 +12,7 @@ import socket
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import UsageError, needs
 from pellicle.explorer.page import document, policy
 from pellicle.explorer.session import Session
 
@@ -39,13 +39,11 @@ def application(session: Session, token: str, port: int) -> Starlette:
 
     **Raises:** UsageError without Starlette.
     """
-    try:
+    with needs("explore", "the explorer needs"):
         from starlette.applications import Starlette
         from starlette.concurrency import run_in_threadpool
         from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse
         from starlette.routing import Route
-    except ImportError:
-        raise UsageError(f"the explorer needs starlette: {install_command('explore')}") from None
     hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
 
     def refused(request: Request, given: str) -> Response | None:
@@ -90,10 +88,8 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
 
     **Raises:** UsageError without the packages of the extra, and where the port cannot be opened.
     """
-    try:
+    with needs("explore", "the explorer needs"):
         import uvicorn
-    except ImportError:
-        raise UsageError(f"the explorer needs uvicorn: {install_command('explore')}") from None
     # the protocol is named, or asyncio sends with delay: answers would wait 40 ms for an acknowledgement
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -5,7 +5,7 @@ from functools import cache
 from threading import Thread
 from typing import Any
 
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import needs
 from pellicle.explorer.page import style, widget_module
 from pellicle.explorer.session import Session
 
@@ -18,10 +18,8 @@ def widget(session: Session) -> Any:
 
     **Raises:** UsageError without anywidget.
     """
-    try:
+    with needs("explore", "the explorer in notebooks needs"):
         import anywidget  # noqa: F401
-    except ImportError:
-        raise UsageError(f"the explorer in notebooks needs anywidget: {install_command('explore')}") from None
     return _widget_class()(session)
 
 

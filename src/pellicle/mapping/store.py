@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.errors import UsageError, install_command
+from pellicle.errors import UsageError, needs
 from pellicle.files import not_written
 from pellicle.fitting.batch.data import CODES, NO_DATA, STATUSES, BatchFits
 from pellicle.fitting.parameter import Parameter
@@ -60,11 +60,10 @@ def zarr_package() -> Any:
 
     **Raises:** UsageError where it is absent.
     """
-    try:
+    with needs("maps", "maps of cubes need"):
         import zarr
-    except ImportError:
-        raise UsageError(f"maps of cubes need zarr: {install_command('maps')}") from None
-    return zarr
+
+        return zarr
 
 
 @dataclass(frozen=True)

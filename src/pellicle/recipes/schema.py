@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.options import CameraOptions, FitOptions, ReadingOptions
@@ -14,7 +14,9 @@ from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import did_you_mean
 from pellicle.recipes.dispersion_models import MODELS, SPLINES, TERMS
+from pellicle.scene.layers import Uncertainty
 from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
+from pellicle.scene.surface import SurfaceUncertainty
 
 UNIAXIAL, BIAXIAL = ("ordinary", "extraordinary"), ("x", "y", "z")
 _NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
@@ -178,6 +180,15 @@ class _Table(BaseModel):
 
 Uncertain = Annotated[float, Field(ge=0)] | None
 """Standard uncertainty of a number that is taken as known; None leaves the usual one."""
+_OF_SCENE = {"index", "dispersion", "roughness", "thickness_spread", "interlayer", "overlayer"}
+"""Uncertainties of `[scene]`; the others are those of the instrument."""
+_EVERY = [field.name for field in fields(Uncertainty)]
+
+
+def _uncertainties(names: Iterable[str]) -> Any:
+    """A table of the keys `NAME_uncertainty` of a record of standard uncertainties."""
+    keys: dict[str, Any] = {f"{name}_uncertainty": (Uncertain, None) for name in names}
+    return create_model("UncertaintyTable", __base__=_Table, **keys)
 
 
 BACK = ("back_collected", "back_reflections")
@@ -241,7 +252,7 @@ class GridTable(_Table):
     step: float = Field(gt=0)
 
 
-class InstrumentTable(_Table):
+class InstrumentTable(_uncertainties(name for name in _EVERY if name not in _OF_SCENE)):
     """`[instrument]`."""
 
     scale: Literal["free", "slow"] | float = 1.0
@@ -252,20 +263,6 @@ class InstrumentTable(_Table):
     numerical_aperture: Number | None = None
     wavelength_shift: Number | None = None
     angle_shift: Number | None = None
-    wavelength_uncertainty: Uncertain = None
-    bandwidth_uncertainty: Uncertain = None
-    angle_uncertainty: Uncertain = None
-    angle_spread_uncertainty: Uncertain = None
-    scale_uncertainty: Uncertain = None
-    offset_uncertainty: Uncertain = None
-    psi_uncertainty: Uncertain = None
-    delta_uncertainty: Uncertain = None
-    depolarisation_uncertainty: Uncertain = None
-    mueller_uncertainty: Uncertain = None
-    white_balance_uncertainty: Uncertain = None
-    flare_uncertainty: Uncertain = None
-    camera_uncertainty: Uncertain = None
-    lamp_uncertainty: Uncertain = None
 
 
 _Angle = Annotated[
@@ -328,19 +325,13 @@ class DataTable(ReadingTable, FitOptions):  # pyright: ignore[reportGeneralTypeI
         return self
 
 
-class SceneTable(_Table):
+class SceneTable(_uncertainties(name for name in _EVERY if name in _OF_SCENE)):
     """`[scene]`."""
 
     ambient: Medium = 1.0
     substrate: Medium | PlateTable
     layer: list[LayerTable] = Field(min_length=1)
     uncertainty: Literal["usual", "none"] = "usual"
-    index_uncertainty: Uncertain = None
-    dispersion_uncertainty: Uncertain = None
-    roughness_uncertainty: Uncertain = None
-    thickness_spread_uncertainty: Uncertain = None
-    interlayer_uncertainty: Uncertain = None
-    overlayer_uncertainty: Uncertain = None
 
 
 class ReferenceTable(_Table):
@@ -375,7 +366,7 @@ class SurfaceDataTable(_Table, FitOptions):  # pyright: ignore[reportGeneralType
     max_theta: float | None = Field(default=None, gt=0, le=90)
 
 
-class SurfaceTable(_Table):
+class SurfaceTable(_uncertainties(field.name for field in fields(SurfaceUncertainty))):
     """`[scene.surface]`: further keys are the model's own numbers.
 
     `sensor` gives each channel its band: an observer of the CIE, "srgb", or a file of a camera's
@@ -392,13 +383,6 @@ class SurfaceTable(_Table):
     film: Medium | None = None
     base: Medium | None = None
     uncertainty: Literal["usual", "none"] = "usual"
-    index_uncertainty: Uncertain = None
-    base_uncertainty: Uncertain = None
-    gain_uncertainty: Uncertain = None
-    band_uncertainty: Uncertain = None
-    bandwidth_uncertainty: Uncertain = None
-    thickness_spread_uncertainty: Uncertain = None
-    angle_uncertainty: Uncertain = None
 
 
 class SurfaceSceneTable(_Table):

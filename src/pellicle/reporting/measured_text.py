@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from pellicle.data.colour_rows import MEANING
 from pellicle.data.colours import Colours
 from pellicle.data.cube import Cube
 from pellicle.data.cubes.checks import sample
@@ -117,12 +118,6 @@ def _degrees(angles: Iterable[float]) -> str:
     return f"{text} degrees" if text else ""
 
 
-_SPACES = {
-    "srgb": "display values of sRGB",
-    "rgb": "channels of a camera",
-    "xyz": "CIE XYZ",
-    "lab": "CIE 1976 L*, a*, b*",
-}
 _COLOURS_SHOWN = 12
 """Colours that are listed."""
 
@@ -141,7 +136,7 @@ def _colours_rows(colours: Colours) -> list[tuple[str, str]]:
     noise = f"{np.median(colours.noise):.2g} in the median"
     return [
         ("film", colours.name),
-        ("quantity", f"{_SPACES[colours.space]}, {len(colours)} colour{'s' * (len(colours) > 1)}, {light}"),
+        ("quantity", f"{MEANING[colours.space]}, {len(colours)} colour{'s' * (len(colours) > 1)}, {light}"),
         *(("" if i else ", ".join(colours.channels), text) for i, text in enumerate(lines)),
         ("noise", f"usual one, {noise}" if colours.sigma is None else noise),
         ("white balance", "free" if colours.white_balance == "free" else ""),

@@ -15,7 +15,7 @@ import numpy as np
 from pellicle.data.cubes.raw_cube import WAVELENGTH, RawCube, Stored
 from pellicle.data.photographs import image_format
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.errors import DataError, UsageError, install_command
+from pellicle.errors import DataError, UsageError, decoding, needs
 from pellicle.signals.limits import HIGHEST
 
 _BLOCK = 64
@@ -176,7 +176,8 @@ def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
     kind = image_format(path)
     if kind is None:
         raise UsageError(f"`mask` {str(path)!r} is no PNG, TIFF or .npy file: save it as one of these")
-    try:
+    damaged = decoding(f"{path}: the {kind} cannot be read", "save it again")
+    with needs("images", f"{path}: images need"), damaged:
         if kind == "TIFF":
             import tifffile
 
@@ -186,8 +187,4 @@ def _mask_file(path: Path, raw: RawCube) -> np.ndarray:
 
             with Image.open(path) as image:
                 values = np.asarray(image.convert("RGB") if image.mode == "P" else image)
-    except ImportError as error:
-        raise UsageError(f"{path}: images need {error.name}: {install_command('images')}") from None
-    except Exception as error:  # decoders raise errors of every kind on damaged files
-        raise DataError(f"{path}: the {kind} cannot be read ({error}); save it again") from None
     return values if values.ndim == 2 else np.any(values[..., :3] != 0, axis=-1)

@@ -10,7 +10,7 @@ import numpy as np
 from pellicle.data.cubes.numpy_files import array_axes, need_wavelengths
 from pellicle.data.cubes.raw_cube import COUNTS, Asked, MappedFile, RawCube, Stored
 from pellicle.data.photographs import image_format
-from pellicle.errors import DataError, UsageError, install_command
+from pellicle.errors import DataError, decoding, needs
 
 _OME_CHANNEL = re.compile(r'<Channel\b[^>]*?\bEmissionWavelength="([\d.]+)"')
 _OME_UNIT = re.compile(r'\bEmissionWavelengthUnit="([^"]+)"')
@@ -25,22 +25,16 @@ def is_tiff(path: Path) -> bool:
 
 def read_tiff(path: Path, asked: Asked) -> RawCube:
     """Read a TIFF stack. Raises DataError for a damaged one, UsageError without wavelengths or tifffile."""
-    try:
+    damaged = decoding(f"{path}: the TIFF cannot be read", "save it again")
+    with needs("images", f"{path}: TIFF stacks need"), damaged:
         import tifffile
-    except ImportError:
-        raise UsageError(f"{path}: TIFF stacks need tifffile: {install_command('images')}") from None
-    try:
+
         with tifffile.TiffFile(path) as file:
             data, letters = _stack(path, file)
             wavelength, unit, notes = asked.wavelength, asked.unit, []
             if wavelength is None:
                 wavelength, told = _channel_wavelengths(file)
                 unit, notes = "nm", [told] if told else []
-    except (DataError, UsageError):
-        raise
-    except Exception as error:  # tifffile raises errors of every kind on damaged files
-        reason = str(error).split("\n")[0].rstrip(".")
-        raise DataError(f"{path}: the TIFF cannot be read ({reason}); save it again") from None
     if wavelength is None:
         raise need_wavelengths(data.shape, str(path))
     # rows, columns and time as the file states them, the axis of the bands by its length
@@ -78,15 +72,10 @@ class CompressedPages:
         import tifffile
         import zarr
 
-        try:
-            with tifffile.TiffFile(self.path, is_shaped=None if self.shaped else False) as file:
-                pages: Any = zarr.open_array(file.series[0].aszarr(), mode="r")
-                return np.asarray(pages[where])
-        except Exception as error:  # decoders raise errors of every kind on damaged files
-            reason = str(error.args[0] if error.args else error).split("\n")[0]
-            raise DataError(
-                f"{self.path}: cannot be decoded ({reason}); save it without compression"
-            ) from None
+        damaged = decoding(f"{self.path}: cannot be decoded", "save it without compression")
+        with damaged, tifffile.TiffFile(self.path, is_shaped=None if self.shaped else False) as file:
+            pages: Any = zarr.open_array(file.series[0].aszarr(), mode="r")
+            return np.asarray(pages[where])
 
 
 def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
@@ -104,10 +93,8 @@ def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
         )
     dtype, shape, letters = np.dtype(first.dtype), tuple(first.shape), first.axes
     if first.dataoffset is None or first.keyframe.fillorder != 1:
-        try:
+        with needs("maps", f"{path}: compressed TIFF stacks need"):
             import zarr  # noqa: F401
-        except ImportError:
-            raise UsageError(f"{path}: compressed TIFF stacks need zarr: {install_command('maps')}") from None
         return CompressedPages(str(path), shaped, dtype, shape), letters
     kept = [i for i, n in enumerate(shape) if n > 1 or letters[i] in "YX"]
     dtype = dtype.newbyteorder(file.byteorder)

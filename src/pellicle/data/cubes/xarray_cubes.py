@@ -14,7 +14,7 @@ from pellicle.data.formats.nexus import SIGNATURE
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.data.tabular.columns import recognise, wavelength_unit
 from pellicle.data.tabular.text import open_binary
-from pellicle.errors import DataError, UsageError, install_command
+from pellicle.errors import DataError, UsageError, decoding, needs
 
 _PIXELS = {
     "time": ("time", "t", "frame", "frames"),
@@ -265,14 +265,8 @@ def read_zarr(path: Path, asked: Asked) -> RawCube:
 
 
 def _opened(path: Path, opening: Any) -> Any:
-    try:
+    damaged = decoding(f"{path}: cannot be opened as a cube", "write it again")
+    with needs("maps", f"{path}: cubes in zarr and NetCDF need"), damaged:
         import xarray
 
         return opening(xarray)
-    except ImportError as error:
-        raise UsageError(
-            f"{path}: cubes in zarr and NetCDF need {error.name}: {install_command('maps')}"
-        ) from None
-    except Exception as error:  # xarray and its engines raise errors of every kind on damaged files
-        reason = " ".join(str(error).split())[:200].rstrip(".")
-        raise DataError(f"{path}: cannot be opened as a cube ({reason}); write it again") from None

@@ -23,7 +23,7 @@ import numpy as np
 from pellicle.data.formats import isolated
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.table import Table, array_columns
-from pellicle.errors import DataError, install_command
+from pellicle.errors import DataError, decoding, install_command
 from pellicle.signals.registry import KINDS, ONE_COLUMN
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -70,16 +70,9 @@ def read_hdf5(content: bytes) -> list[Table]:
     """Return the spectra of an HDF5 file, in this process. Raises DataError as `read` does."""
     import h5py
 
-    try:
-        with h5py.File(io.BytesIO(content), "r") as file:
-            tables = list(_spectra(file))
-    except DataError:
-        raise
-    except Exception as error:  # h5py raises OSError, KeyError, RuntimeError, ... on damaged files
-        raise DataError(
-            f"is an HDF5 (NeXus) file that cannot be read ({' '.join(str(error).split())[:200]}); "
-            "export it as CSV"
-        ) from None
+    damaged = decoding("is an HDF5 (NeXus) file that cannot be read", "export it as CSV")
+    with damaged, h5py.File(io.BytesIO(content), "r") as file:
+        tables = list(_spectra(file))
     if not tables:
         raise DataError(
             "is an HDF5 (NeXus) file without a wavelength, energy or wavenumber beside a "

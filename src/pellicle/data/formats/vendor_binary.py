@@ -20,7 +20,7 @@ import numpy as np
 from pellicle.data.formats.exports import Curve, axis_column, first_stated, readable, signal_column
 from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.table import Table, array_columns
-from pellicle.errors import DataError, install_command
+from pellicle.errors import DataError, decoding, needs
 
 _OLE = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _JASCO_STREAM = "DataInfo".encode("utf-16-le")
@@ -75,14 +75,11 @@ def by_openreadout(content: bytes) -> list[Table] | None:
     if kind is None:
         return None
     name = _FORMATS[kind]
-    try:
+    absent = f"is a {name} file, which needs the package", "; or export the spectrum as CSV"
+    damaged = decoding(f"is a {name} file that cannot be read", "export it as CSV")
+    with needs("formats", *absent, DataError), damaged:
         import openreadout
-    except ImportError:
-        raise DataError(
-            f"is a {name} file, which needs the package openreadout: {install_command('formats')}; "
-            "or export the spectrum as CSV"
-        ) from None
-    try:
+
         with openreadout.File(content, name=f"file.{kind}") as file:
             findings = file.check()["findings"]
             if damage := next((x["message"] for x in findings if x["severity"] == "error"), ""):
@@ -90,11 +87,6 @@ def by_openreadout(content: bytes) -> list[Table] | None:
                     f"is a damaged {name} file ({_plain(damage)}); copy or export it again"
                 )
             curves = list(_curves(file, name, len(content)))
-    except DataError:
-        raise
-    except Exception as error:  # a foreign reader on a damaged file may raise anything
-        reason = _plain(str(error).partition(" (hint")[0]) or type(error).__name__
-        raise DataError(f"is a {name} file that cannot be read ({reason}); export it as CSV") from None
     if not curves:
         raise DataError(f"is a {name} file without a spectrum; export it as CSV")
     return readable(curves)
@@ -233,20 +225,12 @@ def _unpacked(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
 
 
 def _parsed(document: bytes) -> Element:
-    try:
+    absent = f"is an {_PROCSPEC} file, which needs the package", "; or export the spectrum as text"
+    damaged = decoding(f"is an {_PROCSPEC} file whose XML cannot be read", "export the spectrum as text")
+    with needs("formats", *absent, DataError), damaged:
         from defusedxml.ElementTree import fromstring
-    except ImportError:
-        raise DataError(
-            f"is an {_PROCSPEC} file, which needs the package defusedxml: "
-            f"{install_command('formats')}; or export the spectrum as text"
-        ) from None
-    try:
+
         return fromstring(_UNPRINTABLE.sub(b"", document), forbid_dtd=True)
-    except Exception as error:  # syntax errors, and entities and document types that defusedxml refuses
-        raise DataError(
-            f"is an {_PROCSPEC} file whose XML cannot be read ({type(error).__name__}: "
-            f"{_plain(str(error))}); export the spectrum as text"
-        ) from None
 
 
 def _plain(error: str) -> str:

@@ -1,7 +1,7 @@
 """Selection of the columns to read: by the caller's names, by the header, or by position."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -95,13 +95,16 @@ def axis_columns(table: Table, columns: Sequence[Column], example: str) -> AxisC
             f"{table.path}: no column is a wavelength, energy or wavenumber among {listed(columns)}; "
             f"name the columns in order, as in {example}"
         )
-    for column in (angle, azimuth):
-        if column and column.unknown_unit:
-            raise DataError(
-                f"{table.path}: {table.label(column.position)} is in {column.unknown_unit!r}; "
-                "write angles in degrees"
-            )
+    refuse_units(table, [column for column in (angle, azimuth) if column], "write angles in degrees")
     return AxisColumns(wavelength, angle, azimuth)
+
+
+def refuse_units(table: Table, columns: Iterable[Column], remedy: str, *foreign: str) -> None:
+    """Raise DataError for the first column in a unit that is unknown, or `foreign` to its quantity."""
+    for column in columns:
+        if column.unknown_unit or column.unit in foreign:
+            unit = column.unknown_unit or column.unit
+            raise DataError(f"{table.path}: {table.label(column.position)} is in {unit!r}; {remedy}")
 
 
 def only(table: Table, columns: Sequence[Column], role: str) -> Column | None:
