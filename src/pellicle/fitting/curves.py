@@ -56,12 +56,9 @@ def at_each_wavelength(curves: Sequence[Index | Curve | ColourCurve]) -> Index:
 
 
 @dataclass(frozen=True)
-class Curve:
-    """Data and model at each wavelength (nm), and the layer's index with standard errors.
+class _WithIndex:
+    """Data and model, and the layer's index with standard errors at each wavelength (nm).
 
-    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees
-    (of generalised ones (wavelengths, ratios));
-    `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
     Of a birefringent layer `n` and `k` are the ordinary ones, and `principal` has each index by its name.
     """
 
@@ -73,15 +70,26 @@ class Curve:
     k: np.ndarray
     n_stderr: np.ndarray
     k_stderr: np.ndarray
-    delta_data: np.ndarray | None = None
-    delta_model: np.ndarray | None = None
-    depolarisation_data: np.ndarray | None = None
-    depolarisation_model: np.ndarray | None = None
     principal: Mapping[str, Index] | None = None
 
     @property
     def residual(self) -> np.ndarray:
         return self.data - self.model
+
+
+@dataclass(frozen=True)
+class Curve(_WithIndex):
+    """Data and model of a spectrum at each wavelength, and the layer's index with standard errors.
+
+    For ellipsometry `data`, `model` and `sigma` are Ψ, and `delta_data` and `delta_model` Δ, in degrees
+    (of generalised ones (wavelengths, ratios));
+    `depolarisation_data` and `depolarisation_model` are fractions, None where it was not measured.
+    """
+
+    delta_data: np.ndarray | None = None
+    delta_model: np.ndarray | None = None
+    depolarisation_data: np.ndarray | None = None
+    depolarisation_model: np.ndarray | None = None
 
     @property
     def delta_residual(self) -> np.ndarray:
@@ -106,27 +114,14 @@ class BrdfCurve:
 
 
 @dataclass(frozen=True)
-class ColourCurve:
+class ColourCurve(_WithIndex):
     """Colours of data and model, each (colours, 3) in the space of the data, with σ.
 
     `difference` (colours,) is ΔE*ab (CIE 1976), None for the channels of a camera. The layer's index, with
     standard errors, is that at the wavelengths (nm) of the sensor.
     """
 
-    data: np.ndarray
-    sigma: np.ndarray
-    model: np.ndarray
-    difference: np.ndarray | None
-    wavelength: np.ndarray
-    n: np.ndarray
-    k: np.ndarray
-    n_stderr: np.ndarray
-    k_stderr: np.ndarray
-    principal: Mapping[str, Index] | None = None
-
-    @property
-    def residual(self) -> np.ndarray:
-        return self.data - self.model
+    difference: np.ndarray | None = None
 
 
 class Deferred(Sequence[Curve | ColourCurve | BrdfCurve]):

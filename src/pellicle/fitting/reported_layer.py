@@ -51,13 +51,12 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
     return Linearised(*reported, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
 
 
-def layer_errors(at: Any, covariance: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Standard errors of the layer's n and k at each wavelength, from the covariance of the parameters.
-
-    `at` is the local model of a spectrum or of colours.
-    """
-    n, k = slope_errors(np.asarray(at.layer_slope)[:2, :points], covariance)
-    return n, k
+def index_of_layer(scene: Scene, at: Any, covariance: np.ndarray, wavelength: np.ndarray) -> dict[str, Any]:
+    """n and k of the reported layer, standard errors by the covariance of the parameters, and its principal
+    indices, as fields of a curve. `at` is the local model of a spectrum or of colours."""
+    (n, k), slopes = (np.asarray(x)[:2, : wavelength.size] for x in (at.layer, at.layer_slope))
+    index = Index(wavelength, n, k, *slope_errors(slopes, covariance))
+    return vars(index) | {"principal": principal_indices(scene, at, covariance, wavelength)}
 
 
 def principal_indices(

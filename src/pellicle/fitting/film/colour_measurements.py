@@ -20,9 +20,8 @@ from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.systematic_effects import named_for, simulated_effects
 from pellicle.fitting.misfit import Accuracy
 from pellicle.fitting.problem import Noise
-from pellicle.fitting.reported_layer import layer_errors, principal_indices
+from pellicle.fitting.reported_layer import index_of_layer
 from pellicle.fitting.result import Part
-from pellicle.fitting.reweighting import ViewFit
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength
 from pellicle.scene.free import is_free
@@ -129,25 +128,9 @@ def colours_view(
     return ColoursView(measured.name, chosen, anonymous(sampled), data, takes, code, tuple(modes), densest)
 
 
-def colours_part(colours: Colours, view: ColoursView, fit: ViewFit, covariance: np.ndarray) -> Part:
-    """The part of a fit that colours are; `covariance` is that of the parameters of the view."""
-    return Part(
-        name=view.name,
-        data=colours,
-        curve=colour_curve(colours, view, fit.at, covariance),
-        plan=view.plan,
-        rms=view.rms(fit.at),
-        chi2_reduced=fit.chi2 / fit.freedom,
-        effective_points=view.rows / fit.length,
-        sigma_from="usual" if colours.sigma is None else "given",
-    )
-
-
 def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.ndarray) -> ColourCurve:
     """Data and model in the space of the data, and the layer's index at the wavelengths of the sensor."""
     nm, sensor = colours.sensor
-    n_stderr, k_stderr = layer_errors(at, covariance, len(nm))
-    n, k = np.asarray(at.layer)[:2, : len(nm)]
     difference = None  # where the channels are those of a camera
     if colours.space != "rgb" or colours.camera is not None:
         to_xyz, white = np.linalg.inv(view.encoding.linear), sensor.sum(axis=0)
@@ -158,12 +141,7 @@ def colour_curve(colours: Colours, view: ColoursView, at: Local, covariance: np.
         sigma=colours.noise,
         model=view.encoded(at.model),
         difference=difference,
-        wavelength=nm,
-        n=n,
-        k=k,
-        n_stderr=n_stderr,
-        k_stderr=k_stderr,
-        principal=principal_indices(view.scene, at, covariance, nm),
+        **index_of_layer(view.scene, at, covariance, nm),
     )
 
 

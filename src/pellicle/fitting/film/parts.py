@@ -14,12 +14,12 @@ from pellicle.fitting.covariance import Errors
 from pellicle.fitting.curves import ColourCurve, Curve, Deferred
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film.colour_measurements import accuracy as colours_accuracy
-from pellicle.fitting.film.colour_measurements import colour_curve, colours_part, unlike
+from pellicle.fitting.film.colour_measurements import colour_curve, unlike
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.fringes import Fringes
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.misfit import Accuracy, misfit
-from pellicle.fitting.reported_layer import layer_errors, principal_indices
+from pellicle.fitting.reported_layer import index_of_layer
 from pellicle.fitting.result import Part, Rival
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 
@@ -37,18 +37,14 @@ def parts(data: list[Spectrum | Colours], ranked: RankedMinima, errors: Errors) 
         covariance = errors.covariance[np.ix_(view.takes, view.takes)]
         if isinstance(own, Colours):
             assert isinstance(view, ColoursView)
-            return colours_part(own, view, fit, covariance)
-        assert isinstance(view, SpectrumView)
-        return Part(
-            name=view.name,
-            data=own,
-            curve=_curve(own, view, fit.at, covariance),
-            plan=view.plan,
-            rms=view.rms(fit.at.model),
-            chi2_reduced=fit.chi2 / fit.freedom,
-            effective_points=view.rows / fit.length,
-            sigma_from="given" if view.noise.given else "model" if view.noise.drifting else "residuals",
-        )
+            curve, rms = colour_curve(own, view, fit.at, covariance), view.rms(fit.at)
+            source = "usual" if own.sigma is None else "given"
+        else:
+            assert isinstance(view, SpectrumView)
+            curve, rms = _curve(own, view, fit.at, covariance), view.rms(fit.at.model)
+            source = "given" if view.noise.given else "model" if view.noise.drifting else "residuals"
+        about = view.name, own, curve, view.plan, rms
+        return Part(*about, fit.chi2 / fit.freedom, view.rows / fit.length, source)
 
     rows = zip(data, ranked.problem.views, ranked.fits, strict=True)
     return tuple(part(own, view, fit) for own, view, fit in rows)
@@ -94,10 +90,8 @@ def with_curves(
         return _curve(part.spectrum, view, at, unknown)
 
     def curves(rival: Rival) -> tuple[Curve | ColourCurve, ...]:
-        values, pairs = (
-            np.array(list(rival.parameters.values())),
-            zip(parts, ranked.problem.views, strict=True),
-        )
+        values = np.array(list(rival.parameters.values()))
+        pairs = zip(parts, ranked.problem.views, strict=True)
         return tuple(curve(part, view, values) for part, view in pairs)
 
     return tuple(replace(rival, curves=Deferred(len(parts), partial(curves, rival))) for rival in rivals)
@@ -125,8 +119,6 @@ def accuracy(view: SpectrumView, calibrated: bool, values: np.ndarray) -> Accura
 def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.ndarray) -> Curve:
     """Data, model and the layer's index with errors, at the real points."""
     rows = view.rows
-    n_stderr, k_stderr = layer_errors(at, covariance, rows)
-    n, k = np.asarray(at.layer)[:2, :rows]
     wavelength = np.asarray(view.scene.light.wavelength)[:rows]
     data, model = view.in_columns(view.data.values), view.in_columns(at.model)
     weight = np.asarray(view.data.weight)[: view.points].reshape(rows, view.channels)
@@ -135,12 +127,4 @@ def _curve(spectrum: Spectrum, view: SpectrumView, at: Local, covariance: np.nda
         # a scene without depolarisation has none at any wavelength
         arrays["depolarisation_data"] = share.measured(spectrum)
         arrays.setdefault("depolarisation_model", np.zeros(rows))
-    return Curve(
-        wavelength=wavelength,
-        n=n,
-        k=k,
-        n_stderr=n_stderr,
-        k_stderr=k_stderr,
-        principal=principal_indices(view.scene, at, covariance, wavelength),
-        **arrays,
-    )
+    return Curve(**arrays, **index_of_layer(view.scene, at, covariance, wavelength))
