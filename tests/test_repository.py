@@ -39,6 +39,7 @@ CODE = {
 WORDS = {word for text in CODE.values() for word in re.findall(r"\w+", text)}
 WORDS |= {"properdocs", "validation"}  # of the site's settings
 WORDS |= {"sigma_psi_ane", "sigma_delta_ane"}  # columns whose names are composed
+WORDS |= set(re.findall(r"\w+", (ROOT / "docs/recipe.schema.json").read_text("utf-8")))  # composed keys
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -101,7 +101,17 @@ class Colours:
                 f"`sensor`: expected the shapes (N,) and (N, 3), got {nm.shape}, {weights.shape}"
             )
         object.__setattr__(self, "sensor", (nm, weights))
-        self._check_words()
+        known = {"space": SPACES, "signal": ("R", "T"), "polarisation": POLARISATIONS}
+        for name, words in (known | {"white_balance": ("fixed", "free")}).items():
+            if getattr(self, name) not in words:
+                raise UsageError(f"`{name}` must be one of {', '.join(words)}, not {getattr(self, name)!r}")
+        if self.gamma != 1.0 and self.space != "rgb":
+            raise UsageError(f'`gamma` goes with `space="rgb"`: {self.space} has its own coding')
+        if not 0.1 <= self.gamma <= 10:
+            raise UsageError(f"`gamma` must be a number from 0.1 to 10, such as 2.2, got {self.gamma:g}")
+        if self.space != "rgb" and (self.camera is not None or self.white_balance == "free"):
+            name = "camera" if self.camera is not None else "white_balance"
+            raise UsageError(f'`{name}` goes with `space="rgb"`, the channels of a camera, not {self.space}')
         errors = np.ones((1, 3)) if self.sigma is None else self.sigma
         angle = np.zeros(1) if self.angle is None else self.angle
         for channel, column, spread in zip(self.channels, self.values.T, errors.T, strict=True):
@@ -114,19 +124,6 @@ class Colours:
             refuse_first(spread, wrong, of_spread, f"is not above zero; {_REMEDY}")
         beyond = ~((angle >= 0) & (angle <= 90))
         refuse_first(angle, beyond, self.place("angle"), "is not from 0 to 90 degrees")
-
-    def _check_words(self) -> None:
-        known = {"space": SPACES, "signal": ("R", "T"), "polarisation": POLARISATIONS}
-        for name, words in (known | {"white_balance": ("fixed", "free")}).items():
-            if getattr(self, name) not in words:
-                raise UsageError(f"`{name}` must be one of {', '.join(words)}, not {getattr(self, name)!r}")
-        if self.gamma != 1.0 and self.space != "rgb":
-            raise UsageError(f'`gamma` goes with `space="rgb"`: {self.space} has its own coding')
-        if not 0.1 <= self.gamma <= 10:
-            raise UsageError(f"`gamma` must be a number from 0.1 to 10, such as 2.2, got {self.gamma:g}")
-        if self.space != "rgb" and (self.camera is not None or self.white_balance == "free"):
-            name = "camera" if self.camera is not None else "white_balance"
-            raise UsageError(f'`{name}` goes with `space="rgb"`, the channels of a camera, not {self.space}')
 
     @property
     def channels(self) -> tuple[str, str, str]:

@@ -86,7 +86,15 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
 
     An array of angles of incidence has none.
     """
-    present = _present(scene)
+    # numbers that the scene has: free ones, thicknesses, constant indices and optional effects
+    leaves = jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free)
+    shown = {(*at, GetAttrKey(key)) for at in _constants(scene) for key in ("n", "k")}
+    present = {}
+    for path, leaf in leaves:
+        key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
+        slides = path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k"
+        if is_free(leaf) or (number and (path in shown or slides)):
+            present[path] = leaf
     for path in _addable(scene):
         present.setdefault(path, 0.0)
     scaffold = scene
@@ -155,19 +163,6 @@ def free_paths(tree: Any) -> list[tuple[Any, ...]]:
     """Return the place of each free number of a pytree, in their order."""
     leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
     return [path for path, leaf in leaves if is_free(leaf)]
-
-
-def _present(scene: Scene) -> dict[tuple[Any, ...], Any]:
-    """Numbers that the scene has: free ones, thicknesses, constant indices and optional effects."""
-    leaves = jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free)
-    shown = {(*at, GetAttrKey(key)) for at in _constants(scene) for key in ("n", "k")}
-    present = {}
-    for path, leaf in leaves:
-        key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
-        slides = path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k"
-        if is_free(leaf) or (number and (path in shown or slides)):
-            present[path] = leaf
-    return present
 
 
 def _constants(scene: Scene) -> list[tuple[Any, ...]]:

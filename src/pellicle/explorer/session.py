@@ -268,14 +268,6 @@ def _measured_spectra(body: Mapping[str, Any], folder: Path | None, signal: str)
     if "file" in body:
         path = _inside(folder, body["file"])
         return _read(path, path.name, signal)
-    name, content = _content(body)
-    with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
-        path = Path(place) / name
-        path.write_bytes(content)
-        return _read(path, name, signal)
-
-
-def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
     name = body.get("name")
     if not isinstance(name, str):
         raise UsageError("a file needs a name")
@@ -291,7 +283,10 @@ def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
         form = "Unicode text" if encoded is None else "base64"
         raise UsageError(f"{name}: is not {form}") from None
     _check_size(name, len(content))
-    return name, content
+    with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
+        path = Path(place) / name
+        path.write_bytes(content)
+        return _read(path, name, signal)
 
 
 def _check_size(name: str, size: int) -> None:

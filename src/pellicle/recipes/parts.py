@@ -88,7 +88,15 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         if spline in SPLINES and same(fixed_model(spline, dispersion.knots, spline), dispersion):
             return f"{spline}({','.join(repr(x) for x in dispersion.knots)})"
     if isinstance(dispersion, Material):
-        return _material(dispersion, folder)
+        # the name of the catalogue, the page, or the path of the file
+        if os.path.exists(dispersion.page):
+            return Path(os.path.relpath(dispersion.page, folder)).as_posix()
+        try:
+            if same(material(dispersion.name), dispersion):
+                return dispersion.name
+        except UnknownMaterial:
+            pass
+        return dispersion.name if dispersion.page == "exactly 1" or dispersion.clear else dispersion.page
     if isinstance(dispersion, Constant):
         return _constant(dispersion, name)
     if isinstance(dispersion, Anisotropic):
@@ -142,18 +150,6 @@ def _plain(tree: Any) -> Any:
         return isinstance(node, Material | Constant) or is_free(node)
 
     return jax.tree_util.tree_map(plain, tree, is_leaf=stop)
-
-
-def _material(dispersion: Material, folder: Path) -> str:
-    """The name of the catalogue, the page, or the path of the file."""
-    if os.path.exists(dispersion.page):
-        return Path(os.path.relpath(dispersion.page, folder)).as_posix()
-    try:
-        if same(material(dispersion.name), dispersion):
-            return dispersion.name
-    except UnknownMaterial:
-        pass
-    return dispersion.name if dispersion.page == "exactly 1" or dispersion.clear else dispersion.page
 
 
 def _constant(dispersion: Constant, name: str) -> Any:

@@ -169,7 +169,26 @@ def film_of(described: Scene | Surface | Fit) -> Film:
         return film_of(with_values(scene[0] if isinstance(scene, tuple) else scene, values))
     check_scene(described)
     if isinstance(described, Surface):
-        return _of_surface(described)
+        # the film on the facets of a surface
+        if described.brdf.from_film_colour is None:
+            raise UsageError(
+                f"{described.model} has no film on a base, as renderers do: export microfacet-film or"
+                " blinn-phong-film"
+            )
+        numbers: dict[str, Any] = dict(described.start_numbers())
+        layer = _medium(numbers, "n", "k") if described.film is None else described.film
+        base = _medium(numbers, "base_n", "base_k") if described.base is None else described.base
+        ambient = _medium(numbers, "ambient_n", "ambient_k")
+        scene = Scene(Layer(layer, float(numbers["thickness"])), base, ambient=ambient)
+        notes = []
+        if np.any(numbers.get("diffuse", 0.0)):
+            notes.append("the diffuse part of the surface is left out")
+        if not np.all(numbers.get("specular", 1.0) == 1.0):
+            notes.append("the weight of the specular part is left out: it is 1")
+        if "exponent" in numbers:
+            notes.append("the Blinn-Phong lobe becomes GGX facets of nearly its width")
+            return Film(scene, float(np.sqrt(2 / (float(numbers["exponent"]) + 2))), tuple(notes))
+        return Film(scene, float(numbers["roughness"]), tuple(notes))
     if any(isinstance(medium, Anisotropic) for medium in scene_media(described)):
         raise UsageError(
             "a birefringent film is not exported: materials of renderers have one index: give it one"
@@ -211,29 +230,6 @@ def _value(values: Mapping[str, float], name: str) -> float:
             f"the fit has no value of {name}, which its scene leaves free: give the scene it is of"
         )
     return values[name]
-
-
-def _of_surface(surface: Surface) -> Film:
-    """The film on the facets of a surface."""
-    if surface.brdf.from_film_colour is None:
-        raise UsageError(
-            f"{surface.model} has no film on a base, as renderers do: export microfacet-film or"
-            " blinn-phong-film"
-        )
-    numbers: dict[str, Any] = dict(surface.start_numbers())
-    layer = _medium(numbers, "n", "k") if surface.film is None else surface.film
-    base = _medium(numbers, "base_n", "base_k") if surface.base is None else surface.base
-    ambient = _medium(numbers, "ambient_n", "ambient_k")
-    scene = Scene(Layer(layer, float(numbers["thickness"])), base, ambient=ambient)
-    notes = []
-    if np.any(numbers.get("diffuse", 0.0)):
-        notes.append("the diffuse part of the surface is left out")
-    if not np.all(numbers.get("specular", 1.0) == 1.0):
-        notes.append("the weight of the specular part is left out: it is 1")
-    if "exponent" in numbers:
-        notes.append("the Blinn-Phong lobe becomes GGX facets of nearly its width")
-        return Film(scene, float(np.sqrt(2 / (float(numbers["exponent"]) + 2))), tuple(notes))
-    return Film(scene, float(numbers["roughness"]), tuple(notes))
 
 
 def _medium(numbers: Mapping[str, Any], n: str, k: str) -> Constant | Table:

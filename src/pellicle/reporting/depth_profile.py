@@ -97,7 +97,14 @@ def draw(profile: DepthProfile) -> Figure:
     for i, group in enumerate(profile.sections):
         names = ("|E|², incident wave = 1", "absorbed power (% per nm)") if i == 0 else ("", "")
         for row, values, label in zip(rows, (group.intensity, 100 * group.absorbed), names, strict=True):
-            lines = _against_depth(group, profile.at, values)
+            # a line for each wavelength, interrupted at the interfaces: E_z and the absorbed power jump there
+            medium = np.array(group.medium)
+            breaks = np.flatnonzero(medium[1:] != medium[:-1]) + 1
+            depth = np.insert(group.depth.astype(float), breaks, np.nan)
+            lines = [
+                Line(depth, np.insert(values[i], breaks, np.nan), f"{nm:g} nm", COLOURS[i % len(COLOURS)])
+                for i, nm in enumerate(profile.at)
+            ]
             legend: Place = "above" if not i and row is rows[0] else ""
             ends = group.depth[0], group.depth[-1]
             top = max(float(np.nanmax(line.y)) for line in lines)
@@ -105,17 +112,6 @@ def draw(profile: DepthProfile) -> Figure:
             row.append(Panel(label, lines, [], 2.2, spans=_layers(group, named=row is rows[0]), **axes))
     sections = [Section("depth (nm)", rows), _against_wavelength(profile)]
     return matplotlib_figure.draw(sections, "", max(8.0, 4.2 * len(profile.sections)))
-
-
-def _against_depth(group: Group, at: np.ndarray, values: np.ndarray) -> list[Line]:
-    """A line for each wavelength, interrupted at the interfaces: E_z and the absorbed power jump there."""
-    medium = np.array(group.medium)
-    breaks = np.flatnonzero(medium[1:] != medium[:-1]) + 1
-    depth = np.insert(group.depth.astype(float), breaks, np.nan)
-    return [
-        Line(depth, np.insert(values[i], breaks, np.nan), f"{nm:g} nm", COLOURS[i % len(COLOURS)])
-        for i, nm in enumerate(at)
-    ]
 
 
 def _layers(group: Group, named: bool = True) -> list[tuple[float, float, str, float]]:

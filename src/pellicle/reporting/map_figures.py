@@ -236,12 +236,7 @@ def _series(sheet: Sheet, variable: str) -> Figure:
             panels[row, i].set_title(what + f", {when}" if i == 0 else when, fontsize="medium", loc="left")
             if i:
                 panels[row, i].set_ylabel("")
-    _against_series(sheet, curve, variable)
-    return figure
-
-
-def _against_series(sheet: Sheet, panel: Axes, variable: str) -> None:
-    """Mean and 5 to 95 % of the decided pixels of each frame, and the share of these pixels."""
+    # mean and 5 to 95 % of the decided pixels of each frame, and the share of these pixels
     thin = thinned(sheet.data, sheet.made.axes)
     axis = sheet.axes.series
     assert axis is not None
@@ -253,16 +248,17 @@ def _against_series(sheet: Sheet, panel: Axes, variable: str) -> None:
     mean[some] = np.nanmean(values[some], axis=1)
     low[some], high[some] = np.nanpercentile(values[some], [5, 95], axis=1)
     band: dict[str, Any] = {"color": BLUE, "alpha": 0.25, "linewidth": 0, "label": "5 to 95 % of the pixels"}
-    handles = [panel.fill_between(axis.values, low, high, **band)]
-    handles += panel.plot(axis.values, mean, ".-", color=BLUE, markersize=4, label="mean")
-    panel.set(xlabel=axis.label, ylabel=sheet.label(variable))
-    beside, about = panel.twinx(), "pixels that can be used (right)"
+    handles = [curve.fill_between(axis.values, low, high, **band)]
+    handles += curve.plot(axis.values, mean, ".-", color=BLUE, markersize=4, label="mean")
+    curve.set(xlabel=axis.label, ylabel=sheet.label(variable))
+    beside, about = curve.twinx(), "pixels that can be used (right)"
     share = 100 * used.sum(axis=1) / np.maximum((codes != CODES[NO_DATA]).sum(axis=1), 1)
     handles += beside.plot(axis.values, share, color=ORANGE, linewidth=1.0, label=about)
     beside.set(ylabel="share (%)", ylim=(0, 105))
-    for own in (panel, beside):
+    for own in (curve, beside):
         own.spines[["top"]].set_visible(False)
-    panel.legend(handles=handles, ncols=3, fontsize="small", **ABOVE)
+    curve.legend(handles=handles, ncols=3, fontsize="small", **ABOVE)
+    return figure
 
 
 def _line(sheet: Sheet, variable: str) -> Figure:

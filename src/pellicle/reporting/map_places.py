@@ -194,7 +194,16 @@ def _in_frame(marked: np.ndarray, known: np.ndarray, axes: MapAxes, counted: boo
             return "in scattered pixels"
         return "at " + _spans(sorted(runs), axes.x)
     if axes.kind == "sites":
-        return _at_sites(marked, known, axes)
+        # sites far from the centre of all, near it, or neither
+        assert axes.y is not None
+        x, y = axes.x.values, axes.y.values
+        radius = np.hypot(x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2)
+        order = np.flatnonzero(known)[np.argsort(radius[known])]
+        size = min(int(np.ceil(1.25 * marked.sum())), len(order) // 2)
+        for word, end in (("outer", order[::-1][:size]), ("inner", order[:size])):
+            if size and marked[end].sum() >= MOST * marked.sum():
+                return f"at the {word} sites"
+        return "at scattered sites"
     if count == known.sum():
         return "everywhere"
     if around := _around(marked, axes):
@@ -214,19 +223,6 @@ def _around(marked: np.ndarray, axes: MapAxes) -> str:
     assert axes.y is not None
     x, y = (axis.span(*axis.values[at[[0, -1]]]) for axis, at in ((axes.x, columns), (axes.y, rows)))
     return f"all around {x}, {y}"
-
-
-def _at_sites(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:
-    """Sites far from the centre of all, near it, or neither."""
-    assert axes.y is not None
-    x, y = axes.x.values, axes.y.values
-    radius = np.hypot(x - (x.min() + x.max()) / 2, y - (y.min() + y.max()) / 2)
-    order = np.flatnonzero(known)[np.argsort(radius[known])]
-    size = min(int(np.ceil(1.25 * marked.sum())), len(order) // 2)
-    for word, end in (("outer", order[::-1][:size]), ("inner", order[:size])):
-        if size and marked[end].sum() >= MOST * marked.sum():
-            return f"at the {word} sites"
-    return "at scattered sites"
 
 
 def _rows(marked: np.ndarray, known: np.ndarray, axes: MapAxes) -> str:

@@ -37,7 +37,22 @@ def describe(measured: Spectrum | Colours | Cube, notes: tuple[str, ...] | None 
 def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
     """Convert the summary to a dictionary; numbers that are unknown are None."""
     if isinstance(measured, Spectrum):
-        record = _spectrum_record(measured)
+        errors = taken(measured, "sigma", "delta_sigma")
+        record = {
+            "schema": "pellicle.spectrum/1",
+            **taken(measured, "path", "sha256", "name", "signal", "polarisation", "calibrated"),
+            "folded": measured.kind.folded,
+            "transmission": measured.transmission,
+            "points": len(measured),
+            "sweeps": len(measured.sweeps),
+            "range_nm": measured.wavelength[[0, -1]],
+            "angles_deg": _each(measured.angle),
+            "azimuths_deg": _each(measured.azimuth),
+            "values": {name: [x.min(), x.max()] for name, x in _values(measured).items()},
+            "noise": {name: scatter(x) for name, x in _values(measured).items()},
+            **{name: None if x is None else [x.min(), x.max()] for name, x in errors.items()},
+            "declared": dict(measured.declared),
+        }
     else:
         record = _colours_record(measured) if isinstance(measured, Colours) else _cube_record(measured)
     return strict(record | {"notes": measured.notes, "versions": versions()})
@@ -66,25 +81,6 @@ def _spectrum_rows(spectrum: Spectrum) -> list[tuple[str, str]]:
         ("noise", "; ".join(text for text in noise if text)),
         *spectrum.declared,
     ]
-
-
-def _spectrum_record(spectrum: Spectrum) -> dict[str, Any]:
-    errors = taken(spectrum, "sigma", "delta_sigma")
-    return {
-        "schema": "pellicle.spectrum/1",
-        **taken(spectrum, "path", "sha256", "name", "signal", "polarisation", "calibrated"),
-        "folded": spectrum.kind.folded,
-        "transmission": spectrum.transmission,
-        "points": len(spectrum),
-        "sweeps": len(spectrum.sweeps),
-        "range_nm": spectrum.wavelength[[0, -1]],
-        "angles_deg": _each(spectrum.angle),
-        "azimuths_deg": _each(spectrum.azimuth),
-        "values": {name: [x.min(), x.max()] for name, x in _values(spectrum).items()},
-        "noise": {name: scatter(x) for name, x in _values(spectrum).items()},
-        **{name: None if x is None else [x.min(), x.max()] for name, x in errors.items()},
-        "declared": dict(spectrum.declared),
-    }
 
 
 def scatter(values: Float[np.ndarray, " points"]) -> float:

@@ -101,7 +101,23 @@ def write_map(folder: str | os.PathLike[str], made: ThicknessMap) -> Path:
 def draw(made: ThicknessMap, name: str = "") -> Figure:
     """Draw a strip with every admissible thickness, or a map with its probability."""
     if made.position is None:
-        return _region(made, name)
+        height, width = made.found.status.shape
+        figure = new_figure(10.0, float(np.clip(0.6 + 3.0 * height / width, 2.4, 8.0)))
+        panels = figure.subplots(1, 3)
+        panels[0].imshow(np.clip(made.colours, 0, 1), interpolation="nearest")
+        panels[0].set_title(plain(name))
+        parts = (
+            ("thickness (nm)", made.found.thickness, {"cmap": "viridis"}),
+            ("probability", made.found.probability, {"cmap": "cividis", "vmin": 0, "vmax": 1}),
+        )
+        for axes, (label, values, style) in zip(panels[1:], parts, strict=True):
+            image = axes.imshow(values[..., 0], interpolation="nearest", **style)
+            axes.set_title(label)
+            figure.colorbar(image, ax=axes, shrink=0.8)
+        for axes in panels:
+            axes.set_xlabel("x (pixels)")
+        panels[0].set_ylabel("y (pixels)")
+        return figure
     figure, position, films = new_figure(7.0, 4.6), made.position, made.found
     shown, axes = figure.subplots(2, 1, sharex=True, height_ratios=[1, 4])
     extent = (position[0] - 0.5, position[-1] + 0.5, 1.5, -0.5)
@@ -125,24 +141,4 @@ def draw(made: ThicknessMap, name: str = "") -> Figure:
         axes.plot(*marked, "x", color=ORANGE, markersize=4, label="misfit")
     axes.set(xlabel="position along the strip (pixels)", ylabel="thickness (nm)")
     axes.legend(frameon=False, fontsize="small")
-    return figure
-
-
-def _region(made: ThicknessMap, name: str) -> Figure:
-    height, width = made.found.status.shape
-    figure = new_figure(10.0, float(np.clip(0.6 + 3.0 * height / width, 2.4, 8.0)))
-    panels = figure.subplots(1, 3)
-    panels[0].imshow(np.clip(made.colours, 0, 1), interpolation="nearest")
-    panels[0].set_title(plain(name))
-    parts = (
-        ("thickness (nm)", made.found.thickness, {"cmap": "viridis"}),
-        ("probability", made.found.probability, {"cmap": "cividis", "vmin": 0, "vmax": 1}),
-    )
-    for axes, (label, values, style) in zip(panels[1:], parts, strict=True):
-        image = axes.imshow(values[..., 0], interpolation="nearest", **style)
-        axes.set_title(label)
-        figure.colorbar(image, ax=axes, shrink=0.8)
-    for axes in panels:
-        axes.set_xlabel("x (pixels)")
-    panels[0].set_ylabel("y (pixels)")
     return figure

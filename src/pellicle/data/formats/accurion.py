@@ -108,31 +108,6 @@ def _mean(zones: Sequence[Rows], columns: dict[str, int]) -> Rows:
     return means
 
 
-def _spots(rows: Rows, columns: dict[str, int]) -> list[Rows]:
-    """The rows of each spot or time: a repeated point begins another spot, in any order of rows.
-
-    Positions do not separate spots: stages drift by a tenth of a millimetre while angles change. Raises
-    DataError where positions contradict, as where a point of a spot is missing.
-    """
-    by_spot: dict[tuple[str, int], Rows] = {}
-    counts: Counter[tuple[str, ...]] = Counter()
-    for line, cells in rows:
-        region = _region(cells, columns)
-        point = (region, cells[columns["Lambda"]], cells[columns["AOI"]])
-        counts[point] += 1
-        by_spot.setdefault((region, counts[point]), []).append((line, cells))
-    spots = list(by_spot.values())
-    for (before, first), *others in spots if len(spots) > 1 else ():
-        for line, cells in others:
-            apart = _distance(_position(first, columns), _position(cells, columns))
-            if apart > DRIFT_MM:
-                raise DataError(
-                    f"line {line.number} lies {apart:.3g} mm from line {before.number}, which should be of "
-                    "the same spot: some of its points are missing; keep the rows of one spot in the file"
-                )
-    return spots
-
-
 def _region(cells: list[str], columns: dict[str, int]) -> str:
     return cells[columns["ROIidx"]] if "ROIidx" in columns else ""
 
@@ -150,7 +125,23 @@ def _distance(one: tuple[float, ...], other: tuple[float, ...]) -> float:
 
 def _select_spot(rows: Rows, columns: dict[str, int], spot: int | None) -> tuple[Rows, list[str]]:
     """The rows of one spot, and notes. Raises UsageError where `spot` is missing or wrong."""
-    spots = _spots(rows, columns)
+    # the rows of each spot or time: a repeated point begins another spot, in any order of rows
+    by_spot: dict[tuple[str, int], Rows] = {}
+    counts: Counter[tuple[str, ...]] = Counter()
+    for line, cells in rows:
+        region = _region(cells, columns)
+        point = (region, cells[columns["Lambda"]], cells[columns["AOI"]])
+        counts[point] += 1
+        by_spot.setdefault((region, counts[point]), []).append((line, cells))
+    spots = list(by_spot.values())
+    for (before, first), *others in spots if len(spots) > 1 else ():
+        for line, cells in others:
+            apart = _distance(_position(first, columns), _position(cells, columns))
+            if apart > DRIFT_MM:
+                raise DataError(
+                    f"line {line.number} lies {apart:.3g} mm from line {before.number}, which should be of "
+                    "the same spot: some of its points are missing; keep the rows of one spot in the file"
+                )
     if spot is None and len(spots) == 1:
         return spots[0], []
     heads = [(line, _region(cells, columns), _position(cells, columns)) for (line, cells), *_ in spots]

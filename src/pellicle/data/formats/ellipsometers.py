@@ -40,7 +40,16 @@ def horiba(file: TextFile) -> list[Table] | None:
 
     Raises DataError where the file has none, but Is and Ic.
     """
-    blocks = _horiba_blocks(file)
+    # the lines below each # NAME:
+    heads = {comment.number: comment.text.strip().rstrip(":").strip().upper() for comment in file.comments}
+    blocks: dict[str, list[Line]] = {}
+    name = None
+    for line in file.all_lines if heads else []:
+        if line.number in heads:
+            name = heads[line.number]
+            blocks.setdefault(name, [])
+        elif name is not None:
+            blocks[name].append(line)
     if not {_HORIBA_DATA, _HORIBA_ANGLE} <= set(blocks):
         return None
     header, rows = blocks[_HORIBA_DATA][:1], blocks[_HORIBA_DATA][1:]
@@ -71,20 +80,6 @@ def horiba(file: TextFile) -> list[Table] | None:
     facts = [(fact, blocks[name][0].text.strip()) for name, fact in _HORIBA_FACTS.items() if blocks.get(name)]
     read = (f"wavelength ({unit})", "angle_deg", "psi_deg", "delta_deg")
     return [export("Horiba DeltaPsi2 text", read, points, facts=facts, notes=notes, decimal=".")]
-
-
-def _horiba_blocks(file: TextFile) -> dict[str, list[Line]]:
-    """The lines below each `# NAME:`."""
-    heads = {comment.number: comment.text.strip().rstrip(":").strip().upper() for comment in file.comments}
-    blocks: dict[str, list[Line]] = {}
-    name = None
-    for line in file.all_lines if heads else []:
-        if line.number in heads:
-            name = heads[line.number]
-            blocks.setdefault(name, [])
-        elif name is not None:
-            blocks[name].append(line)
-    return blocks
 
 
 def spectraray(file: TextFile) -> list[Table] | None:

@@ -65,15 +65,6 @@ def fitted(
     name = residual or ("linear" if all(each.sigma is not None for each in samples) else "cube-root")
     if name not in RESIDUALS:
         raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
-    _check(samples, surface)
-    stems = [Path(each.path).stem.replace(".", "_") for each in samples]
-    names = stems if len(set(stems)) == len(stems) else [str(i + 1) for i in range(len(stems))]
-    with jax.enable_x64(True):
-        names = [""] if isinstance(data, BrdfSamples) else names
-        return _fit(samples, names, surface, name, tolerance, loss, progress)
-
-
-def _check(samples: list[BrdfSamples], surface: Surface) -> None:
     if not surface.free_numbers():
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
     places = [f"{each.path}: " if each.path else "" for each in samples]
@@ -86,6 +77,11 @@ def _check(samples: list[BrdfSamples], surface: Surface) -> None:
     count = sum(len(each) for each in samples)
     if count < FEWEST:
         raise UsageError(f"{places[0]}{count} samples are too few to fit and to judge: give {FEWEST} or more")
+    stems = [Path(each.path).stem.replace(".", "_") for each in samples]
+    names = stems if len(set(stems)) == len(stems) else [str(i + 1) for i in range(len(stems))]
+    with jax.enable_x64(True):
+        names = [""] if isinstance(data, BrdfSamples) else names
+        return _fit(samples, names, surface, name, tolerance, loss, progress)
 
 
 def _held_out(whole: Problem, effort: Effort, loss: str, progress: Progress) -> tuple[Minima, float]:

@@ -135,7 +135,7 @@ def _judged(scene: Scene, values: tuple[float, ...] | None) -> _Judged:
     return _Judged(
         tuple(medium is not None and _solid(medium, nm) for medium in layers),
         _solid(bulk, nm),
-        _oxidises(bulk, nm),
+        bool(_median(bulk, nm) > _OXIDISES or np.median(np.asarray(imag(ordinary_index(bulk, nm)))) > 0.1),
         isinstance(foot, Layer)
         and not free_leaves(getattr(scene.layers[-1], "material", None))
         and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE,
@@ -343,9 +343,3 @@ def _median(medium: Any, nm: np.ndarray) -> float:
 def _solid(medium: Any, nm: np.ndarray) -> bool:
     index = ordinary_index(medium, nm)
     return bool(np.max(np.hypot(np.asarray(real(index)) - 1, np.asarray(imag(index)))) > _GAS)
-
-
-def _oxidises(medium: Any, nm: np.ndarray) -> bool:
-    return bool(
-        _median(medium, nm) > _OXIDISES or np.median(np.asarray(imag(ordinary_index(medium, nm)))) > 0.1
-    )

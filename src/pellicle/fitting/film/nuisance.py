@@ -228,7 +228,14 @@ def nonnegative_curves(matrix, b, degrees: tuple[int, ...], slack: float):
 
     **Source:** J. Nocedal and S. Wright, Numerical optimization (2006), section 16.4 (the dual problem).
     """
-    rows = _rows(degrees)
+    # values of the curves at their positions, (positions, coefficients), as multiples of the coefficients
+    own_rows, first, count = [], 0, sum(degree + 1 for degree in degrees)
+    for degree in degrees:
+        at = np.cos(np.linspace(0.0, np.pi, degree + 1 if degree < 2 else _POSITIONS))
+        own = np.polynomial.chebyshev.chebvander(at, degree)
+        own_rows.append(np.pad(own, ((0, 0), (first, count - first - degree - 1))))
+        first += degree + 1
+    rows = np.vstack(own_rows)
     inverse, unbounded = nonnegative(matrix, b, np.zeros(len(b), bool), slack)
     across, values = rows @ inverse, rows @ unbounded
     gram = across @ rows.T
@@ -237,14 +244,3 @@ def nonnegative_curves(matrix, b, degrees: tuple[int, ...], slack: float):
     missing = jnp.where(held, -values, -jnp.maximum(values, 0.0))
     reduced, force = nonnegative(gram, missing, np.ones(len(rows), bool), 0.0, held)
     return inverse - across.T @ reduced @ across, unbounded + across.T @ force
-
-
-def _rows(degrees: tuple[int, ...]) -> np.ndarray:
-    """Values of curves at their positions, (positions, coefficients), as multiples of the coefficients."""
-    rows, first, count = [], 0, sum(degree + 1 for degree in degrees)
-    for degree in degrees:
-        at = np.cos(np.linspace(0.0, np.pi, degree + 1 if degree < 2 else _POSITIONS))
-        own = np.polynomial.chebyshev.chebvander(at, degree)
-        rows.append(np.pad(own, ((0, 0), (first, count - first - degree - 1))))
-        first += degree + 1
-    return np.vstack(rows)

@@ -217,7 +217,17 @@ def material_file(constants: OpticalConstants, kind: str, title: str = "", assum
             )
 
     refuse(axis, constants.axis, constants.axis <= 0, "above 0")
-    _check_order(constants)
+    steps = np.diff(constants.axis)
+    if not steps.size:
+        raise DataError("expected at least two rows, found one; add the others")
+    wrong = steps * np.sign(steps[0]) <= 0
+    if wrong.any():
+        row = int(np.argmax(wrong)) + 1
+        raise DataError(
+            f"{constants.where(row, constants.names[0])}: expected wavelengths that only rise or only fall, "
+            f"found {constants.axis[row]:g} after {constants.axis[row - 1]:g}; sort the rows and delete "
+            "repeated ones"
+        )
     with np.errstate(over="ignore"):
         nm = np.round(to_nm(constants.axis, constants.unit), 9)
     refuse(axis, constants.axis, ~((nm > 0) & (nm < LONGEST_NM)), "of a wavelength of light")
@@ -236,17 +246,3 @@ def material_file(constants: OpticalConstants, kind: str, title: str = "", assum
         refuse(first, n, n <= 0, "above 0")
     columns = f"{axis} in {constants.unit}, {first}{f', {second}' if k is not None else ''}; {len(nm)} rows"
     return table(nm, n, k)._replace(format=kind, columns=columns, assumed=assumed, title=title)
-
-
-def _check_order(constants: OpticalConstants) -> None:
-    steps = np.diff(constants.axis)
-    if not steps.size:
-        raise DataError("expected at least two rows, found one; add the others")
-    wrong = steps * np.sign(steps[0]) <= 0
-    if wrong.any():
-        row = int(np.argmax(wrong)) + 1
-        raise DataError(
-            f"{constants.where(row, constants.names[0])}: expected wavelengths that only rise or only fall, "
-            f"found {constants.axis[row]:g} after {constants.axis[row - 1]:g}; sort the rows and delete "
-            "repeated ones"
-        )
