@@ -5,7 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from pellicle.data.half_angles import angles, from_half_difference, vectors
+from pellicle.data.brdf_samples import angles, from_half_difference, vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError
 from tests.data.tables import assert_read

@@ -1,4 +1,9 @@
-"""Samples of a BRDF as arrays, and their CSV."""
+"""Samples of a BRDF as arrays, and their CSV; directions as angles, vectors, half and difference angles.
+
+Half and difference angles (radians) are those of Rusinkiewicz (A new change of variables for efficient BRDF
+representation, 1998): with the normal along z, the half vector lies at (θ_h, φ_h), and the difference vector
+(θ_d, φ_d) is one of the two directions after a rotation of the half vector onto the normal.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +21,39 @@ from pellicle.data.tabular.columns import DIRECTIONS
 from pellicle.errors import DataError, UsageError
 from pellicle.files import write_text
 from pellicle.signals.limits import Where, noise_level, refuse_first
+
+Angle = np.ndarray | float
+
+
+def vectors(theta: Angle, phi: Angle) -> np.ndarray:
+    """Return unit vectors of shape (3, ...)."""
+    theta, phi = np.broadcast_arrays(theta, phi)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
+def angles(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return θ from 0 to π and φ from 0 to 2π of vectors of shape (3, ...) and any length."""
+    x, y, z = vector
+    return np.arctan2(np.hypot(x, y), z), np.arctan2(y, x) % (2 * np.pi)
+
+
+def from_half_difference(
+    theta_h: Angle, phi_h: Angle, theta_d: Angle, phi_d: Angle
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the two directions (3, ...) with these half and difference angles, that of φ_d first.
+
+    The second is that of φ_d + π, the mirror image of the first at the half vector: adding π to φ_d swaps
+    light and viewer.
+    """
+    x, y, z = vectors(theta_d, phi_d)
+    return _rotated(x, y, z, theta_h, phi_h), _rotated(-x, -y, z, theta_h, phi_h)
+
+
+def _rotated(x: np.ndarray, y: np.ndarray, z: np.ndarray, theta: Angle, phi: Angle) -> np.ndarray:
+    """Rotate by θ about y, which takes the normal to the half vector, then by φ about z."""
+    x, z = np.cos(theta) * x + np.sin(theta) * z, np.cos(theta) * z - np.sin(theta) * x
+    return np.stack([np.cos(phi) * x - np.sin(phi) * y, np.sin(phi) * x + np.cos(phi) * y, z])
+
 
 CHANNELS = (("value",), ("R", "G", "B"))
 ROUNDING = 1e-3

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.data.brdf_samples import vectors
 from pellicle.data.formats.bilinear_warp import BilinearWarp, Corners
 from pellicle.data.formats.rgl import RglBrdf, unit_to_phi, unit_to_theta
-from pellicle.data.half_angles import vectors
 
 Brdf = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """BRDF (N, channels) in 1/sr of directions to the light and to the viewer, unit vectors (3, N)."""

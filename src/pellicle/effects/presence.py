@@ -12,8 +12,7 @@ from pellicle.dispersion.anisotropic import (
     mixes_polarisations,
     principal_media,
 )
-from pellicle.dispersion.base import AbstractDispersion, known_index
-from pellicle.dispersion.empirical import Constant
+from pellicle.dispersion.empirical import AbstractDispersion, Constant, known_index
 from pellicle.effects.differences import largest_attenuation, normal_incidence, upper
 from pellicle.errors import UsageError
 from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL, SLICED, Row

@@ -20,9 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.covariance import Errors, Scaled
+from pellicle.fitting.covariance import Errors, Normal, Scaled, held_within, times
 from pellicle.fitting.noise import WINDOW
-from pellicle.fitting.normal_equations import Normal, held_within, times
 from pellicle.fitting.robust_losses import median, spread
 
 HALF_NORMAL = math.sqrt(3)

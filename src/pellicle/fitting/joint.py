@@ -30,9 +30,8 @@ from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.minima import minima
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Box, Coordinates, Problem
+from pellicle.fitting.problem import Box, Coordinates, Problem, Progress
 from pellicle.fitting.profile_likelihood import Limits
-from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Estimate, Fit, Part
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES

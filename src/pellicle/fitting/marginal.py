@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.covariance import Errors, Scaled
+from pellicle.fitting.covariance import Errors, Normal, Scaled, held_within, times
 from pellicle.fitting.discrepancy import Discrepancy, Evidence, System, discrepancy
 from pellicle.fitting.noise import student
-from pellicle.fitting.normal_equations import Normal, held_within, times
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
 from pellicle.fitting.robust_losses import median
 from pellicle.fitting.status import RIVAL

@@ -7,8 +7,7 @@ import numpy as np
 
 from pellicle.effects.averaging import rays_of_axes
 from pellicle.fitting.evaluation import Until, polish
-from pellicle.fitting.problem import Problem
-from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.problem import Problem, Progress, quiet
 
 log = getLogger(__name__)
 

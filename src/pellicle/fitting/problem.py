@@ -6,7 +6,7 @@ whatever comes after the search takes a `Problem` and depends on neither.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
@@ -18,6 +18,14 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.forward_model.plan import Plan
 from pellicle.optics.pair import namespace
 from pellicle.scene.priors import LogUniform, Prior
+
+Progress = Callable[[str, int, int], None]
+"""Called with the name of a stage, how much is done and how much there is."""
+
+
+def quiet(stage: str, done: int, total: int) -> None:
+    """A no-op progress callback."""
+
 
 Array: TypeAlias = jax.Array | np.ndarray
 

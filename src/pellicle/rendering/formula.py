@@ -25,7 +25,7 @@ from jaxtyping import Float
 from pellicle.colour import delta_e2000, integration_bands, lab, sensor
 from pellicle.colour.bands import published_gaussians
 from pellicle.colour.spaces import srgb_matrix
-from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import AbstractDispersion, known_index
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.optics.pair import parts
 from pellicle.scene.film import Light, Scene

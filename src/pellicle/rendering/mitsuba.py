@@ -20,8 +20,8 @@ from jinja2 import Template
 from pellicle.brdf.lobes import microfacets
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.spaces import srgb_matrix
+from pellicle.data.brdf_samples import angles, vectors
 from pellicle.data.formats.rgl import write_tensors
-from pellicle.data.half_angles import angles, vectors
 from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text

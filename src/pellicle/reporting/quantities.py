@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.colour.spaces import encoding, linear_srgb, srgb
-from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.data.brdf_samples import BrdfSamples, vectors
 from pellicle.data.colours import Colours
-from pellicle.data.half_angles import vectors
 from pellicle.data.spectrum import Spectrum, named
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.result import Part

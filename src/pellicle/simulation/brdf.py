@@ -7,8 +7,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
-from pellicle.data.half_angles import angles, from_half_difference
+from pellicle.data.brdf_samples import CHANNELS, BrdfSamples, angles, from_half_difference
 from pellicle.effects import surface_plan
 from pellicle.errors import UsageError
 from pellicle.forward_model.plan import Plan

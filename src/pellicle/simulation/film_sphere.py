@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.colour import integration_bands
 from pellicle.colour.observers import Sensor, srgb_sensor
-from pellicle.dispersion.base import known_index
+from pellicle.dispersion.empirical import known_index
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, response
 from pellicle.optics.interface import allow_tunnelling

@@ -14,7 +14,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media
-from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, interface, response
 from pellicle.optics import ellipsometry as waves

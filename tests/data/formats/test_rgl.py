@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.data.brdf_samples import vectors
 from pellicle.data.formats.rgl import MAGIC, is_tensor_file, load_rgl, read_rgl, read_tensors, write_tensors
-from pellicle.data.half_angles import vectors
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.rgl_tables import TableSize, tabulate

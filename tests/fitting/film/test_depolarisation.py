@@ -12,7 +12,7 @@ from pellicle.fitting.comparison import compare
 from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.progress import quiet
+from pellicle.fitting.problem import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.result import predictions
 

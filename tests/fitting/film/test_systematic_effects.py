@@ -11,7 +11,7 @@ from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.progress import quiet
+from pellicle.fitting.problem import quiet
 from pellicle.scene.layers import Interface
 
 from ...differences import derivative

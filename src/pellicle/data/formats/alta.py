@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pellicle.data.brdf_samples import CHANNELS, BrdfSamples
-from pellicle.data.half_angles import angles, from_half_difference
+from pellicle.data.brdf_samples import CHANNELS, BrdfSamples, angles, from_half_difference
 from pellicle.data.tabular.table import Table, TextCells
 from pellicle.data.tabular.text import Line, TextFile
 from pellicle.errors import DataError

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pellicle.data.brdf_samples import BrdfSamples, spread
-from pellicle.data.half_angles import angles, from_half_difference
+from pellicle.data.brdf_samples import BrdfSamples, angles, from_half_difference, spread
 from pellicle.data.tabular.text import open_binary
 from pellicle.errors import DataError
 

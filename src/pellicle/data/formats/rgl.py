@@ -25,9 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.brdf_samples import BrdfSamples, spread
+from pellicle.data.brdf_samples import BrdfSamples, angles, spread, vectors
 from pellicle.data.formats.bilinear_warp import BilinearWarp, Corners, corners, interpolated
-from pellicle.data.half_angles import angles, vectors
 from pellicle.data.tabular.text import open_binary
 from pellicle.errors import DataError
 from pellicle.files import replacing

@@ -17,8 +17,7 @@ from pellicle.fitting.film.problem import Target, make
 from pellicle.fitting.film.search import search
 from pellicle.fitting.minima import MOST, Minima, distinct, minima, solve
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem, box
-from pellicle.fitting.progress import Progress
+from pellicle.fitting.problem import Problem, Progress, box
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.status import RIVAL
 

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.base import HC, known_index
-from pellicle.dispersion.empirical import CauchyUrbach, Constant
+from pellicle.dispersion.empirical import HC, CauchyUrbach, Constant, known_index
 from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.assembly import Assembly

@@ -20,8 +20,7 @@ from pellicle.fitting.film.fringes import proposed
 from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem
-from pellicle.fitting.progress import Progress
+from pellicle.fitting.problem import Problem, Progress
 
 log = getLogger(__name__)
 
