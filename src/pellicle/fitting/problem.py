@@ -7,6 +7,7 @@ whatever comes after the search takes a `Problem` and depends on neither.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
@@ -280,6 +281,36 @@ class View(Protocol):
     def off_tolerance(self, values: np.ndarray) -> float:
         """Error of the view's plan at `values`, in the unit of its signal; 0 for an exact plan."""
         ...
+
+
+class UsualView:
+    """What views do unless they say otherwise: one noise for all channels, no neighbours along a spectrum."""
+
+    @property
+    def independent_fraction(self: Any) -> Any:
+        """Effective points per point (...): correlated errors count less."""
+        return self.data.independent_fraction
+
+    @property
+    def noise_groups(self: Any) -> tuple[NoiseGroup, ...]:
+        """One group of all channels."""
+        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
+
+    def at_model(self, at: Any) -> Any:
+        """1: the noise does not depend on the model."""
+        return 1.0
+
+    def by_local_noise(self, at: Any) -> Any:
+        """The view itself: its points are not neighbours along a spectrum."""
+        return self
+
+    def counting(self: Any, fraction: Any) -> Any:
+        """The view with each point counting for `fraction` (...) of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
+
+    def thinned(self) -> Any:
+        """The view as it is: a scan needs all of its points."""
+        return self
 
 
 class Problem(NamedTuple):

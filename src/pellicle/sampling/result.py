@@ -88,7 +88,7 @@ def _samples(
     view: SamplesView, part: Part, model: np.ndarray, random: np.random.Generator
 ) -> list[Prediction]:
     """One for each channel, its samples from the darkest to the brightest of the fitted surface."""
-    rows, samples, residual = slice(view.rows), view.samples, view.form.residual
+    rows, samples, residual = slice(view.rows), view.data, view.form.residual
     model = model[:, rows]
     where = samples.i[rows, 2:3], samples.floor[rows]
     compared = RESIDUALS[residual](model, *where)

@@ -153,13 +153,13 @@ def test_two_lobes_without_a_layer(problem):
 def test_weights_are_those_of_the_compared_numbers(problem, residual):
     """With a σ, residuals are in standard deviations to first order, whatever is compared."""
     [view] = problem(residual=residual, sigma=1e-4).views
-    near = view.samples.values * (1 + 3e-4)
-    compared = np.asarray(view.form.compare(view.samples, near))[: view.rows]
+    near = view.data.values * (1 + 3e-4)
+    compared = np.asarray(view.form.compare(view.data, near))[: view.rows]
     np.testing.assert_allclose(compared, -3.0, rtol=1e-3)
     [bare] = problem(residual=residual).views
     assert (bare.noise.given, view.noise.given) == (False, True)
-    np.testing.assert_array_equal(bare.samples.weight[: bare.rows], 1.0)
-    np.testing.assert_array_equal(bare.samples.weight[bare.rows :], 0.0)
+    np.testing.assert_array_equal(bare.data.weight[: bare.rows], 1.0)
+    np.testing.assert_array_equal(bare.data.weight[bare.rows :], 0.0)
 
 
 RHO, COSINE, FLOOR = np.array([0.0, 0.3, 40.0]), np.array([1.0, 0.5, 0.2]), 1e-3

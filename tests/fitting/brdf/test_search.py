@@ -115,17 +115,17 @@ def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
     view stay as they are, so that its polish and the scan share their shapes."""
     programs = Programs(monkeypatch, distance)
     [view] = grey.views
-    weight = np.array(view.samples.weight)
+    weight = np.array(view.data.weight)
     weight[10:20] = 0.0  # held out
     several = []
     for own in range(count):
-        values = np.zeros_like(view.samples.values)
+        values = np.zeros_like(view.data.values)
         values[: view.rows, 0] = own * view.rows + np.arange(view.rows)
-        several.append(dataclasses.replace(view, samples=view.samples._replace(weight=weight, values=values)))
+        several.append(dataclasses.replace(view, data=view.data._replace(weight=weight, values=values)))
     search(grey._replace(views=tuple(several)), FEW, quiet)
     chosen = programs.seen[0]
     if count == 1:
-        assert chosen is several[0].samples
+        assert chosen is several[0].data
         return
     assert chosen.values.shape == (SCAN_SAMPLES, 1)
     fitted = [own * 50 + row for own in range(count) for row in range(50) if not 10 <= row < 20]

@@ -118,7 +118,7 @@ def incoherent(problem: Problem) -> Problem:
 
 def without_layer(problem: Problem) -> Problem:
     """Problem of two plain lobes without a layer, which a layer must beat too."""
-    count = problem.views[0].samples.values.shape[1]
+    count = problem.views[0].data.values.shape[1]
     shapes = {"roughness_1": _ROUGHNESS, "roughness_2": _ROUGHNESS, "normal": _NORMAL}
     weights = [(key, channel) for key in ("lobe_1", "lobe_2", "diffuse") for channel in range(count)]
     parameters = [Parameter(key, key, "", low, low, high) for key, (low, high) in shapes.items()]

@@ -121,15 +121,15 @@ def _thinned(problem: Problem) -> Problem:
     """The problem with one view of `SCAN_SAMPLES` samples, spread evenly over the values of all views; where
     there are fewer, some are repeated. One view with no more, padding included, stays: it needs no program
     of its own."""
-    if len(problem.views) == 1 and len(problem.views[0].samples.values) <= SCAN_SAMPLES:
+    if len(problem.views) == 1 and len(problem.views[0].data.values) <= SCAN_SAMPLES:
         return problem
-    columns = zip(*(view.samples[:5] for view in problem.views), strict=True)
+    columns = zip(*(view.data[:5] for view in problem.views), strict=True)
     every = Samples(*map(np.concatenate, columns))
     weighted = np.flatnonzero(np.any(every.weight > 0, axis=1))
     order = weighted[np.argsort(every.values[weighted].mean(axis=1), kind="stable")]
     chosen = np.sort(order[np.linspace(0, len(weighted) - 1, SCAN_SAMPLES).round().astype(int)])
     picked = Samples(*(column[chosen] for column in every[:5]))
-    view = replace(problem.views[0], samples=picked, rows=len(chosen), stated=picked.weight)
+    view = replace(problem.views[0], data=picked, rows=len(chosen), stated=picked.weight)
     return problem._replace(views=(view,))
 
 

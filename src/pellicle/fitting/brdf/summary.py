@@ -41,7 +41,7 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
     numbers = {key: np.asarray(x, float) for key, x in view.form.numbers(values, view.fixed).items()}
     model, rise, every = np.asarray(at.model)[: view.rows], view.slope_of_compared(at), list[Effect]()
 
-    def signal(changed: dict[str, Any], samples: Samples = view.samples) -> np.ndarray:
+    def signal(changed: dict[str, Any], samples: Samples = view.data) -> np.ndarray:
         # by the program of the fit
         at = np.array([changed.pop(key, x) for key, x in zip(view.form.keys, values, strict=True)], float)
         return np.asarray(local(view.form, samples, view.fixed | changed, at).model)[: view.rows]
@@ -65,7 +65,7 @@ def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface
         ends = [signal({key: mean + s * math.sqrt(3) * size / by}) for s in (1, -1)]
         add(name, size, "nm", HALF_NORMAL / 6 * (sum(ends) - 2 * model), power=2)
     for side, name in (("i", "angle of incidence"), ("o", "viewing angle")):
-        ends = (signal({}, _turned(view.samples, side, s * _STEP * allowed.angle)) for s in (1, -1))
+        ends = (signal({}, _turned(view.data, side, s * _STEP * allowed.angle)) for s in (1, -1))
         add(f"{name}{of}", allowed.angle, "deg", slope(*ends), shared=False)
     shifted = slope(*(signal({"wavelengths": nm + s * _STEP * allowed.band}) for s in (1, -1)))
     names = [x.upper() for x in LETTERS] if view.channels == 3 else range(1, view.channels + 1)
@@ -103,7 +103,7 @@ class BrdfMeasurements(NamedTuple):
         for view, fit, block in zip(views, fits, blocks, strict=True):
             residual = view.residuals(fit.at)
             columns, one = block.reshape(*residual.shape, -1), np.ones(residual.shape)
-            weights = math.sqrt(view.samples.independent_fraction) * one
+            weights = math.sqrt(view.data.independent_fraction) * one
             values = problem.seen_by(view, at.values)
             effects = systematic_effects(view, values, fit.at, self.surface)
             about = residual, columns, one, 1.0, weights, effects, view.correlation_length

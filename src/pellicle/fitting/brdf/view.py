@@ -16,7 +16,7 @@ from pellicle.brdf.models import model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.noise import correlation_length
-from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Array, Explained, Noise, UsualView
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
 from pellicle.programs.cache import kept
@@ -110,13 +110,13 @@ def local(form: SamplesForm, samples: Samples, fixed: dict[str, Any], values: An
 
 
 @dataclass(frozen=True)
-class SamplesView:
+class SamplesView(UsualView):
     """BRDF samples of a problem; `stated` are the weights before any reweighting."""
 
     name: str  # empty where there is no other
     plan: Plan
     form: SamplesForm
-    samples: Samples
+    data: Samples
     fixed: dict[str, Any]
     takes: tuple[int, ...]
     noise: Noise
@@ -126,39 +126,25 @@ class SamplesView:
 
     @property
     def arrays(self) -> Arrays:
-        return self.samples, self.fixed
+        return self.data, self.fixed
 
     @property
     def channels(self) -> int:
         """Measured numbers of each sample."""
-        return self.samples.values.shape[1]
+        return self.data.values.shape[1]
 
     @property
     def independent(self) -> int:
         """Measured numbers: samples times channels."""
         return self.rows * self.channels
 
-    @property
-    def noise_groups(self) -> tuple[NoiseGroup, ...]:
-        """One group of all channels."""
-        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
-
-    @property
-    def independent_fraction(self) -> float:
-        """Effective points per point: correlated errors count less."""
-        return float(self.samples.independent_fraction)
-
     def local(self, values: Any) -> Local:
         """The model around `values` (free numbers,)."""
-        return local(self.form, self.samples, self.fixed, values)
+        return local(self.form, self.data, self.fixed, values)
 
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (rows, channels)."""
         return np.asarray(at.residual)[: self.rows]
-
-    def by_local_noise(self, at: Local) -> SamplesView:
-        """The view itself: its points are not neighbours along a spectrum."""
-        return self
 
     def at_model(self, at: Local) -> Any:
         """Weights of a relative noise of the model's values over those of the measured ones (rows, channels).
@@ -168,7 +154,7 @@ class SamplesView:
         """
         if self.relative is None:
             return 1.0
-        samples, transform = self.samples, RESIDUALS[self.form.residual]
+        samples, transform = self.data, RESIDUALS[self.form.residual]
         pair = (jnp.maximum(rho, samples.floor) for rho in (samples.values, jnp.asarray(at.model)))
         measured, computed = (slope(transform, x, samples.i[:, 2:3], samples.floor) * x for x in pair)
         ratio = np.asarray(measured) / np.asarray(computed)
@@ -193,47 +179,39 @@ class SamplesView:
     def reweighted(self, factor: Any, fraction: float) -> SamplesView:
         """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
         one."""
-        weight = np.array(self.samples.weight)
+        weight = np.array(self.data.weight)
         weight[: self.rows] *= factor
-        return replace(self, samples=self.samples._replace(weight=weight)).counting(fraction)
-
-    def counting(self, fraction: float) -> SamplesView:
-        """The view with each point counting for `fraction` of an independent one."""
-        return replace(self, samples=self.samples._replace(independent_fraction=np.float64(fraction)))
+        return replace(self, data=self.data._replace(weight=weight)).counting(fraction)
 
     def restricted(self, rows: np.ndarray) -> SamplesView:
         """View of the same program with weight on the samples of these rows alone."""
-        kept_rows = np.zeros((len(self.samples.weight), 1))
+        kept_rows = np.zeros((len(self.data.weight), 1))
         kept_rows[rows] = 1.0
-        return replace(self, samples=self.samples._replace(weight=self.samples.weight * kept_rows))
-
-    def thinned(self) -> SamplesView:
-        """The view as it is: a look around a minimum needs all samples."""
-        return self
+        return replace(self, data=self.data._replace(weight=self.data.weight * kept_rows))
 
     def off_tolerance(self, values: np.ndarray) -> float:
         """Relative error of the view's plan at `values`, as in `effects.surface_plan`."""
         if not self.plan.tolerance:
             return 0.0
         numbers = {key: np.asarray(x) for key, x in self.form.numbers(values, self.fixed).items()}
-        i, o = (x[: self.rows] for x in self.samples[:2])
+        i, o = (x[: self.rows] for x in self.data[:2])
         view = SurfaceView(self.form.model, numbers, i, o)
         values_of = evaluation(view).signals
         return float(np.max(np.abs(values_of(self.plan) - values_of(exact(view)))))
 
     def unit(self) -> np.ndarray:
         """Weights (rows, channels) over those before any reweighting."""
-        return np.asarray(self.samples.weight)[: self.rows] / self.stated[: self.rows]
+        return np.asarray(self.data.weight)[: self.rows] / self.stated[: self.rows]
 
     def compared(self, at: Local) -> np.ndarray:
         """Residuals (rows, channels) in the unit of the residual; in standard deviations where σ is given."""
-        weight = np.asarray(self.samples.weight)[: self.rows]
+        weight = np.asarray(self.data.weight)[: self.rows]
         scale = np.divide(self.stated[: self.rows], weight, out=np.zeros_like(weight), where=weight > 0)
         return self.residuals(at) * scale
 
     def slope_of_compared(self, at: Local) -> np.ndarray:
         """Weighted ∂ compared number / ∂ BRDF (rows, channels) at the model."""
-        samples, transform = self.samples, RESIDUALS[self.form.residual]
+        samples, transform = self.data, RESIDUALS[self.form.residual]
         rise = slope(transform, jnp.asarray(at.model), samples.i[:, 2:3], samples.floor)
         return (np.asarray(rise) * np.asarray(samples.weight))[: self.rows]
 
@@ -243,8 +221,8 @@ class SamplesView:
 
     def span(self) -> float:
         """The range of the compared data, in the residuals' unit."""
-        stated = self.samples._replace(weight=self.stated)
-        values = np.asarray(self.form.compare(stated, 0.0 * self.samples.values))[: self.rows]
+        stated = self.data._replace(weight=self.stated)
+        values = np.asarray(self.form.compare(stated, 0.0 * self.data.values))[: self.rows]
         return float(np.max(np.ptp(values, axis=0)))
 
 

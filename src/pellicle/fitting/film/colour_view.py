@@ -16,9 +16,8 @@ import numpy as np
 
 from pellicle.colour.spaces import Encoding
 from pellicle.data.colours import Colours
-from pellicle.effects.differences import largest_difference, signals
-from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
+from pellicle.fitting.film.view import FilmView
+from pellicle.fitting.problem import Array, Explained, Noise
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan
@@ -89,7 +88,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class ColoursView:
+class ColoursView(FilmView):
     """Colours of a problem, one at each angle of incidence.
 
     `scene` has anonymous free parameters and the wavelengths of the sensor, one after the other for each
@@ -113,10 +112,6 @@ class ColoursView:
         return ColourForm(self.plan.static_key)
 
     @property
-    def arrays(self) -> tuple[Scene, ColourData]:
-        return self.scene, self.data
-
-    @property
     def rows(self) -> int:
         """Number of colours."""
         return len(self.data.values)
@@ -132,16 +127,6 @@ class ColoursView:
         value, lowest, highest = (np.asarray(x) for x in (self.data.values, *self.data.clipped))
         return max(int(np.sum((value > lowest) & (value < highest))), 1)
 
-    @property
-    def noise_groups(self) -> tuple[NoiseGroup, ...]:
-        """One group of all channels."""
-        return (NoiseGroup((0, 1, 2), True, self.independent),)
-
-    @property
-    def independent_fraction(self) -> float:
-        """Effective points per point."""
-        return float(self.data.independent_fraction)
-
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return local(self.form, self.scene, self.data, values)
@@ -149,14 +134,6 @@ class ColoursView:
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (colours, 3), of the model as the camera clips it."""
         return np.asarray(at.residual)
-
-    def by_local_noise(self, at: Local) -> ColoursView:
-        """The view itself: its points are not neighbours along a spectrum."""
-        return self
-
-    def at_model(self, at: Local) -> float:
-        """1: the noise does not depend on the model."""
-        return 1.0
 
     def response(self, at: Local) -> np.ndarray:
         """The matrix (3, 3) from colours of the sensor to recorded linear channels."""
@@ -204,22 +181,6 @@ class ColoursView:
         """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
         one."""
         return replace(self, data=self.data._replace(weight=self.data.weight * factor)).counting(fraction)
-
-    def counting(self, fraction: float) -> ColoursView:
-        """The view with each point counting for `fraction` of an independent one."""
-        return replace(self, data=self.data._replace(independent_fraction=np.float64(fraction)))
-
-    def thinned(self) -> ColoursView:
-        """The view as it is: the integral needs all wavelengths."""
-        return self
-
-    def off_tolerance(self, values: np.ndarray) -> float:
-        """Error of the view's plan at `values`, in the reflectance or transmittance."""
-        if not self.plan.tolerance:
-            return 0.0
-        at = np.asarray(values)[None]
-        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
-        return largest_difference(planned, whole, self.plan.degrees)
 
     def encoded(self, linear: Any) -> np.ndarray:
         """Linear channels (..., 3) in the space of the data."""

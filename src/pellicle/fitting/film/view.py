@@ -15,7 +15,7 @@ from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
-from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup, UsualView
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
@@ -82,8 +82,24 @@ SCAN_POINTS = 448
 """Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
 
 
+class FilmView(UsualView):
+    """A view of data that a `scene` explains by its plan."""
+
+    @property
+    def arrays(self: Any) -> tuple[Scene, Any]:
+        return self.scene, self.data
+
+    def off_tolerance(self: Any, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        if not self.plan.tolerance:
+            return 0.0
+        at = np.asarray(values)[None]
+        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
+        return largest_difference(planned, whole, self.plan.degrees)
+
+
 @dataclass(frozen=True)
-class SpectrumView:
+class SpectrumView(FilmView):
     """One spectrum of a problem, or many of one scene and grid, whose data have leading axes (...).
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
@@ -105,10 +121,6 @@ class SpectrumView:
     @property
     def form(self) -> SpectrumForm:
         return SpectrumForm(self.plan.static_key, self.signal)
-
-    @property
-    def arrays(self) -> tuple[Scene, Data]:
-        return self.scene, self.data
 
     @property
     def rows(self) -> int:
@@ -137,11 +149,6 @@ class SpectrumView:
             for group in self.signal.groups(self.channels, self.data.frame is not None)
         )
 
-    @property
-    def independent_fraction(self) -> Any:
-        """Effective points per point (...): correlated errors count less."""
-        return self.data.independent_fraction
-
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return local(self.form, self.scene, self.data, values)
@@ -163,10 +170,6 @@ class SpectrumView:
     def nuisance_freedom(self, at: Local) -> float:
         """Number of coefficients: a spectrum determines nearly all of them."""
         return float(len(self.nuisances(at)))
-
-    def at_model(self, at: Any) -> float:
-        """1: the noise of a spectrum does not depend on the model."""
-        return 1.0
 
     def by_local_noise(self, at: Local) -> SpectrumView:
         """The view with weights by the noise of neighbouring points, where σ is not given and differs."""
@@ -202,10 +205,6 @@ class SpectrumView:
         most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
         data = self.data._replace(weight=self.data.weight * whole)
         return replace(self, data=data).counting(np.minimum(fraction, most))
-
-    def counting(self, fraction: Any) -> SpectrumView:
-        """The view with each point counting for `fraction` (...) of an independent one."""
-        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
 
     def thinned(self) -> SpectrumView:
         """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
@@ -244,14 +243,6 @@ class SpectrumView:
             return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
 
         return jax.tree_util.tree_map(pick, (self.scene, self.data))
-
-    def off_tolerance(self, values: np.ndarray) -> float:
-        """Error of the view's plan at `values`, in the unit of its signal."""
-        if not self.plan.tolerance:
-            return 0.0
-        at = np.asarray(values)[None]
-        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
-        return largest_difference(planned, whole, self.signal.degrees)
 
     @property
     def rounding(self) -> Any:
