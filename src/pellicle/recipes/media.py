@@ -1,7 +1,5 @@
 """Media and numbers of recipes and of the command line: words and tables to dispersions, fixed or free."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Sequence

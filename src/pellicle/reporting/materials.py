@@ -1,7 +1,5 @@
 """The catalogue of materials as text, and figures of n and k."""
 
-from __future__ import annotations
-
 import os
 import textwrap
 from pathlib import Path

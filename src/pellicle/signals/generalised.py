@@ -16,8 +16,6 @@ ratio, and behind these the direction outwards of each, in which nothing is meas
 Source: M. Schubert, Phys. Rev. B 53, 4265 (1996), for the ratios and the order of the indices.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, final

@@ -131,5 +131,5 @@ def uneven(view: SpectrumView | ColoursView, fit: ViewFit) -> str:
 
 def _residuals(view: SpectrumView, fit: ViewFit) -> np.ndarray:
     """Residuals (rows, measured channels) of a spectrum at the best fit, in the unit of the data."""
-    residuals = (view.data.values - np.asarray(fit.at.model))[: view.points]
+    residuals = (np.asarray(view.data.values) - np.asarray(fit.at.model))[: view.points]
     return residuals.reshape(view.rows, view.channels)[:, : view.measured_channels]
