@@ -155,6 +155,30 @@ def test_division_by_a_white_in_linear_light(photo):
     assert_read(film, sigma=[[0.01] * 3], gamma=2.2)
 
 
+def test_a_flat_field_takes_uneven_light_away(tmp_path, refuses):
+    """A surface of one colour that is lit from the left, beside its own clipped corner."""
+    light = np.linspace(1.0, 0.3, 30)[None, :, None] * np.array([1.0, 0.9, 0.7])
+    surface = np.array([0.3, 0.5, 0.2])
+    paths = [tmp_path / name for name in ("film.tif", "white.tif", "small.tif", "clipped.tif")]
+    white = 0.8 * light * np.ones((20, 1, 1))
+    views = surface * white, white, white[:10], np.minimum(2 * white, 1.0)
+    for path, view in zip(paths, views, strict=True):
+        shown = np.round(65535 * coded(view)).astype(np.uint16)
+        if path == paths[0]:
+            shown[:2, :2] = 65535
+        tifffile.imwrite(path, shown, photometric="rgb")
+    for region in ("2,5,4,4", "24,5,4,4"):
+        film = read_colours(paths[0], region=region, flat_field=paths[1])
+        np.testing.assert_allclose(film.values[0], coded(surface), atol=1e-4)
+        assert abs(read_colours(paths[0], region=region).values[0] - coded(surface)).max() > 0.02
+    assert f"divided by the flat field {paths[1]}" in film.notes
+    assert "clipped (bright), taken as a limit" in " ".join(
+        read_colours(paths[0], region="0,0,3,3", flat_field=paths[1]).notes
+    )
+    for flat, reason in ((paths[2], "30 by 10 pixels"), (paths[3], "the flat field is clipped in")):
+        refuses(UsageError, reason, read_colours, paths[0], region="2,5,4,4", flat_field=flat)
+
+
 def test_regions_are_films_or_angles_of_one(photo, refused):
     path = photo()
     one, two = read_colours_by_film(path, points="10,10;20,15")

@@ -51,7 +51,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     - `strip`: "x0,y0,x1,y1", the ends of a line, 5 pixels wide; or `region`: "x,y,width,height", the whole
       photograph by default. Pixels count from the upper left corner.
     - `space`: "srgb" (the default), or "rgb" with its `gamma`. `observer`, `illuminant`, `lamp`,
-      `sensitivities`, `white`: as in `pellicle.read_colours_by_film`.
+      `sensitivities`, `white`, `flat_field`: as in `pellicle.read_colours_by_film`.
     - `layer`: name of the layer whose thickness is sought, the free one by default. `noise`: standard
       deviation of a coded channel, by default 1.5/255 of sRGB and 0.01 of "rgb".
 

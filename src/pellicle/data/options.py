@@ -214,6 +214,10 @@ class CameraOptions(Options):
         "fixed, or free for an unknown factor of each channel.", words=("fixed", "free")
     )
     white: str | list[int] | None = _FOR_COLOURS("X,Y,WIDTH,HEIGHT of a white in the photograph, in pixels.")
+    flat_field: str | None = _FOR_COLOURS(
+        "Photograph of an evenly white surface in the same light, by which each pixel is divided.",
+        is_file=True,
+    )
     transmitted: bool | None = _FOR_COLOURS("The light has passed the film.")
 
 

@@ -5,6 +5,7 @@ Regions of a photograph are averaged in linear light and divided by a white.
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ def read_colours_by_film(
     gamma: float = 1.0,
     white_balance: str = "fixed",
     white: Pixels | None = None,
+    flat_field: str | os.PathLike[str] | None = None,
     region: Pixels | None = None,
     points: Pixels | None = None,
     angle: float | Sequence[float] | None = None,
@@ -81,6 +83,7 @@ def read_colours_by_film(
     - `gamma` of "rgb": values are linear ones to the power 1/`gamma`.
     - `white_balance`: "fixed", or "free" where each channel has an unknown factor.
     - `white`: region of a photograph that shows a perfect reflector, by which colours are divided.
+    - `flat_field`: photograph of an evenly white surface in the same light, by which each pixel is divided.
     - `region`: rectangles "x,y,width,height;..." of a photograph in pixels from its upper left corner;
       `points`: "x,y;...", each with the pixels around it, 5 by 5.
     - `angle` of incidence in degrees, for all colours; or one for each, and for each region of a photograph,
@@ -106,12 +109,13 @@ def read_colours_by_film(
         if columns is not None or signal_unit is not None:
             raise UsageError(f"{path}: is a photograph: leave `columns` and `signal_unit` out")
         films, seen = _photograph_colours(
-            photographs.read_photograph(path), space, camera, region, points, white, angle
+            photographs.read_photograph(path), space, camera, region, points, white, flat_field, angle
         )
         angle = None
     else:
-        if not region is points is white is None:
-            raise UsageError(f"{path}: is no photograph: leave `region`, `points` and `white` out")
+        if not region is points is white is flat_field is None:
+            only = "`region`, `points`, `white` and `flat_field`"
+            raise UsageError(f"{path}: is no photograph: leave {only} out")
         films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
         seen = sight(camera, films[0].space)
     return [_assembled(film, seen, camera, angle, noise, polarisation) for film in films]
@@ -167,6 +171,7 @@ def _photograph_colours(
     region: Pixels | None,
     points: Pixels | None,
     white: Pixels | None,
+    flat_field: str | os.PathLike[str] | None,
     angle: float | Sequence[float] | None,
 ) -> tuple[list[ColourRows], Sight]:
     """Return the colours of the regions of a photograph, of a film each, or of one film at several angles."""
@@ -181,13 +186,14 @@ def _photograph_colours(
         raise UsageError(f"{photograph.path}: is a photograph of {width} by {height} pixels: give {either}")
     squares = None if points is None else photographs.parse_points(points, photograph)
     regions = squares or photographs.parse_regions(region or "")
-    reference, notes = white_reference(photograph, seen.coding, white)
+    photograph, *notes = flattened(photograph, seen.coding, flat_field)
+    reference, *shown = white_reference(photograph, seen.coding, white)
     angles = None if angle is None else np.asarray(angle, float)
     if angles is not None and angles.ndim and len(angles) != len(regions):
         raise UsageError(
             f"{len(angles)} angles are given for {len(regions)} regions of the photograph: give one for each"
         )
-    told = [*photograph.notes, *notes]
+    told = [*photograph.notes, *notes, *shown]
     if assumed and photograph.floats:
         told.append('floating-point values taken as coded in sRGB: give `space="rgb"` if they are linear')
     told += [f"colour profile {photograph.profile} ignored"] if photograph.profile else []
@@ -196,7 +202,7 @@ def _photograph_colours(
         value, sigma, sentences = _region_colour(region, photograph, seen.coding, reference)
         of_region = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
         rows = ColourRows(space, value, sigma, of_region, None, (*told, *sentences), str(region))
-        rows = rows._replace(balance=_UNBALANCED if white is None else None)
+        rows = rows._replace(balance=_UNBALANCED if white is flat_field is None else None)
         films.append(rows._replace(path=photograph.path, sha256=photograph.sha256))
     if angles is None or not angles.ndim:
         return films, seen
@@ -226,29 +232,54 @@ def check_photograph(photograph: photographs.Photograph, space: str | None) -> s
     return space or "srgb"
 
 
+def flattened(
+    photograph: photographs.Photograph, coding: Encoding, flat_field: str | os.PathLike[str] | None
+) -> tuple[Any, ...]:
+    """The photograph divided by one of an evenly white surface in linear light, and a note; itself without.
+
+    Pixels that are clipped stay so. Raises UsageError for a flat field of another size or that is clipped.
+    """
+    if flat_field is None:
+        return (photograph,)
+    flat = photographs.read_photograph(flat_field)
+    if flat.size != photograph.size:
+        sizes = f"{flat.size[0]} by {flat.size[1]} pixels and {photograph.path} {photograph.size[0]} by"
+        raise UsageError(f"{flat.path}: has {sizes} {photograph.size[1]}: take both with one camera")
+    _check_white(flat.pixels.reshape(-1, 3), f"{flat.path}: the flat field", "photograph it again")
+    linear = coding.decoded(photograph.pixels) / coding.decoded(np.maximum(flat.pixels, flat.step))
+    clipped = (photograph.pixels <= 0) | (photograph.pixels >= 1)
+    pixels = np.where(clipped, photograph.pixels, coding.encode(linear, coding.roots(linear)))
+    return replace(photograph, pixels=pixels.astype(np.float32)), f"divided by the flat field {flat.path}"
+
+
 def white_reference(
     photograph: photographs.Photograph, coding: Encoding, white: Pixels | None
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Linear channels (3,) of the region `white`, 1 without one. Raises UsageError where it is clipped."""
+) -> tuple[Any, ...]:
+    """Linear channels (3,) of the region `white` and a note, 1 without one. Raises UsageError if clipped."""
     if white is None:
-        return np.ones(3), ()
+        return (np.ones(3),)
     one, *others = photographs.parse_regions(white, "white")
     if others:
         raise UsageError("`white` must be one region")
     pixels = one.pixels(photograph, "white")
-    for limited, what, remedy in (
-        (pixels <= 0, "black", "choose the region of a white standard"),
-        (pixels >= 1, "clipped", "expose less, or choose another region"),
+    _check_white(pixels, f"{photograph.path}: `white` {one}", "choose another region")
+    linear = coding.decoded(pixels).mean(axis=0)
+    shown = ", ".join(f"{x:.3g}" for x in linear)
+    return linear, f"divided by the white of region {one}, linear {shown}"
+
+
+def _check_white(pixels: np.ndarray, where: str, remedy: str) -> None:
+    """Raise UsageError where more than 1 % of the coded pixels (N, 3) of a white are black or clipped."""
+    for limited, what, why in (
+        (pixels <= 0, "black", "it is no white"),
+        (pixels >= 1, "clipped", "expose less"),
     ):
         share = np.mean(limited, axis=0)
         if np.any(share > 0.01):
+            percent, channel = 100 * share.max(), "RGB"[int(np.argmax(share))]
             raise UsageError(
-                f"{photograph.path}: `white` {one} is {what} in {100 * share.max():.0f} % of its pixels in"
-                f" {'RGB'[int(np.argmax(share))]}: {remedy}"
+                f"{where} is {what} in {percent:.0f} % of its pixels in {channel}: {why}, or {remedy}"
             )
-    linear = coding.decoded(pixels).mean(axis=0)
-    shown = ", ".join(f"{x:.3g}" for x in linear)
-    return linear, (f"divided by the white of region {one}, linear {shown}",)
 
 
 def _region_colour(

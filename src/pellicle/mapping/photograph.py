@@ -12,7 +12,7 @@ from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
 from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph
 from pellicle.data.photographs import strip as strip_of
-from pellicle.data.read_colours import check_photograph, white_reference
+from pellicle.data.read_colours import check_photograph, flattened, white_reference
 from pellicle.errors import UsageError
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
@@ -66,6 +66,7 @@ def map_photograph(
     sensitivities: str | os.PathLike[str] | None = None,
     gamma: float = 1.0,
     white: Any = None,
+    flat_field: str | os.PathLike[str] | None = None,
     layer: str | None = None,
     noise: float | None = None,
 ) -> ThicknessMap:
@@ -80,13 +81,14 @@ def map_photograph(
     paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
     transmitted = scene.light.signal == "T"
     seen = sight(Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted), space)
-    reference, notes = white_reference(photograph, seen.coding, white)
+    photograph, *notes = flattened(photograph, seen.coding, flat_field)
+    reference, *shown = white_reference(photograph, seen.coding, white)
     linear, position, where, note = _chosen(photograph, seen, strip, region)
     exposed = linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise
-    told = [*photograph.notes, *seen.notes, *notes, note, f"noise {sigma:.2g} of each channel"]
+    told = [*photograph.notes, *seen.notes, *notes, *shown, note, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
         told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
     spread = np.full(3, sigma)
