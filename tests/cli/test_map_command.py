@@ -77,6 +77,25 @@ def test_a_map_in_python_with_a_white_and_a_free_exposure(colours, tmp_path):
 
 
 @pytest.mark.slow  # another map; tests/data has the gamma
+def test_neighbours_choose_the_order_along_a_strip(pellicle, write, colours, tmp_path):
+    """With the exposure free some colours are those of thicker films too."""
+    random = np.random.default_rng(2)
+    path = photo(tmp_path / "wedge.png", np.clip(colours + random.normal(0, 0.004, colours.shape), 0, 1))
+    text = film_recipe(
+        'signal = "srgb"', "material = 1.46\nthickness = { lower = 20, upper = 800 }", substrate="3.9"
+    )
+    film = write(text + '\n[instrument]\nscale = "free"\n', "film.toml")
+    found = []
+    for more, code in (([], 4), (["--neighbours"], 0)):
+        words = ("map", path, "--recipe", film, "--strip", "0,6,59,6", "--json", *more)
+        [record] = pellicle(*words, code=code).objects
+        found.append(np.abs(np.array(record["positions"]["thickness"]) - THICKNESS) > 20)
+        states = record["positions"]["status"]
+    assert np.sum(found[0]) > 1
+    assert not np.any(found[1])
+    assert {"converged", "by-neighbours"} >= set(states)
+
+
 def test_channels_with_a_gamma(pellicle, recipe, colours, tmp_path):
     path = photo(tmp_path / "raw.png", np.maximum(colours, 0), gamma=2.0)
     file = recipe("rgb", "[camera]\ngamma = 2.0")

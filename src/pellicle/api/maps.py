@@ -37,8 +37,8 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
       `if __name__ == "__main__":`. None: as many as there are cores, if that saves time. `scheduler`: address
       of a dask scheduler, "tcp://host:8786", whose workers reach the files by the same paths.
     - `preview`: fit only so many pixels, evenly spread, that it takes seconds; `out` must be another one.
-    - `neighbours`: decide ambiguous pixels by the order of interference of their neighbours. The result is
-      stored beside `out`, with "-neighbours" in its name.
+    - `neighbours`: decide ambiguous pixels by the order of interference of their neighbours, of a photograph
+      too. That of a cube is stored beside `out`, with "-neighbours" in its name.
     - `lamp_curve`: a gain against wavelength that all pixels have in common, by which the cube is divided:
       "joint", fitted together with the films of some pixels; "x,y,width,height", from a region whose scene is
       `lamp_reference`, by default the bare substrate; or a `LampCurve`.

@@ -155,7 +155,7 @@ def _write(folder: Path, made: Map) -> None:
 PHOTOGRAPHS = Group("Photographs", sort_key=5)
 MOST_CONVERGED = 0.5
 """Share of the positions that must have one thickness for the exit code 0."""
-_OF_BOTH = ("--signal", "--noise")
+_OF_BOTH = ("--signal", "--noise", "--neighbours")
 
 
 def map(
@@ -196,10 +196,10 @@ def map(
     run, cube, camera = run or RunFlags(), cube or CubeFlags(), camera or CameraFlags()
     photograph = {"strip": strip, "region": region, "layer": layer}
     of_photograph = [*named(n for n, value in photograph.items() if value is not None), *camera.given()]
-    of_cube = [*run.given(), *(name for name in cube.given() if name not in _OF_BOTH)]
+    of_cube = [name for name in (*run.given(), *cube.given()) if name not in _OF_BOTH]
     if is_photograph(Path(data)):
         _refuse(data, "photograph", "cubes", of_cube)
-        seen = photograph | {"signal": cube.signal, "noise": cube.noise}
+        seen = photograph | {"signal": cube.signal, "noise": cube.noise, "neighbours": bool(run.neighbours)}
         return _map_photograph(data, described, camera, seen, out, json)
     if Path(data).exists():
         _refuse(data, "cube", "photographs", of_photograph)

@@ -14,6 +14,7 @@ from pellicle.data.photographs import Photograph, Region, parse_regions, read_ph
 from pellicle.data.photographs import strip as strip_of
 from pellicle.data.read_colours import check_photograph, flattened, white_reference
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -21,8 +22,8 @@ from pellicle.simulation.colours import colour_table, varied_layer
 
 EXPOSURE = (0.01, 100.0)
 """Range of a free scale, which a soap film of 1 % and an overexposed mirror need."""
-ORDERS = 4
-"""Thicknesses of each pixel that are kept."""
+ORDERS = 4, 8
+"""Thicknesses of each pixel that are kept, and those among which neighbours choose."""
 
 
 class ThicknessMap(NamedTuple):
@@ -49,8 +50,8 @@ class ThicknessMap(NamedTuple):
 
     @property
     def converged(self) -> float:
-        """Share of the positions with one thickness."""
-        return float(np.mean(self.found.status == "converged"))
+        """Share of the positions with one thickness, by their own colour or by their neighbours."""
+        return float(np.mean(np.isin(self.found.status, ["converged", BY_NEIGHBOURS])))
 
 
 def map_photograph(
@@ -69,6 +70,7 @@ def map_photograph(
     flat_field: str | os.PathLike[str] | None = None,
     layer: str | None = None,
     noise: float | None = None,
+    neighbours: bool = False,
 ) -> ThicknessMap:
     """Compute the thickness at each pixel of a photograph; arguments as of `pellicle.map`."""
     if strip is not None and region is not None:
@@ -96,7 +98,10 @@ def map_photograph(
         middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
         spread = sigma * gamma * middle ** (1 - 1 / gamma)
     inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread)
-    films = inverse(coded if space == "srgb" else exposed, ORDERS)
+    films = inverse(coded if space == "srgb" else exposed, ORDERS[neighbours])
+    if neighbours:
+        films, decided = _by_neighbours(films)
+        told.append(decided)
     about = where, space, tuple(told), photograph.path, photograph.sha256
     # coded colours of the most probable thicknesses, at their exposures
     best, exposure = films.thickness[..., 0], films.exposure[..., 0]
@@ -125,6 +130,36 @@ def _chosen(
         raise UsageError("`region` of a map must be one rectangle")
     pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
     return seen.coding.decoded(pixels), None, str(box), f"region {box}: {box.width * box.height} pixels"
+
+
+def _by_neighbours(films: ColourThickness) -> tuple[ColourThickness, str]:
+    """Thicknesses with the order that neighbouring positions decide first, where the colours do not, and
+    words on that."""
+    from xarray import Dataset  # slow to import
+
+    from pellicle.mapping.continuity import decided_by_neighbours, evidence
+
+    place = ("y", "x")[-films.status.ndim :]
+    above = -2 * np.log(films.probability / films.probability[..., :1])
+    codes = np.vectorize(CODES.get)(films.status)
+    dataset = Dataset(
+        {
+            "status": (place, codes),
+            "thickness": (place, films.thickness[..., 0]),
+            "thickness_stderr_noise": (place, films.stderr[..., 0]),
+            "rival_delta_chi2": (place, above[..., 1]),
+            "order_thickness": ((*place, "order"), films.thickness),
+            "order_delta_chi2": ((*place, "order"), above),
+        }
+    )
+    made = decided_by_neighbours(dataset)
+    first = np.asarray(made["thickness"])[..., None]
+    # the chosen order, then the others as they were
+    order = np.argsort(films.thickness != first, axis=-1, kind="stable")
+    *columns, status = films
+    columns = [np.take_along_axis(column, order, axis=-1) for column in columns]
+    status = np.where(np.asarray(made["status"]) == CODES[BY_NEIGHBOURS], BY_NEIGHBOURS, status)
+    return ColourThickness(*columns, status), str(evidence(made))
 
 
 def _inverse(
