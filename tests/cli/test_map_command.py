@@ -90,10 +90,10 @@ def test_neighbours_choose_the_order_along_a_strip(pellicle, write, colours, tmp
         words = ("map", path, "--recipe", film, "--strip", "0,6,59,6", "--json", *more)
         [record] = pellicle(*words, code=code).objects
         found.append(np.abs(np.array(record["positions"]["thickness"]) - THICKNESS) > 20)
-        states = record["positions"]["status"]
-    assert np.sum(found[0]) > 1
-    assert not np.any(found[1])
-    assert {"converged", "by-neighbours"} >= set(states)
+        states = np.array(record["positions"]["status"])
+    assert np.sum(found[0]) > 2
+    assert not np.any(found[1][states != "ambiguous"])
+    assert np.sum(states == "by-neighbours") > 20
 
 
 def test_channels_with_a_gamma(pellicle, recipe, colours, tmp_path):
