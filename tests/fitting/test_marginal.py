@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 import pellicle as pl
 from pellicle.fitting.film.fit import fitted
-from pellicle.fitting.marginal import marginal
+from pellicle.fitting.marginal import left_weights, marginal
 from pellicle.fitting.problem import quiet
 
 NM = np.linspace(450, 800, 90)
@@ -36,7 +36,8 @@ def test_deviance_is_that_of_a_normal_distribution_with_the_effects_in_its_covar
     with jax.enable_x64(True):
         best, [view] = fit.ranking, fit.ranking.evidence()
         allowed = best.discrepancy
-        found = marginal([view], best.jacobian, best.ranked.minima.units[0], allowed)
+        about = left_weights([view], allowed), allowed.total
+        found = marginal([view], best.jacobian, best.ranked.minima.units[0], *about)
         spread = 1 / (view.weights * allowed.raised[0]).ravel()
         slope = view.jacobian.reshape(len(NM), -1)
         columns = np.stack([e.change.ravel() for e in view.effects], axis=1)

@@ -93,9 +93,10 @@ CASES = {
         {"not-identifiable"},
     ),
     "thickness and index": (
-        lambda: cube_of(films((30, 1.5), (200, 1.4), (600, 1.9), (1200, 1.6), seed=4)),
+        # of the last, (110 nm, 2.16) is worse by 103 in χ², and by 4 with the systematic effects
+        lambda: cube_of(films((30, 1.5), (200, 1.4), (600, 1.9), (1200, 1.6), (140, 1.7), seed=4)),
         index(),
-        {"converged"},
+        {"converged", "ambiguous"},
     ),
     "prior and noise of the residuals": (
         lambda: cube_of(films((350, 1.62), (420, 1.62)), None),
@@ -143,8 +144,7 @@ def test_pixels_are_those_of_fit(name):
             away = np.abs(thickness - rival.parameters["thickness"])
             order = np.nanargmin(away)
             if away[order] < 0.01 and rival.delta_chi2 < 20:
-                # a fit integrates the systematic effects out, of pixels the noise alone ranks minima
-                assert found.delta_chi2[i, order] == pytest.approx(rival.delta_chi2, rel=0.3), i
+                assert found.delta_chi2[i, order] == pytest.approx(rival.delta_chi2, rel=0.02), i
 
 
 TRUTH = np.linspace(30, 880, 60)

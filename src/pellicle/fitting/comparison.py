@@ -12,7 +12,7 @@ Am. Stat. Assoc. 90, 928).
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from logging import getLogger
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE
 from pellicle.fitting.discrepancy import Evidence
-from pellicle.fitting.marginal import Ranking, by_remaining, marginal
+from pellicle.fitting.marginal import Ranking, by_remaining, left_weights, marginal
 from pellicle.fitting.noise import student
 from pellicle.fitting.presentation import ReportMixin
 from pellicle.fitting.result import Estimate, Fit, Part, Status
@@ -187,8 +187,7 @@ class _Explained(NamedTuple):
     @property
     def weights(self) -> list[np.ndarray]:
         """1/σ of the points of each view (rows, channels), where σ is what the effects leave."""
-        pairs = zip(self.evidence, self.best.discrepancy.raised, strict=True)
-        return [raised * view.weights * view.unit for view, raised in pairs]
+        return left_weights(self.evidence, self.best.discrepancy)
 
     @property
     def information(self) -> tuple[int, float]:
@@ -208,15 +207,14 @@ class _Explained(NamedTuple):
 
         A depolarisation that the scene has not is a residual as a whole.
         """
-        raised, missed = [], 0.0
+        missed, best = 0.0, self.best
         for view, own, part in zip(self.evidence, weights, parts, strict=True):
             known = view.residual.shape[-1]
-            raised.append(own[:, :known] / (view.weights * view.unit))
             if known < own.shape[1] and (share := part.spectrum.kind.share):
                 missed += float(np.sum((own[:, known:] * share.measured(part.spectrum)[:, None]) ** 2))
-        allowed = replace(self.best.discrepancy, raised=tuple(raised))
-        unit = self.best.ranked.minima.units[0]
-        return missed + float(marginal(self.evidence, self.best.jacobian, unit, allowed).deviance)
+        known = [own[:, : view.residual.shape[-1]] for view, own in zip(self.evidence, weights, strict=True)]
+        about = self.evidence, best.jacobian, best.ranked.minima.units[0], known, best.discrepancy.total
+        return missed + float(marginal(*about).deviance)
 
 
 def _explained(every: Sequence[Ranking]) -> list[_Explained]:

@@ -112,6 +112,7 @@ class Evidence(NamedTuple):
             noise=self.noise[which],
             weights=self.weights[which],
             effects=[replace(effect, change=effect.change[which]) for effect in self.effects],
+            unit=self.unit[which],
             exact_noise=None if exact is None else lambda some: exact(which[some]),
         )
 
@@ -157,10 +158,9 @@ class Discrepancy:
 
     `errors` are those of parameters and nuisances about the values that the effects would give, which are
     `shift` (..., parameters and nuisances) away from those of the fit. `implausible` (...) is true where the
-    effects would have to be larger together than they are. `evidence_shares` are the shares of a difference
-    in χ² of each view, as the fit counts points, that are left when residuals count as what they are;
-    `evidence_share` is their mean. `raised` (..., rows, channels) of each view multiplies the weights of the
-    fit, so that they become those of what remains.
+    effects would have to be larger together than they are. `explained` (...) is the factor by which they may
+    lower a deviance. `raised` (..., rows, channels) of each view multiplies the weights of the fit, so that
+    they become those of what remains.
     """
 
     errors: Errors
@@ -168,9 +168,8 @@ class Discrepancy:
     remaining: tuple[Remaining, ...]
     contributions: tuple[Contribution, ...]
     implausible: Any
-    evidence_shares: tuple[Any, ...]
-    evidence_share: Any
-    raised: tuple[np.ndarray, ...] = ()
+    explained: Any
+    raised: tuple[np.ndarray, ...]
 
     @property
     def total(self) -> np.ndarray:
@@ -181,6 +180,18 @@ class Discrepancy:
     def variance(self) -> np.ndarray:
         """Mean square error of the fit's own parameters and nuisances."""
         return self.errors.variance + self.shift**2
+
+    @property
+    def evidence_shares(self) -> list[Any]:
+        """Shares (...) of a difference in χ² of each view, as the fit counts points, that are left when
+        residuals count as what they are."""
+        return [np.minimum(1.0, median(raised, (-2, -1)) ** 2) for raised in self.raised]
+
+    @property
+    def evidence_share(self) -> Any:
+        """Mean (...) of these shares over the data values."""
+        weights = [math.prod(raised.shape[-2:]) for raised in self.raised]
+        return np.average(self.evidence_shares, axis=0, weights=weights)
 
 
 def discrepancy(
@@ -200,21 +211,20 @@ def discrepancy(
     count = np.sum(np.asarray(grams) > 0, axis=1)
     stretch = scaled.stretch
     covariance = stretch @ led(balance.covariance[:, :known, :known]) @ np.swapaxes(stretch, -1, -2)
-    weights = [view.data.shape[1] for view in balance.views]
-    by_noise = system.by_noise(noises) if contributions else system
+    drifting = any(view.least != 1.0 for view in system.views)
+    by_noise = system.by_noise(noises) if contributions or drifting else system
     plain = balance if by_noise is system else _Balance(by_noise)
     # the σ of a drifting lamp is no noise
     pairs = zip(views, zip(by_noise.views, plain.views, strict=True), strict=True)
-    counted = [own if own[0].least == 1.0 else drifting for own, drifting in pairs]
-    shares = [_evidence_share(*view) for view in counted]
+    counted = [own if own[0].least == 1.0 else short for own, short in pairs]
+    effects = system.normal([view for _, view in counted]).matrix[:, known:, known:]
     return Discrepancy(
         errors=Errors(scaled.names, covariance),
         shift=times(stretch, led(balance.solution[:, :known])),
         remaining=tuple(Remaining(*(led(x) for x in left)) for left in remaining),
         contributions=tuple(_contributions(system, balance, plain)) if contributions else (),
         implausible=led((count > 0) & (np.sum(sizes**2, axis=1) > improbable(count))),
-        evidence_shares=tuple(led(share) for share in shares),
-        evidence_share=led(np.average(shares, axis=0, weights=weights)),
+        explained=led(np.maximum(np.linalg.norm(effects, axis=(1, 2)), 1.0)),
         raised=tuple(led(_raised(*view)) for view in counted),
     )
 
@@ -265,9 +275,10 @@ def improbable(count: Any) -> Any:
 
 class System:
     """Linearised fits with their effects: columns of parameters, nuisances and effects, rows of all views, in
-    units of the noise, and of the priors. All arrays have one leading axis, of `fits`."""
+    units of the noise, and of the priors. All arrays have one leading axis, of `fits`. With `hold` no prior
+    pulls nuisances from where the fit has them."""
 
-    def __init__(self, evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray):
+    def __init__(self, evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray, *, hold: bool = True):
         self.lead, self.known, self.stretch = np.shape(unit)[:-1], len(scaled.names), scaled.stretch
         self.fits = math.prod(self.lead)
         self.views = [self._flat(view) for view in evidence]
@@ -285,7 +296,8 @@ class System:
         self.priors = scaled.jacobian[..., -self.known :, :].reshape(self.fits, self.known, self.known)
         # a drift stays where the fit has it: its prior would pull it as soon as residuals count less
         pull = np.array(np.broadcast_to(scaled.pull, (*self.lead, self.known))).reshape(self.fits, -1)
-        pull[:, count:] = 0.0
+        if hold:
+            pull[:, count:] = 0.0
         self.pull, transposed = pull, np.swapaxes(self.priors, 1, 2)
         self.precision, self.pulled = np.zeros((self.fits, size, size)), np.zeros((self.fits, size))
         self.precision[:, : self.known, : self.known] = transposed @ self.priors
@@ -341,8 +353,26 @@ class System:
             np.multiply(effect.change.reshape(inverse.shape), inverse, out=rows[:, column])
         return rows
 
+    def balances(self) -> list[ViewBalance]:
+        """Rows and data of each view, with its own σ."""
+        return [ViewBalance(view, self.rows(i)) for i, view in enumerate(self.views)]
 
-class _ViewBalance:
+    def normal(self, views: Sequence[ViewBalance], todo: np.ndarray | slice = slice(None)) -> Normal:
+        """Normal equations of some of the fits."""
+        matrix, right = self.precision[todo].copy(), self.pulled[todo].copy()
+        for view in views:
+            matrix += view.gram[todo] / view.variance[todo][:, None, None]
+            right += view.against[todo] / view.variance[todo][:, None]
+
+        def rows(position: int) -> tuple[np.ndarray, np.ndarray]:
+            fit = int(np.arange(self.fits)[todo][position])
+            pairs = [*(view.weighted(fit) for view in views), self.prior_rows(fit)]
+            return np.vstack([row for row, _ in pairs]), np.concatenate([data for _, data in pairs])
+
+        return Normal(matrix, right, rows)
+
+
+class ViewBalance:
     """Rows and data of one view, factors on its σ² (fits,), square roots of the weights of its points, sums
     of squares with these weights, and the residuals `rest` (fits, rows, channels) in units of the noise."""
 
@@ -392,7 +422,7 @@ class _Balance:
 
     def __init__(self, system: System):
         self.system = system
-        self.views = [_ViewBalance(view, system.rows(i)) for i, view in enumerate(system.views)]
+        self.views = system.balances()
         every = slice(None)
         self.solution, self.covariance = self._solved(every)
         for view in self.views:
@@ -407,24 +437,9 @@ class _Balance:
             for view in self.views:
                 view.leave(self.solution, todo)
 
-    def normal(self, todo: np.ndarray | slice = slice(None)) -> Normal:
-        """Normal equations of some of the fits."""
-        system = self.system
-        matrix, right = system.precision[todo].copy(), system.pulled[todo].copy()
-        for view in self.views:
-            matrix += view.gram[todo] / view.variance[todo][:, None, None]
-            right += view.against[todo] / view.variance[todo][:, None]
-
-        def rows(position: int) -> tuple[np.ndarray, np.ndarray]:
-            fit = int(np.arange(system.fits)[todo][position])
-            pairs = [*(view.weighted(fit) for view in self.views), system.prior_rows(fit)]
-            return np.vstack([row for row, _ in pairs]), np.concatenate([data for _, data in pairs])
-
-        return Normal(matrix, right, rows)
-
     def _solved(self, todo: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
         """Least-squares coefficients, those of positive effects not below zero, and their covariance."""
-        free, covariance = self.normal(todo).solved()
+        free, covariance = self.system.normal(self.views, todo).solved()
         return held_within(free, covariance, self.system.lower[todo], self.system.upper[todo]), covariance
 
     def one_by_one(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -433,7 +448,7 @@ class _Balance:
         Returns the share of the residuals that it explains and its coefficient, (fits, effects), and the
         shift of the parameters by it, (fits, effects, known), in the steps of their columns.
         """
-        system, normal = self.system, self.normal()
+        system, normal = self.system, self.system.normal(self.views)
         known, (fits, size) = system.known, system.lower.shape
         effects = size - known
         powers = [np.sum((v.data * v.roots) ** 2, axis=1) / v.variance for v in self.views]
@@ -470,7 +485,7 @@ class _Balance:
         return explains, moved[..., -1], moved[..., :-1] - best[:, None]
 
 
-def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.ndarray]:
+def _remaining(view: Evidence, balance: ViewBalance) -> tuple[Remaining, np.ndarray]:
     """Remaining residuals of a view, with numbers (fits,), and the noise (fits,) of its points."""
     noise, left = np.array(view.noise, float), balance.rest * view.sigma
     # a signal of its own, such as one ratio, is not diluted by others that the scene has right
@@ -487,13 +502,7 @@ def _remaining(view: Evidence, balance: _ViewBalance) -> tuple[Remaining, np.nda
     return Remaining(typical / noise, typical, rms, weighted, balance.variance), noise
 
 
-def _evidence_share(view: Evidence, balance: _ViewBalance) -> np.ndarray:
-    """Variance (fits,) of a point in the ranking over that which stands for it now; at most 1."""
-    counted, now = median(1 / view.weights, (1, 2)), median(view.sigma, (1, 2))
-    return np.minimum(1.0, counted**2 / (balance.variance * now**2))
-
-
-def _raised(view: Evidence, balance: _ViewBalance) -> np.ndarray:
+def _raised(view: Evidence, balance: ViewBalance) -> np.ndarray:
     """Weights (fits, rows, channels) by what remains, over those of the fit."""
     roots = balance.roots.reshape(view.residual.shape) / np.sqrt(balance.variance)[:, None, None]
     return roots / (view.sigma * view.weights)
@@ -503,7 +512,7 @@ def _contributions(system: System, balance: _Balance, by_noise: _Balance) -> Ite
     """Each effect of a system, of which `by_noise` is the balance by the noise of neighbouring points."""
     if not system.effects:
         return
-    known, normal, stretch = system.known, balance.normal(), system.stretch
+    known, normal, stretch = system.known, system.normal(balance.views), system.stretch
     _, covariance = normal.of(np.arange(known)).solved()
     changes = -covariance @ normal.matrix[:, :known, known:]
     together = balance.covariance[:, :known, known:]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.covariance import Errors, Normal, Scaled, held_within, times
+from pellicle.fitting.covariance import Errors, Scaled, held_within, times
 from pellicle.fitting.discrepancy import Discrepancy, Evidence, System, discrepancy
 from pellicle.fitting.noise import student
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
@@ -26,63 +26,52 @@ _UNIFORM = 12.0
 """Inverse variance of a parameter of which the data see nothing, in units of its range."""
 _LINEAR = 4.0
 """Factor by which effects may explain more at a rival than at the best minimum."""
-_CLEAR = 20.0
+CLEAR = 20.0
 """Δχ² by which another minimum than the best by noise must be better to take its place."""
 _MUCH = 4.0
 """Least factor on χ² that chance does not make."""
-_ROUNDS = 3
 
 
 class Marginal(NamedTuple):
     """−2 ln of the marginal likelihood of minima (...), each at its best parameters, and ln of their shares
-    of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there.
-
-    `explained` (...) is by how much the effects may lower a deviance, as a factor.
-    """
+    of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there."""
 
     deviance: Any
     log_share: Any
     stderr: np.ndarray
-    explained: Any
 
 
 def marginal(
-    evidence: Sequence[Evidence], scaled: Scaled, unit: np.ndarray, allowed: Discrepancy
+    evidence: Sequence[Evidence],
+    scaled: Scaled,
+    unit: np.ndarray,
+    weights: Sequence[np.ndarray],
+    total: np.ndarray,
 ) -> Marginal:
     """The marginal likelihood at `unit` (..., parameters) of the unit cube by the evidence there.
 
-    `allowed` is the discrepancy of the best minimum, whose noise counts.
+    `weights` (..., rows, channels) of each view are 1/σ in the unit of the data, where σ is what the effects
+    leave at the best minimum, whose noise counts; `total` are its errors.
 
     **Source:** C. Bishop, 2006, Pattern Recognition and Machine Learning, section 3.5; shares by the normal
     approximation of D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5.
     """
-    pairs = zip(evidence, allowed.raised, strict=True)
-    system = System([view._replace(sigma=1 / (view.weights * by)) for view, by in pairs], scaled, unit)
-    known, count, fits = system.known, np.shape(unit)[-1], system.fits
-    pull = np.array(np.broadcast_to(scaled.pull, (*system.lead, known))).reshape(fits, known)
-    rows = [system.rows(i) for i in range(len(evidence))]
-    data = [(view.residual / view.sigma).reshape(fits, -1) for view in system.views]
-    matrix, right = system.precision.copy(), np.zeros(system.lower.shape)
-    right[:, :known] = -times(np.swapaxes(system.priors, 1, 2), pull)
-    for own, values in zip(rows, data, strict=True):
-        matrix += own @ np.swapaxes(own, 1, 2)
-        right += times(own, values)
-
-    def stacked(fit: int) -> tuple[np.ndarray, np.ndarray]:
-        prior, at = system.prior_rows(fit)
-        at[:known] = -pull[fit]
-        return np.vstack([*(own[fit].T for own in rows), prior]), np.hstack([*(x[fit] for x in data), at])
-
+    pairs = zip(evidence, weights, strict=True)
+    raised = [view._replace(sigma=view.unit / own, least=1.0) for view, own in pairs]
+    system = System(raised, scaled, unit, hold=False)
+    views, known, count, fits = system.balances(), system.known, np.shape(unit)[-1], system.fits
+    normal = system.normal(views)
     stretch = scaled.stretch.reshape(fits, known, known)
-    steps = np.abs(np.linalg.pinv(stretch)) @ np.broadcast_to(allowed.total, (fits, known))[..., None]
+    steps = np.abs(np.linalg.pinv(stretch)) @ np.broadcast_to(total, (fits, known))[..., None]
     reach = _REACH * steps[:, :count, 0]
     lower, upper = system.lower.copy(), system.upper.copy()
     lower[:, :count] = np.maximum(lower[:, :count], -reach)
     upper[:, :count] = np.minimum(upper[:, :count], reach)
-    solution = held_within(*Normal(matrix, right, stacked).solved(), lower, upper)
-    left = [x - times(np.swapaxes(own, 1, 2), solution) for own, x in zip(rows, data, strict=True)]
+    solution = held_within(*normal.solved(), lower, upper)
+    left = [x.data - times(np.swapaxes(x.rows, 1, 2), solution) for x in views]
     chi2 = sum(np.sum(x**2, axis=1) for x in left) + np.sum(solution[:, known:] ** 2, axis=1)
-    chi2 += np.sum((times(system.priors, solution[:, :known]) + pull) ** 2, axis=1)
+    chi2 += np.sum((times(system.priors, solution[:, :known]) + system.pull) ** 2, axis=1)
+    matrix = normal.matrix
     linear, across = matrix[:, count:, count:], matrix[:, count:, :count]
     deviance = chi2 + np.linalg.slogdet(linear)[1]
     information = matrix[:, :count, :count] - np.swapaxes(across, 1, 2) @ np.linalg.solve(linear, across)
@@ -91,9 +80,7 @@ def marginal(
     area = np.linalg.slogdet(slope)[1]  # none in the middle of a disc of directions
     log_share = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1] + np.where(area > -np.inf, area, 0.0)
     stderr = np.sqrt(np.einsum("pij,pjk,pik->pi", slope, covariance, slope))
-    effects = matrix[:, known:, known:]
-    explained = np.linalg.eigvalsh(effects)[:, -1] if effects.size else np.ones(fits)
-    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr, explained)))
+    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr)))
 
 
 class Ranking(NamedTuple):
@@ -124,14 +111,11 @@ def ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Rankin
     it becomes the first, whose noise then counts.
     """
     result = _ranking(make, ranked)
-    for _ in range(_ROUNDS):
-        best = int(np.argmin(result.delta_chi2))
-        if result.delta_chi2[best] > -_CLEAR:
-            break
+    best = int(np.argmin(result.delta_chi2))
+    if result.delta_chi2[best] <= -CLEAR:
         again = _ranking(make, led_by(result.ranked, best))
-        if again.delta_chi2.min() < -_CLEAR:
-            break
-        result = again
+        if again.delta_chi2.min() > -CLEAR:
+            result = again
     order = np.argsort(result.delta_chi2, kind="stable")
     order = np.array([0, *order[order != 0]])
     minima = result.ranked.minima
@@ -146,31 +130,40 @@ def _ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Ranki
     jacobian = linearised(ranked)[0]
     evidence = data.evidence(ranked, jacobian)
     allowed = discrepancy(evidence, jacobian, units[0])
-    best = marginal(evidence, jacobian, units[0], allowed)
-    delta = above_best(ranked, allowed.evidence_share)
+    about = left_weights(evidence, allowed), allowed.total
+    best, delta = marginal(evidence, jacobian, units[0], *about), above_best(ranked, allowed)
     log_share, stderr = np.full(len(units), -np.inf), np.full(units.shape, np.nan)
     log_share[0], stderr[0] = best.log_share, best.stderr
-    for i in range(1, len(units)):
-        if delta[i] > RIVAL * (1 + _LINEAR * best.explained):
-            continue
+    for i in (np.flatnonzero(turnable(delta, allowed)[1:]) + 1).tolist():
         own = at_minimum(ranked, i)
         slopes = linearised(own)[0]
-        there = marginal(data.evidence(own, slopes), slopes, units[i], allowed)
+        there = marginal(data.evidence(own, slopes), slopes, units[i], *about)
         delta[i] = (there.deviance - best.deviance) / np.asarray(student(ranked.freedom, RIVAL)) ** 2
         log_share[i], stderr[i] = there.log_share, there.stderr
     share = np.exp(log_share - log_share.max())
     return Ranking(data, ranked, jacobian, allowed, delta, share / share.sum(), stderr)
 
 
-def above_best(ranked: RankedMinima, share: Any) -> np.ndarray:
+def left_weights(evidence: Sequence[Evidence], allowed: Discrepancy) -> list[np.ndarray]:
+    """1/σ of the points of each view (..., rows, channels), where σ is what the effects leave."""
+    pairs = zip(evidence, allowed.raised, strict=True)
+    return [raised * view.weights * view.unit for view, raised in pairs]
+
+
+def above_best(ranked: RankedMinima, allowed: Discrepancy) -> np.ndarray:
     """Δχ² (..., minima) of the minima on the effective points, by the noise.
 
-    Of a difference in χ² only a `share` (...) is evidence where residuals are larger than noise. Where few
-    residuals set the noise it is less by what Student's t is wider at the threshold of a rival.
+    Of a difference in χ² only a share is evidence where residuals are larger than noise. Where few residuals
+    set the noise it is less by what Student's t is wider at the threshold of a rival.
     """
-    deviance = ranked.minima.deviance
-    wider = np.asarray(student(ranked.freedom, RIVAL))[..., None]
-    return np.asarray(share)[..., None] * np.maximum(deviance - deviance[..., :1], 0.0) / wider**2
+    deviance, wider = ranked.minima.deviance, np.asarray(student(ranked.freedom, RIVAL))[..., None]
+    share = np.asarray(allowed.evidence_share)[..., None]
+    return share * np.maximum(deviance - deviance[..., :1], 0.0) / wider**2
+
+
+def turnable(above: np.ndarray, allowed: Discrepancy) -> np.ndarray:
+    """Minima (..., minima), this Δχ² above the best by the noise, that effects may make as good."""
+    return above <= RIVAL * (1 + _LINEAR * np.asarray(allowed.explained)[..., None])
 
 
 def gains(allowed: Discrepancy) -> list[Any]:

@@ -54,7 +54,7 @@ def prepare(cube: Cube, scene: Scene) -> PixelModel:
         problem = make(target)
         search = prepared(problem, batch_data(sample, problem.views[0].noise))
         assert isinstance(target, Measured)
-        errors = BatchErrors(problem, target, cube.calibrated)
+        errors = BatchErrors(problem, target, cube.calibrated, search)
     return PixelModel(scene, problem, example, search, errors)
 
 

@@ -8,25 +8,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.batch import polish
 from pellicle.fitting.batch.data import CODES, NO_DATA, BatchData, BatchFits, BatchMinima
 from pellicle.fitting.batch.effects import BatchEffects, nodes
 from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
+from pellicle.fitting.batch.search import BatchSearch
 from pellicle.fitting.conclusion import verdicts
-from pellicle.fitting.discrepancy import DOUBTFUL, discrepancy
+from pellicle.fitting.covariance import Scaled
+from pellicle.fitting.discrepancy import DOUBTFUL, Discrepancy, Evidence, discrepancy
 from pellicle.fitting.film.evidence import spectrum_evidence
 from pellicle.fitting.film.parts import accuracy
 from pellicle.fitting.film.problem import Measured, drifts, shortest_wavelength
 from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.view import Local, SpectrumView
-from pellicle.fitting.marginal import above_best, by_remaining, gains
+from pellicle.fitting.marginal import CLEAR, above_best, by_remaining, gains, left_weights, marginal, turnable
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.misfit import misfit, other_material
+from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reweighting import RankedMinima, linearised, ranked_by_factor
-from pellicle.fitting.status import ORDER
+from pellicle.fitting.status import ORDER, RIVAL
 from pellicle.scene.free import is_free
 
+_Linear = tuple[SpectrumView, RankedMinima, Scaled, Evidence]
 BLOCK = 1024
 """Spectra that are judged at once. With 512 the calls of NumPy cost 1 to 3 µs more for each spectrum; the
 systems of equations of 2048 no longer stay in the cache."""
@@ -45,6 +50,11 @@ class Group(NamedTuple):
         for first in range(0, len(self.spectra), size):
             own = slice(first, first + size)
             yield Group(self.spectra[own], None if self.rows is None else self.rows[own], self.parts)
+
+    def of(self, which: np.ndarray) -> Group:
+        """Some spectra of the group, by their positions, as if they were all."""
+        rows = None if self.rows is None else self.rows[which]
+        return Group(np.arange(len(which)), rows, self.parts)
 
     def measured(self, x: np.ndarray) -> np.ndarray:
         """Arrays of its spectra (spectra, rows, ...) at their measured rows."""
@@ -81,8 +91,9 @@ class BatchErrors:
     Left out is what few spectra need: default bounds are not widened, and a plan is not refined.
     """
 
-    def __init__(self, problem: Problem, target: Measured, calibrated: bool):
+    def __init__(self, problem: Problem, target: Measured, calibrated: bool, search: BatchSearch):
         self.problem, self.scene, self.calibrated = problem, target.scene, calibrated
+        self.search = search
         [self.view] = problem.views
         lower, upper = np.array([(p.lower, p.upper) for p in problem.parameters]).T
         depth, table = problem.thickness_axis, None
@@ -94,43 +105,37 @@ class BatchErrors:
     def fits(self, data: BatchData, minima: BatchMinima) -> BatchFits:
         """Errors and status of spectra by their data and minima."""
         spectra, orders, count = minima.values.shape
-        number, quality = np.full((spectra, count), np.nan), np.full(spectra, np.nan)
-        result = BatchFits(
-            values=number,
-            stderr=number.copy(),
-            stderr_noise=number.copy(),
-            status=np.full(spectra, CODES[NO_DATA], np.uint8),
-            minima=np.full(minima.values.shape, np.nan),
-            delta_chi2=np.full((spectra, orders), np.inf),
-            chi2_reduced=quality,
-            rms=quality.copy(),
-        )
+        value, stderr, noise = np.full((3, spectra, count), np.nan)
+        (chi2, rms), status = np.full((2, spectra), np.nan), np.full(spectra, CODES[NO_DATA], np.uint8)
+        every, above = np.full(minima.values.shape, np.nan), np.full((spectra, orders), np.inf)
+        result = BatchFits(value, stderr, noise, status, every, above, chi2, rms)
         known = np.isfinite(minima.deviance[:, 0])
         for group in groups(self.view, data.weight, known):
             for part in group.chunks(BLOCK):
-                for column, own in zip(result, self._fits(data, minima, part), strict=True):
+                found = self._fits(data, minima, part)
+                turned = np.flatnonzero(found.delta_chi2.min(axis=1) <= -CLEAR)
+                if len(turned):
+                    who, which = part.spectra[turned], np.argmin(found.delta_chi2[turned], axis=1)
+                    led = _led_by(self.search, data, minima, who, which)
+                    again = self._fits(data.of(who), led, part.of(turned))
+                    better = again.delta_chi2.min(axis=1) > -CLEAR
+                    for column, own in zip(found, again, strict=True):
+                        column[turned[better]] = own[better]
+                for column, own in zip(result, found, strict=True):
                     column[part.spectra] = own
-        return result
+        order = np.argsort(result.delta_chi2[:, 1:], axis=1, kind="stable") + 1
+        rows, order = np.arange(spectra)[:, None], np.pad(order, [(0, 0), (1, 0)])
+        delta = np.maximum(result.delta_chi2[rows, order], 0.0)
+        return result._replace(minima=result.minima[rows, order], delta_chi2=delta)
 
     def _fits(self, data: BatchData, minima: BatchMinima, group: Group) -> BatchFits:
-        whole, every, view, at = self._seen(data, minima, group)
-        who, problem = group.spectra, self.problem._replace(views=(view,))
-        candidates = Minima(minima.units[who], minima.deviance[who], minima.converged[who])
-        ranked = ranked_by_factor(problem, candidates, minima.misfit[who], at)
-        [after], [fit] = ranked.problem.views, ranked.fits
-        jacobian = linearised(ranked)[0]
-        effects = [
-            replace(effect, change=group.measured(effect.change))
-            for effect in self.effects.changes(whole, every, ranked.values)
-        ]
-        [block] = jacobian.blocks([view.points], [fit.variance])
-        evidence, units = spectrum_evidence(after, at, block, effects), candidates.units[:, 0]
+        """Fits of a group; the first minimum of a spectrum is its answer, even if another is better."""
+        linear = whole, ranked, jacobian, evidence = self._linear(data, minima, group)
+        [view], [fit], who = ranked.searched.views, ranked.fits, group.spectra
+        units = ranked.minima.units[:, 0]
         systematic = discrepancy([evidence], jacobian, units, contributions=False)
-        [remaining], largest = (
-            systematic.remaining,
-            accuracy(view, self.calibrated, np.asarray(view.data.values)),
-        )
-        wrong = misfit(systematic, remaining, largest)
+        [remaining] = systematic.remaining
+        wrong = misfit(systematic, remaining, accuracy(view, self.calibrated, np.asarray(view.data.values)))
         doubtful = np.flatnonzero((remaining.ratio > DOUBTFUL) & ~wrong)
         if len(doubtful):
             again = discrepancy([evidence.of(doubtful)], jacobian.of(doubtful), units[doubtful])
@@ -138,7 +143,8 @@ class BatchErrors:
         counted = by_remaining(ranked, systematic)
         covariance, models = linearised(counted)[1], LocalModels(self.problem, whole, counted)
         numbers = verdicts(
-            *(ranked, covariance, systematic, above_best(ranked, systematic.evidence_share)),
+            *(ranked, covariance, systematic),
+            self._above(data, minima, group, linear, systematic),
             lambda: models.neighbourhood(covariance.covariance),
             self._flat_sides(minima, who, gains(systematic)[0], models, ~wrong),
             misfit=wrong,
@@ -152,8 +158,43 @@ class BatchErrors:
             minima=minima.values[who],
             delta_chi2=numbers.delta_chi2,
             chi2_reduced=ranked.chi2_reduced,
-            rms=view.rms(at.model),
+            rms=view.rms(fit.at.model),
         )
+
+    def _linear(self, data: BatchData, minima: BatchMinima, group: Group) -> _Linear:
+        """The view of the spectra of a group at all points, and their ranked minima with the Jacobian and the
+        evidence at the first."""
+        whole, every, view, at = self._seen(data, minima, group)
+        who, problem = group.spectra, self.problem._replace(views=(view,))
+        candidates = Minima(minima.units[who], minima.deviance[who], minima.converged[who])
+        ranked = ranked_by_factor(problem, candidates, minima.misfit[who], at)
+        [after], [fit] = ranked.problem.views, ranked.fits
+        jacobian = linearised(ranked)[0]
+        effects = [
+            replace(effect, change=group.measured(effect.change))
+            for effect in self.effects.changes(whole, every, ranked.values)
+        ]
+        [block] = jacobian.blocks([view.points], [fit.variance])
+        return whole, ranked, jacobian, spectrum_evidence(after, at, block, effects)
+
+    def _above(
+        self, data: BatchData, minima: BatchMinima, group: Group, linear: _Linear, allowed: Discrepancy
+    ) -> np.ndarray:
+        """Δχ² (spectra, minima) of the minima, with the effects integrated out where they may turn it."""
+        _, ranked, jacobian, evidence = linear
+        above = above_best(ranked, allowed)
+        near = turnable(above, allowed) & ranked.minima.converged & (np.arange(above.shape[1]) > 0)
+        of, position = np.nonzero(near)
+        if len(of):
+            [weights], who = left_weights([evidence], allowed), group.spectra[of]
+            left = [weights[of]], allowed.total[of]
+            best = marginal([evidence.of(of)], jacobian.of(of), ranked.minima.units[of, 0], *left)
+            rivals = _led_by(self.search, data, minima, who, position)
+            _, _, slopes, there = self._linear(data.of(who), rivals, group.of(of))
+            rise = marginal([there], slopes, rivals.units[:, 0], *left).deviance - best.deviance
+            wider = np.broadcast_to(student(ranked.freedom, RIVAL), len(above))[of]
+            above[of, position] = rise / wider**2
+        return above
 
     def _seen(
         self, data: BatchData, minima: BatchMinima, group: Group
@@ -211,6 +252,25 @@ class BatchErrors:
             limits = bounded_by_drift(limits, ranked, models.thinnest())
         count = limits.stderr.shape[-1]
         return unlimited(limits, ranked, models.unneeded(covariance[:, :count, :count]))
+
+
+def _led_by(
+    search: BatchSearch, data: BatchData, minima: BatchMinima, who: np.ndarray, which: np.ndarray
+) -> BatchMinima:
+    """Minima of the spectra `who` with those at positions `which` in front, after a step to them."""
+    own = {name: np.array(x[who]) for name, x in minima._asdict().items() if name != "thickness"}
+    rows, pair = np.arange(len(who))[:, None], np.stack([np.zeros_like(which), which], axis=1)
+    for name in ("values", "units", "deviance", "misfit", "converged"):
+        own[name][rows, pair] = own[name][rows, pair[:, ::-1]]
+    about = search.static, search.common, data.of(who)
+    units = polish.in_rows(polish.at_best, *about, own["units"][:, 0]).units
+    best = polish.in_rows(polish.at_best, *about, units)
+    own |= {name: getattr(best, name) for name in ("model", "signal", "gain", "offset", "slope")}
+    own["profile"] += (minima.deviance[who, 0] - best.deviance)[:, None]
+    first = units, search.problem.values(units), best.deviance, best.misfit
+    for name, x in zip(("units", "values", "deviance", "misfit"), first, strict=True):
+        own[name][:, 0] = x
+    return BatchMinima(thickness=minima.thickness, **own)
 
 
 def _resampled(grid: np.ndarray, thickness: np.ndarray, profile: np.ndarray) -> np.ndarray:
