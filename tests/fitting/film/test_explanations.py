@@ -72,6 +72,14 @@ def test_a_rough_surface_is_named_for_psi_and_delta():
     assert depth + rough / 2 == pytest.approx(700.0, abs=1.0)
 
 
+@pytest.mark.slow  # twenty searches
+def test_a_misfit_of_a_free_film_has_no_reference_of_air():
+    """An oxide on silicon that is fitted as a film in air, of which no reflectance is a share."""
+    fit = pl.fit(spectrum(reflectance()), pl.Scene(SCENE.layers, "air", light=SCENE.light))
+    assert fit.status == "misfit"
+    assert not any("relative to bare air" in warning for warning in fit.warnings)
+
+
 @pytest.mark.slow  # two fits of one program
 def test_files_of_other_spots_are_told_apart():
     data = [spectrum(reflectance(depth=300.0)), spectrum(reflectance(depth=330.0), seed=1)]

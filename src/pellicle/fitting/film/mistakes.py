@@ -13,6 +13,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.dispersion.empirical import AbstractDispersion, known_index
+from pellicle.errors import DataError
 from pellicle.fitting.film.problem import Measured
 from pellicle.materials import Material, material
 from pellicle.optics.pair import Pair, imag, is_real, real, to_complex
@@ -25,8 +26,9 @@ _FAMILIES = (
     ("PMMA", "polystyrene", "polycarbonate", "PDMS", "SU-8", "PET"),
 )
 _SUBSTRATES = ("Si", "BK7", "SiO2", "Al2O3", "Al", "Ge", "GaAs", "stainless-steel", "Ag", "Au", "Cr")
-_CLEAR, _WIDER = 1e-4, 4.0
-"""Extinction of a substrate up to which light returns from its lower face, and the factor on bounds."""
+_CLEAR, _WIDER, _BLACK = 1e-4, 4.0, 1e-3
+"""Extinction of a substrate up to which light returns from its lower face, the factor on bounds, and the
+least reflectance of a reference."""
 
 
 class Mistake(NamedTuple):
@@ -245,7 +247,7 @@ def _made_of(target: Measured, value: str | float, i: int | None) -> Measured:
 
 
 def _relative(target: Measured, name: str) -> Measured:
-    """Values times the reflectance of a bare surface, by Fresnel's equations."""
+    """Values times the reflectance of a bare surface, by Fresnel's equations. DataError if that is none."""
     light, medium = target.scene.light, material(name)
     if isinstance(medium, Material):
         medium.check_range(target.wavelength)
@@ -256,4 +258,7 @@ def _relative(target: Measured, name: str) -> Measured:
     s = (above - below) / (above + below)
     p = (n**2 * above - first**2 * below) / (n**2 * above + first**2 * below)
     parts = {"s": (s,), "p": (p,)}.get(light.polarisation, (s, p))
-    return _times(target, np.mean(np.abs(parts) ** 2, axis=0))
+    reflected = np.mean(np.abs(parts) ** 2, axis=0)
+    if np.min(reflected) < _BLACK:
+        raise DataError(f"bare {name} reflects too little for a reference")
+    return _times(target, reflected)
