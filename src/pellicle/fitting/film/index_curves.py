@@ -246,12 +246,15 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
         found.append(fits.of_spline(_KNOTS[0], guesses, None, False))
         left = min(left, ranked.chi2_reduced * (1 + found[-1][0].min() / deviance))
     above, further, thickness, curves = (np.concatenate(x) for x in zip(*found, strict=True))
-    # residuals that no curve explains are no noise either
-    share = min(float(judged.best.discrepancy.evidence_share), 1 / max(left, 1.0))
+    # residuals that no curve explains are no noise either; those of the formula alone do not correlate it
+    share, left = 1 / max(left, 1.0), left if all(view.noise.given for view in old.views) else math.inf
+    if left < _EXPLAINED:
+        share *= sum(fit.chi2 for fit in ranked.fits) / deviance
+    else:
+        share = min(float(judged.best.discrepancy.evidence_share), share)
     above = share / student(ranked.freedom, RIVAL) ** 2 * above + further
     close = above - above.min() < RIVAL
     close[0] = True
-    left = left if all(view.noise.given for view in old.views) else math.inf
     about = above[close] - above.min(), thickness[close], curves[close]
     return IndexCurves(*about, nm, depth, names - others, left)
 
