@@ -92,7 +92,19 @@ class Spectrum:
         for name in _ARRAYS:
             if isinstance(value := getattr(self, name), str):
                 raise UsageError(f"`{name}` must be an array, not {value!r}: pl.read_spectrum reads files")
-        self._check_words()
+        for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
+            if getattr(self, name) not in known:
+                raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
+        stated = KINDS[self.signal]
+        for name in KEYWORDS:
+            value = getattr(self, name)
+            given = value is not None and value is not False and not (isinstance(value, tuple) and not value)
+            if (given and name not in stated.keywords) or (not given and name in stated.required):
+                kinds = [word for word, kind in KINDS.items() if name in kind.keywords] or [""]
+                go = "go" if name.endswith("s") else "goes"
+                raise UsageError(f'`{name}` {go} with `signal="{kinds[0]}"`: give both, or neither')
+        if self.depolarisation_sigma is not None and self.depolarisation is None:
+            raise UsageError("`depolarisation_sigma` goes with `depolarisation`: give both, or neither")
         size, parts = np.size(self.wavelength), self.kind.parts
         given, order = [x for x in (self.azimuth, self.angle) if x is not None], None
         if given or not size or not np.all(np.diff(self.wavelength) > 0):
@@ -125,21 +137,6 @@ class Spectrum:
     def kind(self) -> Signal:
         """Kind of the signal: quantities, units, and their comparison in a fit."""
         return KINDS[self.signal].of(self)
-
-    def _check_words(self) -> None:
-        for name, known in (("signal", SIGNALS), ("polarisation", POLARISATIONS)):
-            if getattr(self, name) not in known:
-                raise UsageError(f"`{name}` must be one of {', '.join(known)}, not {getattr(self, name)!r}")
-        stated = KINDS[self.signal]
-        for name in KEYWORDS:
-            value = getattr(self, name)
-            given = value is not None and value is not False and not (isinstance(value, tuple) and not value)
-            if (given and name not in stated.keywords) or (not given and name in stated.required):
-                kinds = [word for word, kind in KINDS.items() if name in kind.keywords] or [""]
-                go = "go" if name.endswith("s") else "goes"
-                raise UsageError(f'`{name}` {go} with `signal="{kinds[0]}"`: give both, or neither')
-        if self.depolarisation_sigma is not None and self.depolarisation is None:
-            raise UsageError("`depolarisation_sigma` goes with `depolarisation`: give both, or neither")
 
     def _check_arrays(self) -> None:
         """Refuse what a file may not contain either. Raises DataError."""

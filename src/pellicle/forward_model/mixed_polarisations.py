@@ -121,7 +121,11 @@ def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit
     a, _ = transverse(groups[0].above, _angle(groups[0]))
     dichroic = plan.row("anisotropy").count == SLICED
     *plates, last = groups
-    lit = _last(last, Inside(a), dichroic)
+    waves = polarised(last.above, last.layers, last.below, last.phases, Inside(a), dichroic)
+    rows = mueller_elements(*waves.reflected)
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for row in rows for x in row))
+    columns = [jnp.stack([jnp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
+    lit = _Lit(jnp.stack(columns, axis=-2), _power(waves))
     for group in reversed(plates):
         angle = _angle(groups[0]) if group is groups[0] else Inside(a)
         lit = _on_plate(group, angle, dichroic, lit)
@@ -129,14 +133,6 @@ def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit
         return lit
     turned = turned_stokes(turn)
     return _Lit(turned @ lit.reflected @ turned, lit.passed @ turned)
-
-
-def _last(group: CoherentGroup, angle: Any, dichroic: bool) -> _Lit:
-    waves = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
-    rows = mueller_elements(*waves.reflected)
-    shape = jnp.broadcast_shapes(*(jnp.shape(x) for row in rows for x in row))
-    columns = [jnp.stack([jnp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
-    return _Lit(jnp.stack(columns, axis=-2), _power(waves))
 
 
 def _power(waves: Polarised) -> Any:

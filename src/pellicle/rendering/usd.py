@@ -14,14 +14,13 @@ import numpy as np
 
 from pellicle.colour import linear_srgb, sensor
 from pellicle.files import replacing
-from pellicle.rendering.formula import Appearance
 from pellicle.rendering.materialx import bsdf_of, formula
 from pellicle.rendering.targets import Material, Target
 
 
 def write(path: Path, material: Material) -> tuple[Path, ...]:
     """Write a stage with a sphere and its material."""
-    Tf, Usd, UsdGeom, UsdShade = _usd("Tf", "Usd", "UsdGeom", "UsdShade")
+    Gf, Sdf, Tf, Usd, UsdGeom, UsdShade = _usd("Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdShade")
     stage = Usd.Stage.CreateInMemory()
     stage.SetMetadata("comment", f"pellicle {version('pellicle')}")
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -32,7 +31,14 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     drawn = UsdShade.Material.Define(stage, f"/film/{Tf.MakeValidIdentifier(material.name)}_material")
     drawn.GetPrim().SetCustomDataByKey("pellicle", json.dumps(material.record(), ensure_ascii=False))
     _connect_materialx(stage, drawn, material)
-    _connect_preview(stage, drawn, material.look)
+    look = material.look
+    normal = np.clip(np.asarray(linear_srgb(look.xyz[-1, 0], sensor().white)), 0.0, 1.0)
+    preview = UsdShade.Shader.Define(stage, drawn.GetPath().AppendChild("preview"))
+    preview.CreateIdAttr("UsdPreviewSurface")
+    preview.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*normal.tolist()))
+    preview.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(1.0)
+    preview.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(float(np.sqrt(look.roughness)))
+    drawn.CreateSurfaceOutput().ConnectToSource(preview.CreateOutput("surface", Sdf.ValueTypeNames.Token))
     UsdShade.MaterialBindingAPI.Apply(sphere.GetPrim()).Bind(drawn)
     with replacing(path) as temporary:
         stage.GetRootLayer().Export(str(temporary))
@@ -62,17 +68,6 @@ def _connect_materialx(stage: Any, drawn: Any, material: Material) -> None:
     output = bsdf.CreateOutput("out", Sdf.ValueTypeNames.Token)
     surface.CreateInput("bsdf", Sdf.ValueTypeNames.Token).ConnectToSource(output)
     drawn.CreateSurfaceOutput("mtlx").ConnectToSource(surface.CreateOutput("out", Sdf.ValueTypeNames.Token))
-
-
-def _connect_preview(stage: Any, drawn: Any, look: Appearance) -> None:
-    Gf, Sdf, UsdShade = _usd("Gf", "Sdf", "UsdShade")
-    normal = np.clip(np.asarray(linear_srgb(look.xyz[-1, 0], sensor().white)), 0.0, 1.0)
-    preview = UsdShade.Shader.Define(stage, drawn.GetPath().AppendChild("preview"))
-    preview.CreateIdAttr("UsdPreviewSurface")
-    preview.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*normal.tolist()))
-    preview.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(1.0)
-    preview.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(float(np.sqrt(look.roughness)))
-    drawn.CreateSurfaceOutput().ConnectToSource(preview.CreateOutput("surface", Sdf.ValueTypeNames.Token))
 
 
 def _usd(*names: str) -> list[Any]:

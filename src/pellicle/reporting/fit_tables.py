@@ -30,7 +30,21 @@ def fit_csv(fit: Fit) -> str:
     if fit.layer_test is not None:
         return _samples(fit)
     if fit.joint:
-        return _joint(fit)
+        about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
+        azimuths, rows = False, []
+        for part in fit.parts:
+            data = part.data
+            unknown = np.full(len(part.curve.model), math.nan)
+            nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown
+            angle = data.theta_i if isinstance(data, BrdfSamples) else data.angle
+            azimuth = data.azimuth if isinstance(data, Spectrum) else None
+            azimuths |= azimuth is not None
+            for q in quantities(data, part.curve):
+                numbers = (nm, angle, q.data, q.model, q.residual, q.sigma, azimuth)
+                of_points = zip(*(unknown if x is None else x for x in numbers), strict=True)
+                rows += [(part.name, q.name, *point) for point in of_points]
+        columns = dict(zip(_JOINT, zip(*rows, strict=True), strict=True))
+        return _text(fit, about, {name: columns[name] for name in _JOINT[: None if azimuths else -1]})
     [part] = fit.parts
     if isinstance(part.data, Colours):
         return _colours(fit, part)
@@ -137,28 +151,6 @@ def _samples(fit: Fit) -> str:
     model = np.concatenate([part.curve.model for part in fit.parts])
     columns |= dict(zip(channels, measured.T, strict=True))
     return _text(fit, about, columns | {f"model_{c}": x for c, x in zip(channels, model.T, strict=True)})
-
-
-def _joint(fit: Fit) -> str:
-    """A row for each value; Ψ, Δ and depolarisation are three, and so is a colour; Mueller elements one each.
-
-    The angle of a BRDF sample is that of the light.
-    """
-    about = ["joint fit: data, model, residual = data - model, sigma = standard deviation assumed"]
-    azimuths, rows = False, []
-    for part in fit.parts:
-        data = part.data
-        unknown = np.full(len(part.curve.model), math.nan)
-        nm = part.spectral.wavelength if isinstance(data, Spectrum) else unknown
-        angle = data.theta_i if isinstance(data, BrdfSamples) else data.angle
-        azimuth = data.azimuth if isinstance(data, Spectrum) else None
-        azimuths |= azimuth is not None
-        for q in quantities(data, part.curve):
-            numbers = (nm, angle, q.data, q.model, q.residual, q.sigma, azimuth)
-            of_points = zip(*(unknown if x is None else x for x in numbers), strict=True)
-            rows += [(part.name, q.name, *point) for point in of_points]
-    columns = dict(zip(_JOINT, zip(*rows, strict=True), strict=True))
-    return _text(fit, about, {name: columns[name] for name in _JOINT[: None if azimuths else -1]})
 
 
 def _text(fit: Fit, about: Sequence[str], columns: dict[str, Any]) -> str:

@@ -155,7 +155,13 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
     if panel.zero:
         axes.axhline(0, color=GREY, linewidth=0.6)
     for left, right, name, shade in panel.spans:
-        _span(axes, panel, left, right, name, shade)
+        # shade a range of the abscissa and write its name, upright where it is narrow
+        axes.axvspan(left, right, color=GREY, alpha=shade, linewidth=0)
+        low, high = panel.span or (left, right)
+        narrow = (right - left) / (high - low) < 0.07 + 0.018 * len(name)
+        turned, place = 90 if narrow else 0, axes.get_xaxis_transform()
+        style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "rotation": turned}
+        axes.text((left + right) / 2, 0.97, plain(name), transform=place, **style)
     upright: Any = {} if panel.key else {"rotation": 90, "bbox": _BOX}
     for x, y, text in panel.notes:
         axes.annotate(text, (x, y), **_NOTE, **upright)
@@ -189,16 +195,6 @@ def _line(axes: Axes, line: Line, points: int, listed: set[str]) -> None:
     size = {"diamond": 5.0, "cross": 5.0}.get(line.style, size)
     style |= {"markersize": size} | ({"markerfacecolor": "none"} if line.style == "ring" else {})
     axes.plot(line.x, line.y, _MARKERS[line.style], **style)
-
-
-def _span(axes: Axes, panel: Panel, left: float, right: float, name: str, shade: float) -> None:
-    """Shade a range of the abscissa and write its name, upright where it is narrow."""
-    axes.axvspan(left, right, color=GREY, alpha=shade, linewidth=0)
-    low, high = panel.span or (left, right)
-    narrow = (right - left) / (high - low) < 0.07 + 0.018 * len(name)
-    turned, place = 90 if narrow else 0, axes.get_xaxis_transform()
-    style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": "small", "rotation": turned}
-    axes.text((left + right) / 2, 0.97, plain(name), transform=place, **style)
 
 
 def _patches(axes: Axes, panel: Panel) -> None:
