@@ -23,8 +23,8 @@ import numpy as np
 
 from pellicle.accuracy.case import Case, Program, Variant, compiled
 from pellicle.fitting.film.problem import Measured, make
-from pellicle.fitting.presentation import PlotMixin
 from pellicle.fitting.problem import Form, Problem, Progress
+from pellicle.fitting.result import PlotMixin
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import free_leaves
 

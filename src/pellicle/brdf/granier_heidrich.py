@@ -14,7 +14,7 @@ paper. Where it is ambiguous, the reading that is consistent with the rest of it
   (1 − F(i))(1 − F(o)) in T.
 - The lower boundary reflects everything without a phase shift; the lobes are not normalised.
 
-Energy can exceed one, so the weights are not albedos (`pellicle.brdf.albedo` computes it).
+Energy can exceed one, so the weights are not albedos (`pellicle.brdf.lobes` computes it).
 """
 
 from collections.abc import Callable

@@ -26,8 +26,7 @@ from pellicle.fitting.curves import BIREFRINGENCE
 from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, left_weights, marginal
 from pellicle.fitting.noise import student
-from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import Estimate, Fit, Part, Status
+from pellicle.fitting.result import Estimate, Fit, Part, ReportMixin, Status
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Scene
 

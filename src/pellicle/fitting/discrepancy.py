@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.covariance import Errors, Normal, Scaled, held_within, times
-from pellicle.fitting.noise import WINDOW
-from pellicle.fitting.robust_losses import median, spread
+from pellicle.fitting.noise import WINDOW, median, spread
 
 HALF_NORMAL = math.sqrt(3)
 """Root mean square of σ² where σ has a half-normal prior, in units of the square of its scale: 3^½."""

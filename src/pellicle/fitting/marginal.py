@@ -15,9 +15,8 @@ import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled, held_within, times
 from pellicle.fitting.discrepancy import Discrepancy, Evidence, System, discrepancy
-from pellicle.fitting.noise import student
+from pellicle.fitting.noise import median, student
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
-from pellicle.fitting.robust_losses import median
 from pellicle.fitting.status import RIVAL
 
 _REACH = 3.0

@@ -12,8 +12,7 @@ from logging import getLogger
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting.presentation import ReportMixin
-from pellicle.fitting.result import Estimate, Fit, Status
+from pellicle.fitting.result import Estimate, Fit, ReportMixin, Status
 from pellicle.fitting.status import describe
 
 log = getLogger(__name__)

@@ -16,9 +16,8 @@ import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled, errors, scaled
 from pellicle.fitting.minima import MOST, Minima, deviance_at, minima
-from pellicle.fitting.noise import NoiseEstimate, noise_of
+from pellicle.fitting.noise import LEAST_SQUARES, LOSSES, Loss, NoiseEstimate, inflation, noise_of, spread
 from pellicle.fitting.problem import Problem, View
-from pellicle.fitting.robust_losses import LEAST_SQUARES, LOSSES, Loss, inflation, spread
 
 log = getLogger(__name__)
 

@@ -14,7 +14,7 @@ import numpy as np
 from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.fitting.presentation import PlotMixin
+from pellicle.fitting.result import PlotMixin
 from pellicle.mapping.store import DONE, IDENTITY, STATUS, variable_name, write_dataset, zarr_package
 
 if TYPE_CHECKING:

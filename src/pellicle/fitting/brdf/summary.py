@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.brdf.albedo import energy_warning
 from pellicle.brdf.directions import direction
+from pellicle.brdf.lobes import energy_warning
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import in_plane
 from pellicle.fitting.brdf.view import Local, Samples, SamplesView, local

@@ -14,9 +14,8 @@ from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_e
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.view import Local, SpectrumView
-from pellicle.fitting.noise import DRIFT_CORRELATION, short_range_noise
+from pellicle.fitting.noise import DRIFT_CORRELATION, median, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.robust_losses import median
 
 LEAST_NOISE = 1e-9
 """Least noise, as a share of the signal's level: rounding in simulated data."""

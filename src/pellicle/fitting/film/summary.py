@@ -20,11 +20,10 @@ from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import Target, drifts, shortest_wavelength
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import local_noise, student
+from pellicle.fitting.noise import local_noise, spread, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima
-from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene
