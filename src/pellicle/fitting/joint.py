@@ -28,13 +28,12 @@ from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fit as of_film
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.summary import FilmMeasurements
-from pellicle.fitting.minima import minima
 from pellicle.fitting.noise import LEAST_SQUARES
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Box, Coordinates, Problem, Progress
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Fit, Part
-from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.reweighting import RankedMinima, minima, rank
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface

@@ -32,7 +32,7 @@ from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate
-from pellicle.simulation.colours import BANDS, interference_colours, interference_spectra, varied_layer
+from pellicle.simulation.spectra import BANDS, interference_colours, interference_spectra, varied_layer
 
 ANGLES = np.linspace(0.0, 80.0, 81)
 """Angles of incidence (degrees) at which colours are compared."""

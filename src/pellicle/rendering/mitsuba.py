@@ -29,7 +29,7 @@ from pellicle.rendering.formula import Appearance
 from pellicle.rendering.targets import Material, Target, write_grey_image
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
-from pellicle.simulation.colours import BANDS
+from pellicle.simulation.spectra import BANDS
 
 ALPHA = 0.1
 """GGX roughness of a film that has none of its own: `measured` has no perfect mirrors."""

@@ -16,7 +16,7 @@ from pellicle.files import write_text
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.plain_text import csv_rows
 from pellicle.scene.film import Scene
-from pellicle.simulation.colours import colour_table, interference_colours
+from pellicle.simulation.spectra import colour_table, interference_colours
 
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""
@@ -37,7 +37,7 @@ def chart(
 
     **Arguments:** `thickness` (nm) and `angle` (degrees) are ranges. `inverse` adds a panel with every
     thickness that has the colour of another one. `layer`, `observer` and `illuminant` are those of
-    `pellicle.simulation.colours.interference_colours`.
+    `pellicle.simulation.spectra.interference_colours`.
 
     **Returns:** the share of the colours that sRGB cannot show.
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting import minima as solver
+from pellicle.fitting import reweighting as solver
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.problem import measured as as_numbers
 from pellicle.fitting.film.search import design_points, search

@@ -23,11 +23,10 @@ from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.marginal import CLEAR, above_best, by_remaining, gains, left_weights, marginal, turnable
-from pellicle.fitting.minima import Minima
 from pellicle.fitting.misfit import misfit, other_material
 from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.reweighting import RankedMinima, linearised, ranked_by_factor
+from pellicle.fitting.reweighting import Minima, RankedMinima, linearised, ranked_by_factor
 from pellicle.fitting.status import ORDER, RIVAL
 from pellicle.scene.free import is_free
 

@@ -15,11 +15,10 @@ from pellicle.fitting.film.other_readings import Data, folded, readings
 from pellicle.fitting.film.parameters import thickness_name
 from pellicle.fitting.film.problem import Measured, Target, make
 from pellicle.fitting.film.search import search
-from pellicle.fitting.minima import minima
 from pellicle.fitting.noise import short_range_noise
 from pellicle.fitting.problem import Problem, Progress, quiet
 from pellicle.fitting.result import Estimate, Fit, Status
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.reweighting import RankedMinima, minima
 from pellicle.fitting.status import RIVAL, describe
 
 log = getLogger(__name__)

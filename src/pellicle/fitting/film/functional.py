@@ -17,8 +17,8 @@ from pellicle.errors import UsageError
 from pellicle.fitting.evaluation import Static, Until, polished
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
-from pellicle.fitting.minima import MOST, STEPS
 from pellicle.fitting.problem import Array, Box
+from pellicle.fitting.reweighting import MOST, STEPS
 from pellicle.scene.film import Scene
 
 

@@ -23,12 +23,11 @@ from pellicle.fitting.conclusion import Conclusion
 from pellicle.fitting.curves import at_each_wavelength
 from pellicle.fitting.film.parameters import thickness_name
 from pellicle.fitting.film.problem import Measured, Target, make
-from pellicle.fitting.minima import solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reported_layer import reported_layer, reported_medium
 from pellicle.fitting.result import Estimate, Part, Status
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.reweighting import RankedMinima, solve
 from pellicle.fitting.status import RIVAL, WELL_KNOWN, apart_from, distinct_rivals, expanded
 from pellicle.optics.pair import imag, real
 from pellicle.scene.free import Free, free_leaves, insert
