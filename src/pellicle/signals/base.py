@@ -227,6 +227,13 @@ class Signal(ABC):
         return f"of {self.word}"
 
     @property
+    def waves(self) -> Any:
+        """Traced functions of signals: a module that is imported when it is needed, since it imports JAX."""
+        from pellicle.signals import waves
+
+        return waves
+
+    @property
     @abstractmethod
     def quantities(self) -> tuple[Quantity, ...]:
         """The measured quantities, in the order of files."""

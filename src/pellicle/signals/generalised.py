@@ -91,30 +91,22 @@ class Generalised(Ratios):
         return {"sigma": sigma, "delta_sigma": delta_sigma(values, sigma)}
 
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
         if len(rows) > CHANNELS:
-            return waves.angles_of_sums(waves.ratio_sums_of_mueller(waves.isotropic_matrix(*rows)))
-        return waves.without_mixing(rows)
+            return self.of_sums(self.of_mueller(self.waves.isotropic_matrix(*rows)))
+        return self.waves.without_mixing(rows)
 
     def of_jones(self, jones: Any) -> list[Any]:
-        from pellicle.signals import waves
-
         # Woollam's r_ps is the element in row s and column p
         pairs = (jones.pp, jones.ss), (jones.sp, jones.pp), (jones.ps, jones.ss)
-        return [part for pair in pairs for part in waves.stokes_of_jones(*pair)]
+        return [part for pair in pairs for part in self.waves.stokes_of_jones(*pair)]
 
     def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
-        from pellicle.signals import waves
-
-        return waves.ratio_sums_of_mueller(matrix)
+        return self.waves.ratio_sums_of_mueller(matrix)
 
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        from pellicle.signals import waves
-
         sphere = rows.reshape(len(rows), -1, CHANNELS)
         noisy, clean = (
-            waves.angles(own)[:, self.positions].reshape(len(rows), -1)
+            self.waves.angles(own)[:, self.positions].reshape(len(rows), -1)
             for own in (scattered(sphere, noise, seed), sphere)
         )
         return noisy, clean
@@ -134,12 +126,10 @@ class Generalised(Ratios):
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
         """N, C, S of the measured ratios, each brought to its sphere, in the frame of the data."""
-        from pellicle.signals import waves
-
         positions = [CHANNELS * place + i for place in self.positions for i in range(CHANNELS)]
-        rows = waves.columns(rows, positions)
-        rows = waves.on_spheres(rows) if depolarises else rows
-        return waves.in_frame(frame, rows).reshape(-1)
+        rows = self.waves.columns(rows, positions)
+        rows = self.waves.on_spheres(rows) if depolarises else rows
+        return self.waves.in_frame(frame, rows).reshape(-1)
 
     def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
         ratios = len(self.parts)

@@ -65,22 +65,16 @@ class Mueller(Signal):
             check_element(data.values[:, i], sigma, element, place(f"`{element}`"), remedy)
 
     def isotropic(self, rows: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
-        return [element for row in waves.isotropic_matrix(*rows) for element in row][1:]
+        return [element for row in self.waves.isotropic_matrix(*rows) for element in row][1:]
 
     def of_jones(self, jones: Any) -> list[Any]:
-        from pellicle.signals import waves
-
-        return waves.all_elements(jones)
+        return self.waves.all_elements(jones)
 
     def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
         return [element for row in matrix for element in row]
 
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
-        return waves.normalised_elements(sums)
+        return self.waves.normalised_elements(sums)
 
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
         values = rows + noise * np.random.default_rng(seed).normal(0.0, 1.0, rows.shape)
@@ -90,9 +84,7 @@ class Mueller(Signal):
         return Channels(data.values, np.full(len(data), ROUGH) if data.sigma is None else data.sigma)
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
-        from pellicle.signals import waves
-
-        return waves.columns(rows, self.positions).reshape(-1)
+        return self.waves.columns(rows, self.positions).reshape(-1)
 
     def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
         """An offset of each element, and a depolarisation that mixes the phases of s and p: elements of the

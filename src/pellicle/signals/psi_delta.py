@@ -53,14 +53,10 @@ class Ratios(base.Signal):
         return {"values": values, "delta": delta}
 
     def of_sums(self, sums: Sequence[Any]) -> Sequence[Any]:
-        from pellicle.signals import waves
-
-        return waves.angles_of_sums(sums)
+        return self.waves.angles_of_sums(sums)
 
     def drawn(self, rows: Any) -> Any:
-        from pellicle.signals import waves
-
-        return waves.drawn_angles(rows, self.folded)
+        return self.waves.drawn_angles(rows, self.folded)
 
     def rms(self, residual: np.ndarray) -> Any:
         kept = self.points(residual).reshape(*residual.shape[:-1], -1)
@@ -120,19 +116,13 @@ class PsiDelta(Ratios):
         return rows[:3]
 
     def of_jones(self, jones: Any) -> list[Any]:
-        from pellicle.signals import waves
-
-        return waves.stokes_of_jones(jones.pp, jones.ss)
+        return self.waves.stokes_of_jones(jones.pp, jones.ss)
 
     def of_mueller(self, matrix: Sequence[Sequence[Any]]) -> list[Any]:
-        from pellicle.signals import waves
-
-        return waves.stokes_of_mueller(matrix)
+        return self.waves.stokes_of_mueller(matrix)
 
     def synthetic(self, rows: np.ndarray, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-        from pellicle.signals import waves
-
-        clean = waves.angles(rows)
+        clean = self.waves.angles(rows)
         values = clean + noise * np.random.default_rng(seed).normal(0.0, 1.0, clean.shape)
         return np.stack([np.clip(values[:, 0], 0.0, 90.0), np.mod(values[:, 1], 360.0)], axis=1), clean
 
@@ -171,13 +161,11 @@ class PsiDelta(Ratios):
         Ψ and Δ do not depend on the degree of polarisation, so where some light is unpolarised, N, C, S are
         brought to their sphere; a rotating analyser measures N and C as they are.
         """
-        from pellicle.signals import waves
-
         if self.depolarisation:
-            rows = waves.with_depolarisation(rows, self.measured)
+            rows = self.waves.with_depolarisation(rows, self.measured)
         elif not self.folded and depolarises:
-            rows = waves.on_spheres(rows)
-        rows = waves.in_frame(frame, rows)
+            rows = self.waves.on_spheres(rows)
+        rows = self.waves.in_frame(frame, rows)
         return rows[:, : self.measured + self.depolarisation].reshape(-1)
 
     def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
