@@ -99,18 +99,26 @@ def cost(
     **Raises:** UsageError for a tolerance that is not above zero, for a reference that cannot compute the
     scene, for a scene whose signal is 0 everywhere, and for the colours of a surface without colour-science.
     """
+    shared = {"tolerance": tolerance, "progress": progress}
+    of_spectra = {"reference": reference, "noise": noise, "datasets": datasets, "time_limit": time_limit}
+    return _measured(scene, wavelength, directions, (space, angle), of_spectra, shared)
+
+
+def _measured(
+    scene: Scene | Surface,
+    wavelength: ArrayLike | None,
+    directions: Directions | BrdfSamples | None,
+    colours: tuple[str | None, ArrayLike | None],
+    of_spectra: dict[str, Any],
+    shared: dict[str, Any],
+) -> Cost:
+    """Cost of the colours or values of a surface, or of the colours or spectra of a film."""
     from pellicle.accuracy import colour_methods, cost, surface  # cost: a fifth of the time of importing this
     from pellicle.rendering.renderer_methods import RENDERER_METHODS
     from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS
 
-    shared: dict[str, Any] = {"tolerance": tolerance, "progress": progress}
-    of_spectra: dict[str, Any] = {
-        "reference": reference,
-        "noise": noise,
-        "datasets": datasets,
-        "time_limit": time_limit,
-    }
     check_scene(scene)
+    (space, angle), noise = colours, of_spectra["noise"]
     methods = (*colour_methods.COLOUR_METHODS, *RENDERER_METHODS)
     if isinstance(scene, Surface):
         refuse("a Surface", wavelength=wavelength, noise=noise, space=space, angle=angle)

@@ -118,16 +118,7 @@ def read_colour_rows(
     numbers = table.numbers([*chosen.channels, *chosen.sigma, *chosen.angle])
     values, errors = np.stack(numbers[:3], axis=1), numbers[3 : 3 + len(chosen.sigma)]
     if chosen.kind == "xyY":
-        # X, Y, Z of x, y, Y. Raises DataError for a chromaticity that cannot be
-        x, y, luminance = values.T
-        wrong = (y <= 0) | (x < 0) | (x + y > 1)
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise DataError(
-                f"{table.where(row, chosen.channels[1])}: x = {x[row]:g}, y = {y[row]:g} are no chromaticity;"
-                " correct them"
-            )
-        values = np.stack([x / y * luminance, luminance, (1 - x - y) / y * luminance], axis=1)
+        values = _from_chromaticity(table, chosen.channels, values)
     sigma = np.stack((errors * 3)[:3], axis=1) if errors else None
     where = [table.places(position) for position in chosen.channels]
     values, sigma, note = scaled(values, sigma, space, unit or chosen.unit, where, file.path)
@@ -210,6 +201,19 @@ def _space(file: TextFile, kind: str, requested: str | None) -> str:
             f" give `signal={stated or spaces[0]!r}`"
         )
     return requested
+
+
+def _from_chromaticity(table: Table, positions: list[int], values: np.ndarray) -> np.ndarray:
+    """X, Y, Z of x, y, Y. Raises DataError for a chromaticity that cannot be."""
+    x, y, luminance = values.T
+    wrong = (y <= 0) | (x < 0) | (x + y > 1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{table.where(row, positions[1])}: x = {x[row]:g}, y = {y[row]:g} are no chromaticity;"
+            " correct them"
+        )
+    return np.stack([x / y * luminance, luminance, (1 - x - y) / y * luminance], axis=1)
 
 
 def _first_cells(file: TextFile) -> tuple[list[str], str]:

@@ -231,11 +231,7 @@ def repeats(fits: Sequence[Fit]) -> Repeats:
 
     ```
     """
-    # names of repeats: their files, numbered where one file has several
-    names = [", ".join(part.data.path for part in fit.parts if part.data.path) or "repeat" for fit in fits]
-    numbers = [names[: i + 1].count(name) for i, name in enumerate(names)]
-    pairs = zip(names, numbers, strict=True)
-    paths = [f"{name} ({number})" if names.count(name) > 1 else name for name, number in pairs]
+    paths = _paths(fits)
     triples = zip(paths, fits, _reasons(fits, paths), strict=True)
     every = tuple(Repeat(path, fit.status, reason) for path, fit, reason in triples)
     used = [(each.path, fit) for each, fit in zip(every, fits, strict=True) if not each.left_out]
@@ -275,6 +271,14 @@ def _repeated(name: str, estimates: Sequence[Estimate]) -> RepeatedParameter:
         *(name, repeated.sd, repeated.stated, repeated.chi2, repeated.freedom),
     )
     return repeated
+
+
+def _paths(fits: Sequence[Fit]) -> list[str]:
+    """Names of repeats: their files, numbered where one file has several."""
+    names = [", ".join(part.data.path for part in fit.parts if part.data.path) or "repeat" for fit in fits]
+    numbers = [names[: i + 1].count(name) for i, name in enumerate(names)]
+    pairs = zip(names, numbers, strict=True)
+    return [f"{name} ({number})" if names.count(name) > 1 else name for name, number in pairs]
 
 
 def _reasons(fits: Sequence[Fit], paths: Sequence[str]) -> list[str]:

@@ -43,23 +43,7 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     """
     look, uneven = material.look, material.thickness_map is not None
     alpha = look.roughness if look.roughness > 0 else ALPHA
-    # the files that are written, by what they are
-    names = {
-        "rgb": f"{path.stem}.bsdf",
-        "spectral": f"{path.stem}_spectral.bsdf",
-        "lookup": f"{path.stem}.npz",
-        "plugin": f"{PLUGIN}.py",
-        "measured": f"{path.stem}.xml",
-        "scene": f"{path.stem}_lookup.xml",
-    }
-    if path.suffix.lower() == ".bsdf":
-        if uneven:
-            raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
-        names = {key: names[key] for key in ("rgb", "spectral")}
-    elif uneven:
-        names = names | {"map": f"{path.stem}_thickness.png", "scene": names["measured"]}
-        names = {key: names[key] for key in ("lookup", "map", "plugin", "scene")}
-    chosen = {key: path.with_name(name) for key, name in names.items()}
+    chosen = _paths(path, uneven)
     for key, file in chosen.items():
         if file.exists() and key != "plugin":  # the same for every film
             raise UsageError(f"{file}: exists and is not overwritten; choose another `path` or remove it")
@@ -88,6 +72,26 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
         scene = {"comment": note, "measured": True, "table": chosen["rgb"].name}
         write_text(chosen["measured"], _scene(scene))
     return tuple(chosen.values())
+
+
+def _paths(path: Path, uneven: bool) -> dict[str, Path]:
+    """The files that are written, by what they are."""
+    names = {
+        "rgb": f"{path.stem}.bsdf",
+        "spectral": f"{path.stem}_spectral.bsdf",
+        "lookup": f"{path.stem}.npz",
+        "plugin": f"{PLUGIN}.py",
+        "measured": f"{path.stem}.xml",
+        "scene": f"{path.stem}_lookup.xml",
+    }
+    if path.suffix.lower() == ".bsdf":
+        if uneven:
+            raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
+        names = {key: names[key] for key in ("rgb", "spectral")}
+    elif uneven:
+        names = names | {"map": f"{path.stem}_thickness.png", "scene": names["measured"]}
+        names = {key: names[key] for key in ("lookup", "map", "plugin", "scene")}
+    return {key: path.with_name(name) for key, name in names.items()}
 
 
 def _scene(content: Mapping[str, Any]) -> str:

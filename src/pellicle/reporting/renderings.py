@@ -28,6 +28,7 @@ from pellicle.simulation.surface_sphere import in_plane, render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
     from pellicle.rendering.export import Export
@@ -253,19 +254,7 @@ def draw_methods(
     figure = new_figure(1.0 + 1.9 * len(maps), 5.1)
     panels = figure.subplots(2, len(maps), squeeze=False)
     for above, below, colours in zip(*panels, maps, strict=True):
-        # the ball by one method, its time, and below it the ΔE2000 of each pixel
-        linear = np.asarray(linear_srgb(colours.xyz, sensor(*OBSERVER).white))
-        shown = display(pixels.rendering(_over(pixels, linear)), factor, DARK)
-        above.imshow(shown, interpolation="antialiased")
-        seconds, delta_e = colours.seconds, colours.delta_e
-        time = f"{seconds * 1e9:.0f} ns" if seconds < 1e-6 else f"{seconds * 1e6:.1f} µs"
-        above.set_title(f"{colours.name}\n{time} a colour", fontsize="small")
-        error = np.full(pixels.mask.shape, np.nan)
-        error[pixels.mask] = np.where(pixels.share > 0.5, _over(pixels, delta_e[..., None])[:, 0], np.nan)
-        below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
-        mean, largest = (f"{x:.2g}" if x >= 1e-3 else "below 0.001" for x in (delta_e.mean(), delta_e.max()))
-        words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
-        below.set_title(words, fontsize="small")
+        _draw_method(above, below, colours, pixels, factor, scale)
     for axes in panels.flat:
         axes.set(xticks=[], yticks=[])
         axes.set_frame_on(False)
@@ -278,6 +267,24 @@ def draw_methods(
     _describe(figure, title, note)
     save_figure(figure, target, dpi=DPI)
     return maps
+
+
+def _draw_method(
+    above: Axes, below: Axes, colours: ColourMap, pixels: Sphere, factor: float, scale: Normalize
+) -> None:
+    """The ball by one method, its time, and below it the ΔE2000 of each pixel."""
+    linear = np.asarray(linear_srgb(colours.xyz, sensor(*OBSERVER).white))
+    shown = display(pixels.rendering(_over(pixels, linear)), factor, DARK)
+    above.imshow(shown, interpolation="antialiased")
+    seconds, delta_e = colours.seconds, colours.delta_e
+    time = f"{seconds * 1e9:.0f} ns" if seconds < 1e-6 else f"{seconds * 1e6:.1f} µs"
+    above.set_title(f"{colours.name}\n{time} a colour", fontsize="small")
+    error = np.full(pixels.mask.shape, np.nan)
+    error[pixels.mask] = np.where(pixels.share > 0.5, _over(pixels, delta_e[..., None])[:, 0], np.nan)
+    below.imshow(error, norm=scale, cmap="magma_r", interpolation="nearest")
+    mean, largest = (f"{x:.2g}" if x >= 1e-3 else "below 0.001" for x in (delta_e.mean(), delta_e.max()))
+    words = "the reference" if colours.name == EXACT else f"mean {mean}, largest {largest}"
+    below.set_title(words, fontsize="small")
 
 
 def _over(pixels: Sphere, values: np.ndarray) -> np.ndarray:

@@ -246,23 +246,9 @@ def subject_of(
     rows: Any = data
     scenes: Any = scene
     if isinstance(scene, Surface):
-        measurements = measured((BrdfSamples,), data)
-        fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
-        unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
-        rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
-        compared = fit.layer_test.residual if fit.layer_test else ""
-        identity = density.fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
-        assumption = "there is a layer" if unsure else ""
-        with jax.enable_x64(True):
-            return _subject(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
+        return _of_surface(data, scene, tolerance, residual, progress)
     if not joint.of_both_kinds(scene):
-        measurements = measured(OF_A_FILM, data)
-        fit, ranked = spectra.fitted(measurements, scenes, tolerance, progress)
-        with jax.enable_x64(True):
-            targets = spectra.measurements(measurements, scenes)
-            identity = density.fingerprint([arrays(target) for target in targets], tolerance)
-            known = partial(FilmMeasurements, spectra.listed(measurements), targets)
-            return _subject(fit, ranked, known, identity)
+        return _of_film(data, scene, tolerance, progress)
     fit, ranked = joint.fitted(rows, scenes, tolerance, progress, residual=residual)
     with jax.enable_x64(True):
         kinds = joint.apart(rows, scenes)
@@ -270,6 +256,30 @@ def subject_of(
         known = [*map(arrays, targets), *_columns(kinds.samples, kinds.surface)]
         identity = density.fingerprint(known, kinds.surface.model, residual, tolerance)
         return _subject(fit, ranked, partial(joint.together, kinds, targets), identity)
+
+
+def _of_surface(
+    data: Any, scene: Surface, tolerance: float, residual: str | None, progress: Progress
+) -> Subject:
+    measurements = measured((BrdfSamples,), data)
+    fit, ranked = brdf.fitted(measurements, scene, tolerance, progress, residual=residual)
+    unsure = fit.layer_test and not fit.layer_test.layered and fit.status is not Status.AMBIGUOUS
+    rows = [measurements] if isinstance(measurements, BrdfSamples) else measurements
+    compared = fit.layer_test.residual if fit.layer_test else ""
+    identity = density.fingerprint(_columns(rows, scene), scene.model, compared, tolerance)
+    assumption = "there is a layer" if unsure else ""
+    with jax.enable_x64(True):
+        return _subject(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
+
+
+def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> Subject:
+    measurements = measured(OF_A_FILM, data)
+    fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
+    with jax.enable_x64(True):
+        targets = spectra.measurements(measurements, scene)
+        identity = density.fingerprint([arrays(target) for target in targets], tolerance)
+        known = partial(FilmMeasurements, spectra.listed(measurements), targets)
+        return _subject(fit, ranked, known, identity)
 
 
 def _columns(samples: Sequence[BrdfSamples], surface: Surface) -> list[tuple[Any, ...]]:

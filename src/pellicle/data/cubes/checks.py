@@ -147,6 +147,13 @@ def in_nm(
             + (f" and looks like {' or '.join(likely)}" if likely else "")
             + "; state their unit with `wavelength_unit`"
         )
+    _refuse_repeated(nm, path)
+    shown = shown or unit or "nm, assumed"
+    notes = [f"wavelength unit: {shown}" + ("" if shown.startswith("nm") else ", converted to nm")]
+    return nm, notes + ["bands sorted by wavelength"] * bool(np.any(np.diff(nm) < 0))
+
+
+def _refuse_repeated(nm: np.ndarray, path: str) -> None:
     order = np.argsort(nm, kind="stable")
     same = np.flatnonzero(np.diff(nm[order]) <= 1e-9 * nm.max())
     if same.size:
@@ -155,9 +162,6 @@ def in_nm(
             f"{path}: bands {first + 1} and {second + 1} have the same wavelength, {nm[first]:.6g} nm: "
             "correct it, or give `wavelengths`"
         )
-    shown = shown or unit or "nm, assumed"
-    notes = [f"wavelength unit: {shown}" + ("" if shown.startswith("nm") else ", converted to nm")]
-    return nm, notes + ["bands sorted by wavelength"] * bool(np.any(np.diff(nm) < 0))
 
 
 def chosen_bands(
