@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.data.spectrum_rows import Reading, Rows, axis_unit, column_unit
+from pellicle.data.spectrum_rows import Reading, Rows, axis_unit
 from pellicle.data.tabular import column_selection as selection
 from pellicle.data.tabular.columns import (
     COUNTERS,
@@ -18,6 +18,7 @@ from pellicle.data.tabular.columns import (
     Column,
     listed,
     signal_unit,
+    unknown_unit,
 )
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
@@ -293,8 +294,22 @@ def signal_scale(table: Table, chosen: selection.Selection, requested: str | Non
     Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
     unknown and none is requested.
     """
+    asked = None if requested is None else signal_unit(requested)
+    if requested is not None and asked is None:
+        raise UsageError(f"`signal_unit` must be one of {', '.join(SIGNAL_UNITS)}, not {requested!r}")
     [column] = chosen.values
-    unit = column_unit(table, column, requested, "signal_unit", signal_unit, SIGNAL_UNITS)
+    place = f"{table.path}: {table.label(column.position)}"
+    if column.unknown_unit and asked is None:
+        raise DataError(
+            f"{place} {unknown_unit(column)}; state it with "
+            '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
+        )
+    if asked and column.unit and asked != column.unit:
+        raise UsageError(
+            f'{place} is in {column.unit}, which contradicts `signal_unit="{asked}"`; leave that out, or '
+            "rename the columns with `columns`"
+        )
+    unit = column.unit or asked
     sigma_unit = chosen.errors[0].unit if chosen.errors else None
     return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)
 

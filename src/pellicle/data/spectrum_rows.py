@@ -134,35 +134,23 @@ class Rows:
 
 
 def axis_unit(table: Table, column: Column, requested: str | None) -> str | None:
-    """Return the unit of the wavelength column, as `column_unit` does."""
-    return column_unit(table, column, requested, "wavelength_unit", wavelength_unit, WAVELENGTH_UNITS)
+    """Return the unit of the wavelength column from its name or from `requested`; None without either.
 
-
-def column_unit(
-    table: Table,
-    column: Column,
-    requested: str | None,
-    argument: str,
-    named: Callable[[str], str | None],
-    known: Sequence[str],
-) -> str | None:
-    """Return the unit of a column from its name or from `requested`; None without either.
-
-    Raises UsageError if `requested`, which `argument` names, is unknown or contradicts the name, DataError if
-    the name's unit is unknown and none is requested.
+    Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
+    unknown and none is requested.
     """
-    asked = None if requested is None else named(requested)
+    asked = wavelength_unit(requested) if requested is not None else None
     if requested is not None and asked is None:
-        raise UsageError(f"`{argument}` must be one of {', '.join(known)}, not {requested!r}")
-    place = f"{table.path}: {table.label(column.position)}"
+        raise UsageError(f"`wavelength_unit` must be one of {', '.join(WAVELENGTH_UNITS)}, not {requested!r}")
     if column.unknown_unit and asked is None:
         raise DataError(
-            f"{place} {unknown_unit(column)}; convert it or state one of {', '.join(known)} with `{argument}`"
+            f"{table.path}: {table.label(column.position)} {unknown_unit(column)}; "
+            f"convert it or state one of {', '.join(WAVELENGTH_UNITS)} with `wavelength_unit`"
         )
     if asked and column.unit and asked != column.unit:
         raise UsageError(
-            f'{place} is in {column.unit}, which contradicts `{argument}="{asked}"`; leave that out, or '
-            "rename the columns with `columns`"
+            f"{table.path}: {table.label(column.position)} is in {column.unit}, which contradicts "
+            f'`wavelength_unit="{asked}"`; leave that out, or rename the columns with `columns`'
         )
     return column.unit or asked
 
