@@ -142,6 +142,7 @@ def fits(monkeypatch):
         monkeypatch.setattr("pellicle.mapping.run.fit_pixels", fit)
 
     monkeypatch.setattr("pellicle.reporting.map_figures.figures", lambda made, summary: [])
+    monkeypatch.setattr("pellicle.mapping.run.bands_off", lambda model, cube: [])
     fits()
     return fits
 

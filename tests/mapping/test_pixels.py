@@ -14,7 +14,9 @@ from pellicle.fitting.batch.effects import _simulation
 from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.extended_scene import Number, Program
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
-from pellicle.mapping.pixels import fit_pixels, prepare, spectrum
+from pellicle.mapping.pixels import bands_off, fit_pixels, prepare, spectrum
+
+from .. import by_tmm
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
 FREE = pl.Free(0, 1600)
@@ -217,6 +219,21 @@ def test_rivals_are_all_minima_of_the_deviance():
                 assert value == pytest.approx(values[nearest], abs=3.0)
                 assert own == pytest.approx(deviance[nearest], rel=1e-3, abs=0.05)
             assert best.deviance[pixel, 0] == pytest.approx(deviance.min(), abs=1e-6)
+
+
+@pytest.mark.parametrize("gain", [1.0, 1.1])
+def test_bands_that_are_off_at_most_pixels_are_named(gain):
+    """An oxide by tmm, two of whose bands have a wrong gain."""
+    index: Any = pl.material("Si").index(NM)
+    silicon = np.asarray(index.re) + 1j * np.asarray(index.im)
+    each = [by_tmm.films("s", NM, [1.0, 1.46, silicon], [d]) for d in np.linspace(120, 850, 12)]
+    values = np.array(each) + SIGMA * np.random.default_rng(11).normal(size=(12, 100))
+    values[:, [40, 71]] *= gain
+    cube = cube_of(values)
+    told = bands_off(prepare(cube, OXIDE), cube)
+    assert bool(told) == (gain != 1)
+    if told:
+        assert f"--without-bands {NM[40]:.6g},{NM[71]:.6g}" in told[0]
 
 
 def test_a_cube_without_data_is_refused(refuses):

@@ -122,7 +122,7 @@ class Remaining(NamedTuple):
     `typical` is their size in the unit of the data, of most points, and `ratio` that to the noise of
     neighbouring points; `rms` is their root mean square in the unit of the data, outliers aside, and
     `weighted` in units of the σ of the points. `variance` is the factor on σ² that stands for them and for
-    their correlation.
+    their correlation. `far` (..., rows, channels) are the signs of those that count less, else 0.
     """
 
     ratio: Any
@@ -130,6 +130,7 @@ class Remaining(NamedTuple):
     rms: Any
     weighted: Any
     variance: Any
+    far: Any = 0
 
 
 class Contribution(NamedTuple):
@@ -498,7 +499,8 @@ def _remaining(view: Evidence, balance: ViewBalance) -> tuple[Remaining, np.ndar
         np.max([np.sqrt(np.mean((root * x[..., own]) ** 2, axis=(1, 2))) for own, root in roots], axis=0)
         for x in (left, balance.rest)
     )
-    return Remaining(typical / noise, typical, rms, weighted, balance.variance), noise
+    far = np.sign(balance.rest) * (balance.roots < 1).reshape(balance.rest.shape)
+    return Remaining(typical / noise, typical, rms, weighted, balance.variance, far), noise
 
 
 def _raised(view: Evidence, balance: ViewBalance) -> np.ndarray:

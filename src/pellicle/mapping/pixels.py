@@ -21,6 +21,9 @@ from pellicle.scene.film import Scene
 
 _SAMPLE = 9
 """Pixels that show how large the values and their errors are."""
+_FEWEST, _MOST, _SHARE = 3, 0.6, 0.1
+"""Pixels that show which bands are off, the share of them that must agree, and the largest share of bands
+that is no misfit of the scene."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,24 @@ def _sample(cube: Cube) -> dict[str, np.ndarray]:
         if len(order):
             return {name: values[order] for name, values in sample.items()}
     raise DataError(f"{cube.path or 'cube'}: no pixel has data")
+
+
+def bands_off(model: PixelModel, cube: Cube) -> list[str]:
+    """A sentence on the few bands that are off to one side at most pixels of a sample, with the remedy."""
+    with jax.enable_x64(True):
+        data = batch_data(_sample(cube), model.problem.views[0].noise)
+        far = model.errors.far(data, minima(model.search, data))
+    sides = np.maximum(np.sum(far > 0, axis=0), np.sum(far < 0, axis=0))
+    known = np.sum(np.isfinite(far), axis=0)
+    off = (known >= _FEWEST) & (sides > _MOST * known)
+    bands = cube.wavelength[off.reshape(cube.wavelength.size, -1).any(axis=1)]
+    if not 0 < bands.size <= _SHARE * cube.wavelength.size:
+        return []
+    names = ",".join(f"{nm:.6g}" for nm in bands)
+    return [
+        f"bands at {names} nm are off to one side at most of {len(far)} pixels tried, by more than noise and"
+        f" usual errors: if the instrument is wrong there, leave them out with --without-bands {names}"
+    ]
 
 
 def _complete(values: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
 from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of
 from pellicle.mapping.map_result import Map, Run
-from pellicle.mapping.pixels import PixelModel, fit_pixels, prepare
+from pellicle.mapping.pixels import PixelModel, bands_off, fit_pixels, prepare
 from pellicle.mapping.store import BYTES, FORMAT, begin, held
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
@@ -118,10 +118,14 @@ def run_map(
     began = time.monotonic()
     model = prepare(cube, scene)
     about, who = attributes(cube, model, recipe, preview), identity(cube, scene)
+    tried = time.monotonic()
+    if fit is None and (overwrite or not Path(path).exists()):
+        about["notes"] += bands_off(model, cube)
+    tried = time.monotonic() - tried  # nearly all of it compilation
     store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
     with held(store.path):
         run = _fit_blocks(Job(model, cube, store, fit or fit_pixels), workers, scheduler, progress)
-    return Map(path, run._replace(seconds=time.monotonic() - began))
+    return Map(path, run._replace(seconds=time.monotonic() - began, compiling=run.compiling + tried))
 
 
 def _fit_blocks(job: Job, workers: int | None, scheduler: str | None, progress: Progress) -> Run:

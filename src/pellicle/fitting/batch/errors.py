@@ -127,6 +127,18 @@ class BatchErrors:
         delta = np.maximum(result.delta_chi2[rows, order], 0.0)
         return result._replace(minima=result.minima[rows, order], delta_chi2=delta)
 
+    def far(self, data: BatchData, minima: BatchMinima) -> np.ndarray:
+        """Signs (spectra, rows, channels) of residuals that are outliers of their spectrum with the effects
+        allowed for, else 0; NaN where nothing was measured."""
+        result = np.full((len(data.values), self.view.rows, self.view.channels), np.nan)
+        for group in groups(self.view, data.weight, np.isfinite(minima.deviance[:, 0])):
+            _, ranked, jacobian, evidence = self._linear(data, minima, group)
+            units = ranked.minima.units[:, 0]
+            [left] = discrepancy([evidence], jacobian, units, contributions=False).remaining
+            rows = np.arange(self.view.rows)[None] if group.rows is None else group.rows
+            result[group.spectra[:, None], rows, : left.far.shape[-1]] = left.far
+        return result
+
     def _fits(self, data: BatchData, minima: BatchMinima, group: Group) -> BatchFits:
         """Fits of a group; the first minimum of a spectrum is its answer, even if another is better."""
         linear = whole, ranked, jacobian, evidence = self._linear(data, minima, group)
