@@ -19,7 +19,7 @@ def row(name, size, unit, explains, alone, change=1.0, **more):
 
 
 def found(*rows):
-    return Discrepancy(Errors(("A", "thickness"), np.eye(2)), np.zeros(2), (), rows, False, (1.0,), 1.0)
+    return Discrepancy(Errors(("A", "thickness"), np.eye(2)), np.zeros(2), (), rows, False, 1.0, ())
 
 
 OXIDE = row("native oxide", 1.0, "nm", 0.55, 2.4)

@@ -51,6 +51,6 @@ LAMP = Accuracy(weighted=0.6)
 )
 def test_what_is_a_misfit(rows, remaining, accuracy, expected):
     errors, left = Errors(("d",), np.eye(1)), Remaining(*remaining, 1.0)
-    found = Discrepancy(errors, NOTHING, (), tuple(rows), False, (1.0,), 1.0)
+    found = Discrepancy(errors, NOTHING, (), tuple(rows), False, 1.0, ())
     assert bool(misfit(found, left, accuracy)) is expected
     assert misfit(dataclasses.replace(found, implausible=True), left, accuracy)
