@@ -60,8 +60,8 @@ def test_the_status_is_that_of_the_thickness(before, resting, other, left, after
 
 def test_each_thickness_is_followed_once_and_every_curve_of_a_given_one():
     above, thickness = np.array([3.0, 1.0, 2.0, 9.0]), np.array([100.0, 103.0, 200.0, 50.0])
-    assert apart(above, thickness) == [1, 2, 3]
-    assert apart(above, np.full(4, np.nan)) == [1, 2, 0, 3]
+    assert apart(above, thickness).tolist() == [1, 2, 3]
+    assert apart(above, np.full(4, np.nan)).tolist() == [1, 2, 0, 3]
 
 
 @pytest.fixture(scope="module")

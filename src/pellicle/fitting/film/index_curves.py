@@ -99,8 +99,8 @@ class IndexCurves(NamedTuple):
         apart = {name for rival in rivals for name in apart_from(parameters, rival)}
         binding = [p for p in parameters.values() if p.binding]
         bound = bool(binding) and all(p.default_bounds and p.name in self.medium for p in binding)
-        judged = status in (Status.CONVERGED, Status.AMBIGUOUS)
-        judged = judged or (status is Status.MISFIT and self.left < _EXPLAINED)
+        formula = [Status.MISFIT] if self.left < _EXPLAINED else []
+        judged = status in (Status.CONVERGED, Status.AMBIGUOUS, *formula)
         if (judged or (bound and status is Status.AT_BOUND)) and apart <= self.medium | {self.depth}:
             status = Status.AMBIGUOUS if not known else Status.CONVERGED if judged else status
         return before._replace(parameters=parameters, status=status)
@@ -155,9 +155,7 @@ class _Fits(NamedTuple):
         at = values[:, names.index(self.depth)] if self.depth in names else np.full(len(curves), math.nan)
         return deviance - self.ranked.minima.deviance[0], np.full(len(curves), further), at, curves
 
-    def at_thicknesses(
-        self, problem: Problem, medium: Any, starts: np.ndarray, near: bool = False
-    ) -> tuple[Any, ...]:
+    def at_thicknesses(self, problem: Problem, medium: Any, starts: np.ndarray, near: bool = False) -> Any:
         """Fits from each start, described so: at all or `near` thicknesses, and from the best of these."""
         lower, span = problem.box.lower, problem.box.upper - problem.box.lower
         axis = next((i for i, p in enumerate(problem.parameters) if p.name == self.depth), None)
@@ -179,12 +177,8 @@ class _Fits(NamedTuple):
         return self.described(problem, medium, np.append(found.deviance, again.deviance), both)
 
     def of_spline(
-        self,
-        knots: int,
-        guesses: Sequence[np.ndarray],
-        depths: np.ndarray | None = None,
-        related: bool = True,
-    ) -> tuple[Any, ...]:
+        self, knots: int, guesses: Sequence[np.ndarray], depths: Any = None, related: Any = True
+    ) -> Any:
         """Fits of a spline with all numbers free, described so, from curves near to `guesses`, at all
         thicknesses or near those of the guesses, `depths`; of n and k that are not `related` by Kramers and
         Kronig too."""
@@ -195,9 +189,8 @@ class _Fits(NamedTuple):
         upper = [_LARGEST[0]] * knots + ([*_LARGEST[1:]] if related else [_LARGEST[0]] * knots)
 
         def build(x: Sequence[Any]) -> Any:
-            if related:
-                return KramersKronigSpline(sites, x[:knots], *x[knots:])
-            return Spline(sites, x[:knots], x[knots:])
+            a, b = x[:knots], x[knots:]
+            return KramersKronigSpline(sites, a, *b) if related else Spline(sites, a, b)
 
         curves = [_complex(build(x.tolist()), self.nm).ravel() for x in np.eye(len(upper))]
         spline, before = build([Free(0.0, x) for x in upper]), self.ranked.problem
@@ -258,15 +251,11 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     return IndexCurves(*about, nm, depth, names - others, left)
 
 
-def apart(above: np.ndarray, thickness: np.ndarray) -> list[int]:
-    """Positions of the best fits by χ², those of one thickness once."""
-    chosen: list[int] = []
-    for i in np.argsort(above).tolist():
-        if len(chosen) < _FOLLOWED and not any(
-            abs(np.log(thickness[i] / thickness[j])) < _NEAR[-1] - 1 for j in chosen
-        ):
-            chosen.append(i)
-    return chosen
+def apart(above: np.ndarray, thickness: np.ndarray) -> np.ndarray:
+    """Positions of the best fits by χ², those of about one thickness once."""
+    order = np.argsort(above)
+    _, first = np.unique(np.round(10 * np.log(thickness[order])), return_index=True, equal_nan=False)
+    return order[np.sort(first)[:_FOLLOWED]]
 
 
 def _complex(medium: Any, nm: np.ndarray) -> np.ndarray:
