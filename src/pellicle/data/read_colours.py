@@ -186,14 +186,13 @@ def _photograph_colours(
         raise UsageError(f"{photograph.path}: is a photograph of {width} by {height} pixels: give {either}")
     squares = None if points is None else photographs.parse_points(points, photograph)
     regions = squares or photographs.parse_regions(region or "")
-    photograph, *notes = flattened(photograph, seen.coding, flat_field)
-    reference, *shown = white_reference(photograph, seen.coding, white)
+    photograph, reference, notes = against_white(photograph, seen.coding, white, flat_field)
     angles = None if angle is None else np.asarray(angle, float)
     if angles is not None and angles.ndim and len(angles) != len(regions):
         raise UsageError(
             f"{len(angles)} angles are given for {len(regions)} regions of the photograph: give one for each"
         )
-    told = [*photograph.notes, *notes, *shown]
+    told = [*photograph.notes, *notes]
     if assumed and photograph.floats:
         told.append('floating-point values taken as coded in sRGB: give `space="rgb"` if they are linear')
     told += [f"colour profile {photograph.profile} ignored"] if photograph.profile else []
@@ -232,7 +231,20 @@ def check_photograph(photograph: photographs.Photograph, space: str | None) -> s
     return space or "srgb"
 
 
-def flattened(
+def against_white(
+    photograph: photographs.Photograph,
+    coding: Encoding,
+    white: Pixels | None,
+    flat_field: str | os.PathLike[str] | None,
+) -> tuple[photographs.Photograph, np.ndarray, list[str]]:
+    """The photograph without the uneven light of a flat field, the linear channels (3,) of the region `white`
+    in it, and notes."""
+    photograph, *notes = _flattened(photograph, coding, flat_field)
+    reference, *shown = _white_reference(photograph, coding, white)
+    return photograph, reference, [*notes, *shown]
+
+
+def _flattened(
     photograph: photographs.Photograph, coding: Encoding, flat_field: str | os.PathLike[str] | None
 ) -> tuple[Any, ...]:
     """The photograph divided by one of an evenly white surface in linear light, and a note; itself without.
@@ -252,7 +264,7 @@ def flattened(
     return replace(photograph, pixels=pixels.astype(np.float32)), f"divided by the flat field {flat.path}"
 
 
-def white_reference(
+def _white_reference(
     photograph: photographs.Photograph, coding: Encoding, white: Pixels | None
 ) -> tuple[Any, ...]:
     """Linear channels (3,) of the region `white` and a note, 1 without one. Raises UsageError if clipped."""

@@ -12,7 +12,7 @@ from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
 from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph
 from pellicle.data.photographs import strip as strip_of
-from pellicle.data.read_colours import check_photograph, flattened, white_reference
+from pellicle.data.read_colours import against_white, check_photograph
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.scene.film import Scene
@@ -83,14 +83,13 @@ def map_photograph(
     paths = [None if path is None else os.fspath(path) for path in (lamp, sensitivities)]
     transmitted = scene.light.signal == "T"
     seen = sight(Camera(observer, illuminant, *paths, gamma=gamma, transmitted=transmitted), space)
-    photograph, *notes = flattened(photograph, seen.coding, flat_field)
-    reference, *shown = white_reference(photograph, seen.coding, white)
+    photograph, reference, notes = against_white(photograph, seen.coding, white, flat_field)
     linear, position, where, note = _chosen(photograph, seen, strip, region)
     exposed = linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise
-    told = [*photograph.notes, *seen.notes, *notes, *shown, note, f"noise {sigma:.2g} of each channel"]
+    told = [*photograph.notes, *seen.notes, *notes, note, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
         told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
     spread = np.full(3, sigma)
@@ -103,12 +102,7 @@ def map_photograph(
         films, decided = _by_neighbours(films)
         told.append(decided)
     about = where, space, tuple(told), photograph.path, photograph.sha256
-    # coded colours of the most probable thicknesses, at their exposures
-    best, exposure = films.thickness[..., 0], films.exposure[..., 0]
-    channels = [np.interp(best, inverse.thickness, column) for column in inverse.channels[:, 0].T]
-    fitted = np.stack(channels, axis=-1) * exposure[..., None]
-    fitted = seen.coding.encode(fitted, seen.coding.roots(fitted))
-    return ThicknessMap(coded, fitted, films, position, *about)
+    return ThicknessMap(coded, _fitted(films, inverse, seen), films, position, *about)
 
 
 def _chosen(
@@ -130,6 +124,14 @@ def _chosen(
         raise UsageError("`region` of a map must be one rectangle")
     pixels = box.pixels(photograph).reshape(box.height, box.width, 3)
     return seen.coding.decoded(pixels), None, str(box), f"region {box}: {box.width * box.height} pixels"
+
+
+def _fitted(films: ColourThickness, inverse: ColourInverse, seen: Sight) -> np.ndarray:
+    """Coded colours (..., 3) of the most probable thicknesses, at their exposures."""
+    best, exposure = films.thickness[..., 0], films.exposure[..., 0]
+    channels = [np.interp(best, inverse.thickness, column) for column in inverse.channels[:, 0].T]
+    fitted = np.stack(channels, axis=-1) * exposure[..., None]
+    return seen.coding.encode(fitted, seen.coding.roots(fitted))
 
 
 def _by_neighbours(films: ColourThickness) -> tuple[ColourThickness, str]:
@@ -156,10 +158,11 @@ def _by_neighbours(films: ColourThickness) -> tuple[ColourThickness, str]:
     first = np.asarray(made["thickness"])[..., None]
     # the chosen order, then the others as they were
     order = np.argsort(films.thickness != first, axis=-1, kind="stable")
-    *columns, status = films
-    columns = [np.take_along_axis(column, order, axis=-1) for column in columns]
-    status = np.where(np.asarray(made["status"]) == CODES[BY_NEIGHBOURS], BY_NEIGHBOURS, status)
-    return ColourThickness(*columns, status), str(evidence(made))
+    columns = {
+        name: np.take_along_axis(x, order, axis=-1) for name, x in films._asdict().items() if name != "status"
+    }
+    status = np.where(np.asarray(made["status"]) == CODES[BY_NEIGHBOURS], BY_NEIGHBOURS, films.status)
+    return films._replace(**columns, status=status), str(evidence(made))
 
 
 def _inverse(

@@ -4,7 +4,7 @@ A unit, a reflectance relative to a wafer, an angle of incidence, a substrate or
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -132,66 +132,60 @@ def of_media(targets: list[Measured], depth: int | None) -> list[Mistake]:
 
 def of_structure(targets: list[Measured]) -> list[Mistake]:
     """Mistakes whose fits take a program of their own: back faces, widths, layers beneath and their order."""
-    scene = targets[0].scene
-    instrument, substrate, first, rows = scene.instrument, scene.substrate, scene.layers[0], []
-    power = all(target.signal.has_scale for target in targets)
-
-    def row(words: str, remedy: str, change: Callable[[Scene], Scene], *effects: str, key: str = "") -> None:
-        rows.append(Mistake(words, remedy, effects, _scene(change), key=key))
-
-    def width(key: str, words: str, most: float) -> None:
-        free = {key: Free(0, most, start=most / 10)}
-        remedy = f"set `{key} = {{{{ lower = 0, upper = {most:g} }}}}` under `[instrument]`"
-        row(
-            f"a {words} of {{:.3g}} nm",
-            remedy,
-            lambda s: replace(s, instrument=replace(s.instrument, **free)),
-            words,
-            key=key,
-        )
-
-    k = imag(known_index(substrate.material, np.asarray(targets[0].wavelength)))
-    if power and substrate.back is not None and substrate.back_collected is None:
-        shared = replace(substrate, back_collected=Free(0, 1))
-        words, remedy = (
-            "a share of {:.2g} of the light from the back face",
-            "give `back_collected=Free(0, 1)`",
-        )
-        row(words, remedy, lambda s: replace(s, substrate=shared), "offset", "scale", key="back_collected")
-    elif power and np.median(k) < _CLEAR:
-        plate = Substrate(substrate.material, back="air")
-        row("a back face", 'give `back="air"`', lambda s: replace(s, substrate=plate), "offset", "scale")
-    if instrument.thickness_spread is None and len(scene.layers) == 1:
-        width("thickness_spread", "thickness spread", 150.0)
-    if instrument.bandwidth is None:
-        width("bandwidth", "bandwidth", 40.0)
+    scene, power = targets[0].scene, all(target.signal.has_scale for target in targets)
+    first: Any = scene.layers[0]
+    k = imag(known_index(scene.substrate.material, np.asarray(targets[0].wavelength)))
+    rows = [*_back_face(scene.substrate, bool(np.median(k) < _CLEAR))] if power else []
+    if scene.instrument.thickness_spread is None and len(scene.layers) == 1:
+        rows.append(_width("thickness_spread", 150.0))
+    if scene.instrument.bandwidth is None:
+        rows.append(_width("bandwidth", 40.0))
     if len(scene.layers) > 1:
-        row(
-            "layers in the opposite order",
-            "swap them",
-            lambda s: replace(s, layers=s.layers[::-1]),
-            "index of layer",
-        )
+        swapped = _scene(lambda s: replace(s, layers=s.layers[::-1]))
+        rows.append(Mistake("layers in the opposite order", "swap them", ("index of layer",), swapped))
     if isinstance(first, Layer) and first.roughness is None:
-        rough, remedy = Free(0, 30, start=3), "set `roughness = {{ lower = 0, upper = 30 }}` of the layer"
-        words, key, change = (
-            "a roughness of {:.3g} nm",
-            "roughness",
-            lambda s: _with_layer(s, 0, roughness=rough),
-        )
-        if not power:  # less light, by which a roughness shows in R and T, changes no ratio
-            zone = Interface(Free(0, 60, start=5), name="rough")
-            words, key, change = (
-                "{:.3g} nm of rough surface",
-                "rough.thickness",
-                lambda s: replace(s, layers=(zone, *s.layers)),
-            )
-            remedy = 'add a `[[scene.layer]]` on top, with `between = "bruggeman"`'
-        row(words, remedy, change, "roughness", "overlayer", key=key)
+        rows.append(_rough(power))
     oxide, remedy = Layer("SiO2", Free(0, 300), "oxide"), "add a `[[scene.layer]]` of SiO2"
+    below = _scene(lambda s: replace(s, layers=(*s.layers, oxide)))
     words = "{:.3g} nm of SiO2 under the layer"
-    row(words, remedy, lambda s: replace(s, layers=(*s.layers, oxide)), "native oxide", key="oxide.thickness")
-    return rows
+    return [*rows, Mistake(words, remedy, ("native oxide",), below, key="oxide.thickness")]
+
+
+def _back_face(substrate: Substrate, clear: bool) -> Iterator[Mistake]:
+    """Light from the lower face of a substrate: all of it, where it is clear, or another share."""
+
+    def with_plate(plate: Substrate) -> Callable[[Measured, Any], Measured]:
+        return _scene(lambda s: replace(s, substrate=plate))
+
+    effects = "offset", "scale"
+    if substrate.back is not None and substrate.back_collected is None:
+        shared = with_plate(replace(substrate, back_collected=Free(0, 1)))
+        words = "a share of {:.2g} of the light from the back face"
+        yield Mistake(words, "give `back_collected=Free(0, 1)`", effects, shared, key="back_collected")
+    elif clear:
+        plate = with_plate(Substrate(substrate.material, back="air"))
+        yield Mistake("a back face", 'give `back="air"`', effects, plate)
+
+
+def _width(key: str, most: float) -> Mistake:
+    """A width of the instrument or of the spot that is free up to `most` nm."""
+    free, words = {key: Free(0, most, start=most / 10)}, key.replace("_", " ")
+    remedy = f"set `{key} = {{{{ lower = 0, upper = {most:g} }}}}` under `[instrument]`"
+    change = _scene(lambda s: replace(s, instrument=replace(s.instrument, **free)))
+    return Mistake(f"a {words} of {{:.3g}} nm", remedy, (words,), change, key=key)
+
+
+def _rough(power: bool) -> Mistake:
+    """A rough upper face: less light in R and T; no ratio changes by that, but by a zone of film and air."""
+    effects = "roughness", "overlayer"
+    if power:
+        change = _scene(lambda s: _with_layer(s, 0, roughness=Free(0, 30, start=3)))
+        remedy = "set `roughness = {{ lower = 0, upper = 30 }}` of the layer"
+        return Mistake("a roughness of {:.3g} nm", remedy, effects, change, key="roughness")
+    zone = Interface(Free(0, 60, start=5), name="rough")
+    change = _scene(lambda s: replace(s, layers=(zone, *s.layers)))
+    remedy = 'add a `[[scene.layer]]` on top, with `between = "bruggeman"`'
+    return Mistake("{:.3g} nm of rough surface", remedy, effects, change, key="rough.thickness")
 
 
 def _scene(change: Callable[[Scene], Scene]) -> Callable[[Measured, Any], Measured]:

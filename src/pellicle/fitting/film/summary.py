@@ -1,7 +1,7 @@
 """Summary of a fit of spectra: scan profile, drift limits, opaque layers, warnings."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.curves import Curve
 from pellicle.fitting.discrepancy import Discrepancy, Evidence
 from pellicle.fitting.film import fringes, parts, residual_structure
+from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.evidence import evidence
 from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
@@ -23,7 +24,7 @@ from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.noise import local_noise, spread, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
-from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene
@@ -191,45 +192,47 @@ def warnings(films: FilmMeasurements, unclear: Sequence[str]) -> tuple[str, ...]
     messages += fringes.disagreement(ranked.problem, films.silent, ranked.values)
     views = zip(spectra, ranked.problem.views, ranked.fits, films.structures, strict=True)
     for spectrum, view, fit, structure in views:
-        scene, length, own = spectrum.scene, fit.length, f"{view.name}: " if view.name else ""
-        orders = view.plan.row("orders")
-        if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
-            messages.append(
-                f"{own}{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
-            )
-        if length >= 10:
-            messages.append(
-                f"{own}residuals are correlated over {length:.0f} points: {view.rows} points"
-                f" count as {view.rows / length:.0f}"
-            )
-        if structure is not None:
-            messages.append(f"{own}the model misses structure {structure.words}")
-        if words := residual_structure.uneven(view, fit):
-            messages.append(own + words)
-        spectral = isinstance(view, SpectrumView)
-        step = float(view.rounding) if spectral else 0.0
-        if spectral and step > _ROUNDED * view.rms(fit.at.model):
-            messages.append(
-                f"{own}the values are rounded to {step * math.sqrt(12):.1g}, and {step:.2g} of the noise is"
-                " that: export more digits"
-            )
-        white = spectral and view.noise.given and length < _WHITE and structure is None
-        if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
-            messages.append(
-                f"{own}residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is"
-                f" too {'small' if ratio > 1 else 'large'}, and errors by the noise with it"
-            )
-        if fit.outliers:
-            messages.append(
-                f"{own}{fit.outliers} of {view.rows} points are outliers that count for less than half"
-            )
-        if scene.light.signal == "T" and scene.substrate.back is None:
+        own = f"{view.name}: " if view.name else ""
+        messages += [own + sentence for sentence in _on_the_data(view, fit, structure)]
+        if spectrum.scene.light.signal == "T" and spectrum.scene.substrate.back is None:
             messages.append(
                 f"{own}transmittance into the substrate, as if the detector were inside it; "
                 '`back="air"` makes it a plate'
             )
     messages += _added_to_an_index(spectra[0].scene, ranked)
     return tuple(dict.fromkeys([*messages, *unclear]))
+
+
+def _on_the_data(
+    view: SpectrumView | ColoursView, fit: ViewFit, structure: residual_structure.Missed | None
+) -> Iterator[str]:
+    """Sentences on the residuals of one view, their noise and their `structure`."""
+    length, orders = fit.length, view.plan.row("orders")
+    if orders.on and orders.error_bound > max(1e-4, view.plan.tolerance):
+        yield f"{orders.count} orders leave an error of up to {orders.error_bound:.1g}: |q| is near 1"
+    if length >= 10:
+        yield (
+            f"residuals are correlated over {length:.0f} points: {view.rows} points count as"
+            f" {view.rows / length:.0f}"
+        )
+    if structure is not None:
+        yield f"the model misses structure {structure.words}"
+    if words := residual_structure.uneven(view, fit):
+        yield words
+    step = float(view.rounding) if isinstance(view, SpectrumView) else 0.0
+    if step > _ROUNDED * view.rms(fit.at.model):
+        yield (
+            f"the values are rounded to {step * math.sqrt(12):.1g}, and {step:.2g} of the noise is that:"
+            " export more digits"
+        )
+    white = isinstance(view, SpectrumView) and view.noise.given and length < _WHITE and structure is None
+    if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
+        yield (
+            f"residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is too"
+            f" {'small' if ratio > 1 else 'large'}, and errors by the noise with it"
+        )
+    if fit.outliers:
+        yield f"{fit.outliers} of {view.rows} points are outliers that count for less than half"
 
 
 def spikes(ranked: RankedMinima) -> str:
