@@ -3,8 +3,9 @@
 One spectrum seldom determines n, k and a thickness, and the formula chosen for the index decides what its own
 errors cannot show. Splines of k with the n of Kramers and Kronig are fitted too, from several starts and at
 many thicknesses; and splines of n and k without that relation where none of these explains the data. Those
-that explain them about as well, where each further number must lower χ² by one, and the fitted formula at
-other thicknesses, enlarge the errors of n, k and the thickness.
+that explain them about as well, where each further number must lower χ² by one, by ln N beside a formula that
+reaches the noise of N values, and the fitted formula at other thicknesses, enlarge the errors of n, k and the
+thickness.
 """
 
 import math
@@ -234,7 +235,8 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     deviance = float(ranked.minima.deviance[0])
     left = ranked.chi2_reduced * (1 + min(x[0].min() for x in found) / deviance)
     # measured n and k obey Kramers and Kronig as well as they are measured
-    if left > _EXPLAINED and sum(view.rows * view.measured_channels for view in old.views) >= 2 * nm.size:
+    points = sum(view.rows * view.measured_channels for view in old.views)
+    if left > _EXPLAINED and points >= 2 * nm.size:
         found.append(fits.of_spline(_KNOTS[0], guesses, None, False))
         left = min(left, ranked.chi2_reduced * (1 + found[-1][0].min() / deviance))
     above, further, thickness, curves = (np.concatenate(x) for x in zip(*found, strict=True))
@@ -244,7 +246,11 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
         share *= sum(fit.chi2 for fit in ranked.fits) / deviance
     else:
         share = min(float(judged.best.discrepancy.evidence_share), share)
-    above = share / student(ranked.freedom, RIVAL) ** 2 * above + further
+    # few numbers that reach a stated σ do so seldom by chance: a number then costs what it does in the BIC
+    reached = math.isfinite(left) and ranked.chi2_reduced < 1 + 2 * math.sqrt(2 / points)
+    cost = math.log(points) if reached else 1.0
+    above = share / student(ranked.freedom, RIVAL) ** 2 * above + cost * further
+    above[1:][np.min(curves[1:, 0], axis=1) <= 0] = math.inf  # no layer has such an n
     close = above - above.min() < RIVAL
     close[0] = True
     about = above[close] - above.min(), thickness[close], curves[close]

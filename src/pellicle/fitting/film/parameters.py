@@ -69,7 +69,8 @@ _DRUDE = {"eps_inf": 6, "Ep": 7}
 Found of 14 simulated spectra of transparent conductors, 0.8 to 2.3 eV: 12 with 3 even levels, 14 with
 these."""
 _RESONANCE = {"E0": 7}
-"""Levels of the energy of the only resonance, by decades: n and k on its two sides differ. Found of 20 films
+"""Levels of the energy of the only resonance, by decades: n and k on its two sides differ, more than where an
+absorption edge goes with it. Found of 20 films
 of `benchmarks/dispersion_models.py` with a gaussian one: 19 with 3 even levels, 20 with these."""
 
 
@@ -122,7 +123,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
     drude = any(isinstance(x, Drude) for x in [location.owner, *getattr(location.owner, "terms", ())])
     resonances = sum(getattr(steps[-1], "name", "") == "E0" for steps, _ in free_leaves(scene))
-    levels = (_DRUDE if drude else _RESONANCE if resonances == 1 else {}).get(key, _FEW)
+    sole = resonances == 1 and issubclass(owner, Lorentz | Gaussian)
+    levels = (_DRUDE if drude else _RESONANCE if sole else {}).get(key, _FEW)
     return Parameter(
         name=full,
         key=key,

@@ -219,13 +219,13 @@ def _on_the_data(
         yield f"the model misses structure {structure.words}"
     if words := residual_structure.uneven(view, fit):
         yield words
-    step = float(view.rounding) if isinstance(view, SpectrumView) else 0.0
-    if step > _ROUNDED * view.rms(fit.at.model):
+    spectral = isinstance(view, SpectrumView)
+    if spectral and (step := float(view.rounding)) > _ROUNDED * view.rms(fit.at.model):
         yield (
             f"the values are rounded to {step * math.sqrt(12):.1g}, and {step:.2g} of the noise is that:"
             " export more digits"
         )
-    white = isinstance(view, SpectrumView) and view.noise.given and length < _WHITE and structure is None
+    white = spectral and view.noise.given and length < _WHITE and structure is None
     if white and not 1 / _OFF < (ratio := fit.chi2 / fit.freedom) < _OFF:
         yield (
             f"residuals are white noise of {math.sqrt(ratio):.2g} times the σ that is given: that is too"
