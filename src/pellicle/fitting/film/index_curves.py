@@ -48,8 +48,9 @@ over `_FRINGE` together, up to so many of them: steps of a third alone missed 21
 _POLISHED, _FOLLOWED = 16, 6
 """Best of the fits at given thicknesses that are fitted on with a free one, and thicknesses at which a spline
 of more knots follows."""
-_EXPLAINED = 1.5
-"""Reduced χ², by a given σ, up to which a curve explains the data."""
+_EXPLAINED, _WHITE = 1.5, 2.0
+"""Reduced χ², by a given σ, up to which a curve explains the data; number of neighbouring points that count
+as one below which residuals are white."""
 
 
 class IndexCurves(NamedTuple):
@@ -246,8 +247,9 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
         share *= sum(fit.chi2 for fit in ranked.fits) / deviance
     else:
         share = min(float(judged.best.discrepancy.evidence_share), share)
-    # few numbers that reach a stated σ do so seldom by chance: a number then costs what it does in the BIC
-    reached = math.isfinite(left) and ranked.chi2_reduced < 1 + 2 * math.sqrt(2 / points)
+    # few numbers that leave only noise do so seldom by chance: a number then costs what it does in the BIC
+    white = math.isinf(left) and all(fit.length < _WHITE for fit in ranked.fits)
+    reached = white or (math.isfinite(left) and ranked.chi2_reduced < 1 + 2 * math.sqrt(2 / points))
     cost = math.log(points) if reached else 1.0
     above = share / student(ranked.freedom, RIVAL) ** 2 * above + cost * further
     above[1:][np.min(curves[1:, 0], axis=1) <= 0] = math.inf  # no layer has such an n
