@@ -199,8 +199,9 @@ class JointMeasurements(NamedTuple):
     def missed(self, parts: tuple[Part, ...], discrepancy: Discrepancy) -> list[Part]:
         """The parts that are not explained."""
         count = len(self.films.targets)
-        of_films = replace(discrepancy, remaining=discrepancy.remaining[:count])
-        return [*self.films.missed(parts[:count], of_films), *self.samples.missed(parts[count:], discrepancy)]
+        each = discrepancy.remaining
+        films, samples = (replace(discrepancy, remaining=own) for own in (each[:count], each[count:]))
+        return [*self.films.missed(parts[:count], films), *self.samples.missed(parts[count:], samples)]
 
     def fixed(self) -> list[Estimate]:
         """Fixed numbers of the scenes and of the surface."""

@@ -78,7 +78,7 @@ def marginal(
     slope = stretch[:, :count, :count]
     area = np.linalg.slogdet(slope)[1]  # none in the middle of a disc of directions
     log_share = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1] + np.where(area > -np.inf, area, 0.0)
-    stderr = np.sqrt(np.einsum("pij,pjk,pik->pi", slope, covariance, slope))
+    stderr = np.sqrt(np.maximum(np.einsum("pij,pjk,pik->pi", slope, covariance, slope), 0.0))
     return Marginal(*(system.led(x) for x in (deviance, log_share, stderr)))
 
 
