@@ -32,8 +32,8 @@ import pellicle as pl  # noqa: E402
 from pellicle.fitting.conclusion import linearised, neighbourhood  # noqa: E402
 from pellicle.fitting.film.fit import fitted  # noqa: E402
 from pellicle.fitting.film.parameters import parameters  # noqa: E402
-from pellicle.fitting.problem import quiet  # noqa: E402
 from pellicle.fitting.profile_likelihood import interval  # noqa: E402
+from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.scene.free import insert  # noqa: E402
 from pellicle.scene.instrument import Drift  # noqa: E402
 from pellicle.simulation.spectra import simulate_signal  # noqa: E402

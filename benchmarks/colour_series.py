@@ -29,7 +29,7 @@ from pellicle.colour import FilmColourTable, invert, lab
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import reflectance
 from pellicle.colour.observers import observer_sensor
-from pellicle.dispersion.empirical import known_index
+from pellicle.dispersion.base import known_index
 from pellicle.optics.pair import to_complex
 
 HERE = Path(__file__).resolve().parent

@@ -22,7 +22,7 @@ import numpy as np
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.colour.spaces import SRGB_WHITE, TO_SRGB, adaptation
-from pellicle.rendering.formula import appearance
+from pellicle.rendering.appearance import appearance
 from pellicle.rendering.mitsuba import ALPHA
 
 sys.path.pop(0)  # where colour.py is not colour-science

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from pellicle.brdf.lobes import directional_albedo
+from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.models import model
 
 WAVELENGTHS = (645.0, 525.0, 445.0)

@@ -24,7 +24,7 @@ jax.config.update("jax_enable_x64", True)
 import pellicle as pl  # noqa: E402
 from pellicle.dispersion import Constant  # noqa: E402
 from pellicle.fitting.film.fit import fitted  # noqa: E402
-from pellicle.fitting.problem import quiet  # noqa: E402
+from pellicle.fitting.progress import quiet  # noqa: E402
 from pellicle.sampling.chain import empty  # noqa: E402
 from pellicle.sampling.density import (  # noqa: E402
     Target,

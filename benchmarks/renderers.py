@@ -13,7 +13,8 @@ import jax
 import numpy as np
 
 import pellicle as pl
-from pellicle.rendering.formula import Appearance, appearance, effective, physical
+from pellicle.rendering.appearance import Appearance, appearance
+from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import target
 
 sys.path.pop(0)  # where another colour.py is

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 import pellicle as pl
-from pellicle.simulation.spectra import interference_colours
+from pellicle.simulation.colours import interference_colours
 
 PHOTOGRAPH = Path(__file__).parents[1] / "docs" / "examples" / "wedge.png"
 THICKNESS = np.arange(20.0, 241.0)

@@ -25,7 +25,7 @@ import pellicle as pl
 from pellicle.colour import srgb
 from pellicle.rendering import gltf as gltf_formula
 from pellicle.rendering import mitsuba_plugin
-from pellicle.rendering.formula import appearance
+from pellicle.rendering.appearance import appearance
 from pellicle.rendering.mitsuba import lookup
 
 matplotlib.use("Agg")

@@ -148,7 +148,7 @@ def _search(case: Case, spectrum: Any) -> Array:
     from pellicle.fitting.film.fit import measurements
     from pellicle.fitting.film.problem import make
     from pellicle.fitting.film.search import search
-    from pellicle.fitting.problem import quiet
+    from pellicle.fitting.progress import quiet
 
     with jax.enable_x64(True):
         problem = make(*measurements(spectrum, case.scene))

@@ -7,7 +7,7 @@ import pellicle as pl
 from pellicle.accuracy.case import case
 from pellicle.accuracy.cost import INTERVAL_METHODS, SOLVERS, compare_intervals, compare_solvers, from_truth
 from pellicle.accuracy.registry import Method, data_sets
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 from pellicle.sampling.sampled_intervals import SAMPLED_INTERVALS
 
 NM = np.linspace(420.0, 740.0, 40)

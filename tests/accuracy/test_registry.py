@@ -11,7 +11,7 @@ from pellicle.accuracy.cost import cost
 from pellicle.accuracy.film_methods import METHODS, compare_methods
 from pellicle.accuracy.registry import Comparison, Method, Result, mark_pareto, measure
 from pellicle.errors import UsageError
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 
 from .conftest import NM, few
 

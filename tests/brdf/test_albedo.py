@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from pellicle.brdf.lobes import ANGLES, directional_albedo, energy_warning
+from pellicle.brdf.albedo import ANGLES, directional_albedo, energy_warning
 from pellicle.brdf.models import model
 
 ALPHAS = (0.003, 0.3, *(pytest.param(x, marks=pytest.mark.slow) for x in (0.01, 0.03, 0.1, 1.0)))

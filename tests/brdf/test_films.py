@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pellicle.brdf import film_colour, lobes
+from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import cosine_to_half, direction
-from pellicle.brdf.lobes import directional_albedo
 from pellicle.brdf.models import MODELS, PRESETS, RGB, model
 
 from ..by_tmm import films

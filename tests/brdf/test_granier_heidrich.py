@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pellicle.brdf import granier_heidrich as gh
+from pellicle.brdf.albedo import directional_albedo, energy_warning, max_albedo
 from pellicle.brdf.directions import direction
-from pellicle.brdf.lobes import directional_albedo, energy_warning, max_albedo
 from pellicle.brdf.models import PRESETS, model
 
 from ..differences import derivative

@@ -6,8 +6,8 @@ import pytest
 import tmm
 
 import pellicle as pl
+from pellicle.brdf.albedo import directional_albedo
 from pellicle.brdf.directions import direction
-from pellicle.brdf.lobes import directional_albedo
 from pellicle.brdf.models import model
 from pellicle.effects.surface_plan import exact
 from pellicle.scene.surface import Surface, surface_view

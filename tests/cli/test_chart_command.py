@@ -6,7 +6,7 @@ import pytest
 import pellicle as pl
 from pellicle.colour import delta_e2000, film_colour
 from pellicle.errors import UsageError
-from pellicle.simulation.spectra import interference_colours
+from pellicle.simulation.colours import interference_colours
 from tests.film_recipes import film_recipe
 
 NM, DEGREES = np.linspace(0.0, 600.0, 7), np.array([0.0, 30.0, 60.0])

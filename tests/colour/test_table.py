@@ -9,7 +9,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import FilmColourTable, delta_e2000, lab, sensor
-from pellicle.simulation.spectra import colour_table
+from pellicle.simulation.colours import colour_table
 
 from ..airy import airy
 

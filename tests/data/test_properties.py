@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pellicle.data.read_spectrum import read_spectrum
-from pellicle.data.tabular.columns import WAVELENGTH_UNITS, recognise, to_nm
+from pellicle.data.tabular.columns import recognise
+from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm
 from pellicle.errors import DataError, UsageError
 from tests.data.tables import assert_read
 

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pellicle.data.formats.detect import read_tables
-from pellicle.data.tabular.columns import HC_EV_NM, is_header, recognise, to_nm, wavelength_unit
+from pellicle.data.tabular.columns import is_header, recognise
 from pellicle.data.tabular.layout import read_table
+from pellicle.data.tabular.units import HC_EV_NM, to_nm, wavelength_unit
 from pellicle.errors import DataError
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pellicle import dispersion as d
-from pellicle.dispersion.empirical import known_index
+from pellicle.dispersion.base import known_index
 from pellicle.materials import material
 from pellicle.optics.pair import parts
 

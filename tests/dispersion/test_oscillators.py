@@ -9,7 +9,8 @@ import pytest
 from scipy import special as scipy_special
 from scipy.integrate import quad
 
-from pellicle.dispersion.empirical import HC, CauchyUrbach
+from pellicle.dispersion.base import HC
+from pellicle.dispersion.empirical import CauchyUrbach
 from pellicle.dispersion.oscillators import CodyLorentz, Drude, Gaussian, Lorentz, Oscillators, TaucLorentz
 from pellicle.optics.pair import imag, real
 from pellicle.optics.special import arctan_over_root, dawson, scaled_ei

@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.optimize import lsq_linear
 
 import pellicle as pl
-from pellicle.dispersion.empirical import HC, known_index
+from pellicle.dispersion.base import HC, known_index
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.film.parameters import parameters
 from pellicle.optics.pair import imag, is_real, real

@@ -5,7 +5,8 @@ import pytest
 
 from pellicle.fitting.budget import budget, carrier, likely_cause
 from pellicle.fitting.covariance import Errors
-from pellicle.fitting.discrepancy import Contribution, Discrepancy, Effect
+from pellicle.fitting.discrepancy import Contribution, Discrepancy
+from pellicle.fitting.linear_system import Effect
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Estimate
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.fitting.problem import LEAST_SQUARE, Box, Coordinates, box
+from pellicle.fitting.coordinates import LEAST_SQUARE, Box, Coordinates, box
 from pellicle.scene.priors import HalfNormal, LogUniform, Normal
 
 from ..differences import jacobian

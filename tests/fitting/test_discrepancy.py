@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import HALF_NORMAL, Effect, Evidence, bulk, discrepancy, improbable
+from pellicle.fitting.discrepancy import bulk, discrepancy, improbable
+from pellicle.fitting.linear_system import HALF_NORMAL, Effect, Evidence
 
 X = np.linspace(-1, 1, 200)
 SIGMA = 0.01

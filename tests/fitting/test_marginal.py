@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 import pellicle as pl
 from pellicle.fitting.film.fit import fitted
 from pellicle.fitting.marginal import left_weights, marginal
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 
 NM = np.linspace(450, 800, 90)
 FILM = pl.Scene(pl.Layer(1.48, pl.Free(100, 4000)), "SiO2")

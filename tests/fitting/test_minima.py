@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pellicle.fitting import reweighting as module
+from pellicle.fitting import minima as module
+from pellicle.fitting.coordinates import box
 from pellicle.fitting.evaluation import Polished
+from pellicle.fitting.minima import Minima, distinct, minima, solve
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem, box
-from pellicle.fitting.reweighting import Minima, distinct, minima, solve
+from pellicle.fitting.problem import Problem
 
 LOWER, UPPER, HOME = 10.0, 1000.0, 700.0
 """Bounds and the only minimum of a thickness (nm)."""

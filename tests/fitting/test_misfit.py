@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.covariance import Errors
-from pellicle.fitting.discrepancy import Contribution, Discrepancy, Effect, Remaining
+from pellicle.fitting.discrepancy import Contribution, Discrepancy, Remaining
+from pellicle.fitting.linear_system import Effect
 from pellicle.fitting.misfit import Accuracy, misfit
 
 ONE = Effect("index", 0.005, "", np.zeros((1, 1)), material=True)

@@ -17,12 +17,13 @@ import optimistix as optx
 import pytest
 
 import pellicle as pl
+from pellicle.fitting.coordinates import box
 from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.view import Local, SpectrumView
 from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Noise, Problem, box
+from pellicle.fitting.problem import Noise, Problem
 
 FOLDER = Path(__file__).parent / "nist_strd"
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from pellicle.fitting.covariance import Normal, covariances, held_within, times
+from pellicle.fitting.normal_equations import Normal, covariances, held_within, times
 from pellicle.fitting.positive_definite import nonnegative
 
 

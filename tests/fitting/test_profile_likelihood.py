@@ -9,8 +9,8 @@ from scipy.optimize import brentq, minimize_scalar
 import pellicle as pl
 from pellicle.fitting.conclusion import neighbourhood
 from pellicle.fitting.film.fit import fitted
-from pellicle.fitting.problem import quiet
 from pellicle.fitting.profile_likelihood import interval
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import linearised
 
 from ..airy import airy

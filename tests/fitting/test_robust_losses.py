@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import pellicle as pl
-from pellicle.fitting.noise import LOSSES, inflation, spread
+from pellicle.fitting.robust_losses import LOSSES, inflation, spread
 
 from ..airy import airy
 from ..differences import derivative

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting import reweighting
+from pellicle.fitting import minima
 from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Estimate, Rival, Status
 from pellicle.fitting.status import ORDER, describe, distinct_rivals, expanded, judged, verdict
@@ -40,14 +40,14 @@ OWN = pytest.mark.slow(reason="compiles a scene of its own")
 )
 def test_a_real_fit_of_each_status(film, measured, monkeypatch, name):
     seen, thickness, fitted, settles, status, words = REAL[name]
-    polish = reweighting.polish
+    polish = minima.polish
 
     def unsettled(*arguments):
         polished = polish(*arguments)
         return polished._replace(converged=np.zeros_like(np.asarray(polished.converged)))
 
     if not settles:
-        monkeypatch.setattr(reweighting, "polish", unsettled)
+        monkeypatch.setattr(minima, "polish", unsettled)
     fit = pl.fit(measured(film(**seen), thickness, sigma=True), film(**fitted))
     assert fit.status is status
     assert words in fit.verdict

@@ -10,7 +10,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.cli.reading import measured_scene
-from pellicle.dispersion.empirical import AbstractDispersion, WithExtinction
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import WithExtinction
 from pellicle.recipes.media import medium
 from pellicle.recipes.python_text import python_text
 from pellicle.recipes.read import checked

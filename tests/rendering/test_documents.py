@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.rendering.formula import appearance, physical
+from pellicle.rendering.appearance import appearance
+from pellicle.rendering.formula import physical
 from pellicle.rendering.targets import Material, Solved, target
 
 MaterialX = pytest.importorskip("MaterialX")

@@ -13,8 +13,9 @@ from pellicle.colour.film import reflectance
 from pellicle.colour.observers import columns
 from pellicle.optics.pair import Pair
 from pellicle.rendering import gltf, materialx
+from pellicle.rendering.appearance import ANGLES, appearance
 from pellicle.rendering.blender import DIELECTRIC, METAL, cycles_formula, film
-from pellicle.rendering.formula import ANGLES, appearance, effective, error, physical
+from pellicle.rendering.formula import effective, error, physical
 from pellicle.rendering.gltf import GLTF
 from pellicle.rendering.materialx import artistic_colours, artistic_index
 from tests.airy import airy

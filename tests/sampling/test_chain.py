@@ -13,7 +13,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 from pellicle.reporting.posterior import write_netcdf
 from pellicle.sampling.chain import empty
 from pellicle.sampling.density import Modes, Target

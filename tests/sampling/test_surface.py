@@ -9,7 +9,7 @@ import pytest
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf import fit as fitting
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface

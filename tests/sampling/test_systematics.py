@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.discrepancy import Effect, Evidence
+from pellicle.fitting.linear_system import Effect, Evidence
 from pellicle.fitting.problem import Explained
 from pellicle.sampling.density import systematics
 

@@ -24,9 +24,10 @@ from pellicle.colour import FilmColourTable, delta_e2000, integration_bands, lab
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import reflectance
 from pellicle.colour.observers import SPAN, Sensor
-from pellicle.dispersion.empirical import AbstractDispersion, Table, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Table
 from pellicle.errors import UsageError
-from pellicle.fitting.problem import Progress, quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.optics.pair import parts, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, start_values

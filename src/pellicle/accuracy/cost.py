@@ -30,9 +30,11 @@ from pellicle.accuracy.registry import (
 )
 from pellicle.fitting.conclusion import neighbourhood
 from pellicle.fitting.film.search import search
-from pellicle.fitting.problem import Form, Progress, quiet
+from pellicle.fitting.minima import solve
+from pellicle.fitting.problem import Form
 from pellicle.fitting.profile_likelihood import interval
-from pellicle.fitting.reweighting import RankedMinima, linearised, rank, solve
+from pellicle.fitting.progress import Progress, quiet
+from pellicle.fitting.reweighting import RankedMinima, linearised, rank
 from pellicle.fitting.status import RIVAL
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves

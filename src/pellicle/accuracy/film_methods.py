@@ -13,11 +13,11 @@ import numpy as np
 from pellicle.accuracy.case import Case, Program, Variant, changed, compiled, disperses, removed, with_effect
 from pellicle.accuracy.registry import Comparison, Method, measure
 from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.effects.film_plan import plan
 from pellicle.effects.removal import FilmRemoval, RealPart
 from pellicle.errors import UsageError, install_command
-from pellicle.fitting.problem import Progress
+from pellicle.fitting.progress import Progress
 from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL
 from pellicle.optics.pair import Pair, is_real, parts
 from pellicle.scene.film import Scene, all_collected, coherent_layers, media, sliced, with_wavelength

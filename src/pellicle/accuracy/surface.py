@@ -16,7 +16,7 @@ from pellicle.brdf.directions import angle_to_half
 from pellicle.dispersion.empirical import along_the_spectrum
 from pellicle.effects import surface_plan
 from pellicle.effects.surface_plan import FLOOR, SurfaceRemoval, exact
-from pellicle.fitting.problem import Progress, quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
 from pellicle.scene.free import insert

@@ -13,7 +13,7 @@ from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.film.fit import fit as fit_spectra
-from pellicle.fitting.problem import Progress, quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, STEPS, measured, sampled, subject_of

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.film_plan import plan as film_plan
 from pellicle.effects.surface_plan import plan as surface_plan
-from pellicle.fitting.problem import Progress, quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, SurfaceView, check_scene, refuse, surface_view

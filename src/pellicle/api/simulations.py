@@ -17,9 +17,10 @@ from pellicle.fitting.result import Fit
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene, refuse
 from pellicle.simulation.brdf import Directions, simulate_samples
+from pellicle.simulation.colours import simulate_colours
 from pellicle.simulation.depth_profile import DepthProfile
 from pellicle.simulation.depth_profile import depth_profile as film_depth_profile
-from pellicle.simulation.spectra import default_wavelengths, simulate_colours, simulate_spectrum
+from pellicle.simulation.spectra import default_wavelengths, simulate_spectrum
 
 if TYPE_CHECKING:
     from pellicle.rendering.export import Export

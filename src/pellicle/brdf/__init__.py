@@ -4,8 +4,8 @@ Directions are unit vectors away from the surface, in its own frame, whose norma
 pure function of its parameters and two directions.
 """
 
+from pellicle.brdf.albedo import directional_albedo as directional_albedo
 from pellicle.brdf.directions import direction as direction
-from pellicle.brdf.lobes import directional_albedo as directional_albedo
 from pellicle.brdf.models import MODELS as MODELS
 from pellicle.brdf.models import PRESETS as PRESETS
 from pellicle.brdf.models import Model as Model

@@ -72,7 +72,7 @@ def chart(
     """
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
     from pellicle.scene.free import Free
-    from pellicle.simulation.spectra import varied_layer
+    from pellicle.simulation.colours import varied_layer
 
     described = read_recipe(recipe)
     if isinstance(described, SurfaceRecipe):

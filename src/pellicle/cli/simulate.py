@@ -185,7 +185,7 @@ def _write_colours(
 ) -> None:
     from pellicle.data.colours import write_colours
     from pellicle.fitting.film.messages import log_plan, log_scene
-    from pellicle.simulation.spectra import simulate_colours
+    from pellicle.simulation.colours import simulate_colours
 
     scene, seen, table = recipe.scene(), recipe.sight(), recipe.tables
     refuse_wavelengths(recipe)

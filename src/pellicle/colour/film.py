@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from pellicle.colour import spaces
 from pellicle.colour.bands import Bands, integration_bands
 from pellicle.colour.observers import sensor
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics import coherent, interface, orders, response
 from pellicle.optics.pair import Number, is_real, real, to_pair
 

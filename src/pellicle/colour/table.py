@@ -15,7 +15,8 @@ from pellicle.colour import spaces
 from pellicle.colour.bands import Bands
 from pellicle.colour.film import Colour, reflectance
 from pellicle.colour.observers import sensor
-from pellicle.dispersion.empirical import AbstractDispersion, Tabulated, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Tabulated
 from pellicle.optics.pair import namespace, real, to_pair
 
 TOLERANCE = 0.05

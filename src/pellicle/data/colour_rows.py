@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.data.options import SPACES
-from pellicle.data.tabular.columns import colour_unit
 from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number, open_binary, read_bytes, split, text_file
+from pellicle.data.tabular.units import colour_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import Where, refuse_first
 

@@ -62,13 +62,13 @@ def _number_or_text(text: str, name: str) -> float | str:
 
 
 def _wavelength_unit(text: str) -> tuple[str | None, tuple[str, ...]]:
-    from pellicle.data.tabular.columns import WAVELENGTH_UNITS, wavelength_unit
+    from pellicle.data.tabular.units import WAVELENGTH_UNITS, wavelength_unit
 
     return wavelength_unit(text), WAVELENGTH_UNITS
 
 
 def _signal_unit(text: str) -> tuple[str | None, tuple[str, ...]]:
-    from pellicle.data.tabular.columns import BITS, SIGNAL_UNITS, colour_unit
+    from pellicle.data.tabular.units import BITS, SIGNAL_UNITS, colour_unit
 
     return colour_unit(text), (*SIGNAL_UNITS, *BITS)
 

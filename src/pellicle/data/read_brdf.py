@@ -10,10 +10,11 @@ from pellicle.data.formats import alta
 from pellicle.data.formats.merl import is_merl, read_merl
 from pellicle.data.formats.rgl import is_tensor_file, read_rgl
 from pellicle.data.tabular.column_selection import named_columns, only
-from pellicle.data.tabular.columns import DIRECTIONS, Column, brdf_unit, listed
+from pellicle.data.tabular.columns import DIRECTIONS, Column, listed
 from pellicle.data.tabular.layout import find_layout
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import read_bytes, text_file
+from pellicle.data.tabular.units import brdf_unit
 from pellicle.errors import DataError, UsageError
 
 _EXAMPLE = '`columns=["theta_i", "phi_i", "theta_o", "phi_o", "R", "G", "B"]`'

@@ -238,22 +238,30 @@ def against_white(
     flat_field: str | os.PathLike[str] | None,
 ) -> tuple[photographs.Photograph, np.ndarray, list[str]]:
     """The photograph without the uneven light of a flat field, the linear channels (3,) of the region `white`
-    in it, and notes."""
-    photograph, *notes = _flattened(photograph, coding, flat_field)
-    reference, *shown = _white_reference(photograph, coding, white)
-    return photograph, reference, [*notes, *shown]
+    in it (1 without one), and notes.
+
+    Raises UsageError for a white that is clipped, and a flat field of another size.
+    """
+    notes, reference = list[str](), np.ones(3)
+    if flat_field is not None:
+        photograph = _flattened(photograph, coding, photographs.read_photograph(flat_field))
+        notes.append(f"divided by the flat field {flat_field}")
+    if white is not None:
+        region, *others = photographs.parse_regions(white, "white")
+        if others:
+            raise UsageError("`white` must be one region")
+        pixels = region.pixels(photograph, "white")
+        _check_white(pixels, f"{photograph.path}: `white` {region}", "choose another region")
+        reference = coding.decoded(pixels).mean(axis=0)
+        shown = ", ".join(f"{x:.3g}" for x in reference)
+        notes.append(f"divided by the white of region {region}, linear {shown}")
+    return photograph, reference, notes
 
 
 def _flattened(
-    photograph: photographs.Photograph, coding: Encoding, flat_field: str | os.PathLike[str] | None
-) -> tuple[Any, ...]:
-    """The photograph divided by one of an evenly white surface in linear light, and a note; itself without.
-
-    Pixels that are clipped stay so. Raises UsageError for a flat field of another size or that is clipped.
-    """
-    if flat_field is None:
-        return (photograph,)
-    flat = photographs.read_photograph(flat_field)
+    photograph: photographs.Photograph, coding: Encoding, flat: photographs.Photograph
+) -> photographs.Photograph:
+    """A photograph divided by one of an evenly white surface in linear light; clipped pixels stay so."""
     if flat.size != photograph.size:
         sizes = f"{flat.size[0]} by {flat.size[1]} pixels and {photograph.path} {photograph.size[0]} by"
         raise UsageError(f"{flat.path}: has {sizes} {photograph.size[1]}: take both with one camera")
@@ -261,23 +269,7 @@ def _flattened(
     linear = coding.decoded(photograph.pixels) / coding.decoded(np.maximum(flat.pixels, flat.step))
     clipped = (photograph.pixels <= 0) | (photograph.pixels >= 1)
     pixels = np.where(clipped, photograph.pixels, coding.encode(linear, coding.roots(linear)))
-    return replace(photograph, pixels=pixels.astype(np.float32)), f"divided by the flat field {flat.path}"
-
-
-def _white_reference(
-    photograph: photographs.Photograph, coding: Encoding, white: Pixels | None
-) -> tuple[Any, ...]:
-    """Linear channels (3,) of the region `white` and a note, 1 without one. Raises UsageError if clipped."""
-    if white is None:
-        return (np.ones(3),)
-    one, *others = photographs.parse_regions(white, "white")
-    if others:
-        raise UsageError("`white` must be one region")
-    pixels = one.pixels(photograph, "white")
-    _check_white(pixels, f"{photograph.path}: `white` {one}", "choose another region")
-    linear = coding.decoded(pixels).mean(axis=0)
-    shown = ", ".join(f"{x:.3g}" for x in linear)
-    return linear, f"divided by the white of region {one}, linear {shown}"
+    return replace(photograph, pixels=pixels.astype(np.float32))
 
 
 def _check_white(pixels: np.ndarray, where: str, remedy: str) -> None:

@@ -15,8 +15,9 @@ from pellicle.data.repeated_sweeps import sweep_numbers
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import NOISE_REPLACES, REMEDY, Axis, Reading, Rows
 from pellicle.data.tabular import column_selection as selection
-from pellicle.data.tabular.columns import MUELLER, SIGNAL_UNITS, Column, listed
+from pellicle.data.tabular.columns import MUELLER, Column, listed
 from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.units import SIGNAL_UNITS
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma

@@ -13,14 +13,13 @@ from pellicle.data.tabular.columns import (
     COUNTS,
     MUELLER,
     RATIO_COLUMNS,
-    SIGNAL_UNITS,
     SIGNALS,
     Column,
     listed,
-    signal_unit,
     unknown_unit,
 )
 from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 from pellicle.signals.one_column import OneColumn

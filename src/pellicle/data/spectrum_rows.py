@@ -12,8 +12,9 @@ from pellicle.data.options import SpectrumOptions
 from pellicle.data.repeated_sweeps import are_sweeps, mean_spectrum, one_way, sweep_numbers
 from pellicle.data.spectrum import POLARISATIONS, Spectrum, inside_range, setting_numbers
 from pellicle.data.tabular.column_selection import AxisColumns, Selection
-from pellicle.data.tabular.columns import WAVELENGTH_UNITS, Column, to_nm, unknown_unit, wavelength_unit
+from pellicle.data.tabular.columns import Column, unknown_unit
 from pellicle.data.tabular.table import Table
+from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import check_noise, refuse_first
 from pellicle.signals.registry import SIMULATED

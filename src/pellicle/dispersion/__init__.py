@@ -5,12 +5,12 @@
 """
 
 from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
+from pellicle.dispersion.base import HC as HC
+from pellicle.dispersion.base import AbstractDispersion as AbstractDispersion
 from pellicle.dispersion.effective_medium import Bruggeman as Bruggeman
 from pellicle.dispersion.effective_medium import Linear as Linear
 from pellicle.dispersion.effective_medium import Looyenga as Looyenga
 from pellicle.dispersion.effective_medium import MaxwellGarnett as MaxwellGarnett
-from pellicle.dispersion.empirical import HC as HC
-from pellicle.dispersion.empirical import AbstractDispersion as AbstractDispersion
 from pellicle.dispersion.empirical import Cauchy as Cauchy
 from pellicle.dispersion.empirical import CauchyUrbach as CauchyUrbach
 from pellicle.dispersion.empirical import Constant as Constant

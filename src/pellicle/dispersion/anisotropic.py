@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex
 
-from pellicle.dispersion.empirical import AbstractDispersion, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.optics.anisotropy import Medium, Principal, permittivity, uniaxial
 from pellicle.optics.pair import Number, namespace
 

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from pellicle.dispersion.anisotropic import require_isotropic
-from pellicle.dispersion.empirical import AbstractDispersion, bounds_of
+from pellicle.dispersion.base import AbstractDispersion, bounds_of
 from pellicle.optics import pair
 from pellicle.optics.pair import Number, Pair, abs2, imag, is_real, namespace, real, times_i
 

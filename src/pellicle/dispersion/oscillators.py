@@ -9,7 +9,7 @@ from typing import Any, ClassVar, final
 
 import equinox as eqx
 
-from pellicle.dispersion.empirical import HC, AbstractDispersion, bounds_of, require_nonnegative
+from pellicle.dispersion.base import HC, AbstractDispersion, bounds_of, require_nonnegative
 from pellicle.optics import pair
 from pellicle.optics.pair import Pair, namespace
 from pellicle.optics.special import arctan_over_root, dawson, log_abs, scaled_ei

@@ -11,7 +11,7 @@ from typing import Any, final
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.empirical import bounds_of
+from pellicle.dispersion.base import bounds_of
 from pellicle.dispersion.spline import b_splines, greville_knots
 from pellicle.optics.pair import namespace
 

@@ -11,7 +11,7 @@ from typing import Any, final
 
 import equinox as eqx
 
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.optics.pair import namespace
 
 Coefficients = tuple[float, ...]

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, final
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.empirical import HC, AbstractDispersion, cast_like, require_nonnegative
+from pellicle.dispersion.base import HC, AbstractDispersion, cast_like, require_nonnegative
 from pellicle.optics.pair import Pair, namespace
 from pellicle.optics.special import log_abs
 

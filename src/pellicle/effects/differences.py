@@ -12,7 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.anisotropic import isotropic_in_plane, principal_media
-from pellicle.dispersion.empirical import AbstractDispersion, Tabulated, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import Number, abs2, imag, real

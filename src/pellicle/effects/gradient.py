@@ -9,7 +9,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.dispersion.empirical import Scaled, Tabulated, known_index
+from pellicle.dispersion.base import known_index
+from pellicle.dispersion.empirical import Scaled, Tabulated
 from pellicle.effects.differences import least_ambient, normal_incidence, upper
 from pellicle.forward_model.plan import Row
 from pellicle.optics.gradient import Gradient, gauss_points, stack_response

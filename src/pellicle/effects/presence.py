@@ -12,12 +12,13 @@ from pellicle.dispersion.anisotropic import (
     mixes_polarisations,
     principal_media,
 )
-from pellicle.dispersion.empirical import AbstractDispersion, Constant, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Constant
 from pellicle.effects.differences import largest_attenuation, normal_incidence, upper
 from pellicle.errors import UsageError
 from pellicle.forward_model.plan import CLOSED_FORMS, GENERAL, SLICED, Row
 from pellicle.materials import Material
-from pellicle.optics.berreman.stack import DIRECT
+from pellicle.optics.berreman.slices import DIRECT
 from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, coherent_layers, groups, is_graded
 from pellicle.scene.free import Free, free_leaves

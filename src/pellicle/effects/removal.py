@@ -22,7 +22,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, mean_medium
-from pellicle.dispersion.empirical import AbstractDispersion, Constant
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
 from pellicle.effects.differences import Evaluation, largest_difference
 from pellicle.forward_model.plan import Plan, Removal, Row
 from pellicle.optics.pair import parts, real

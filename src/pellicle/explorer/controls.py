@@ -17,7 +17,7 @@ from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, is_free
 from pellicle.scene.layers import Interface, Layer, Plate
-from pellicle.simulation.spectra import varied_layer
+from pellicle.simulation.colours import varied_layer
 
 STEPS = 1000
 """Steps of a slider, at least."""

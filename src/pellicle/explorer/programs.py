@@ -21,7 +21,7 @@ from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.instrument import Drift, Instrument
 from pellicle.scene.layers import Layer
-from pellicle.simulation.spectra import BANDS
+from pellicle.simulation.colours import BANDS
 
 MOST = 12
 """Most angles of which each has a curve."""

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from pellicle.fitting.conclusion import Conclusion, conclude
 from pellicle.fitting.covariance import Errors, Scaled
-from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.linear_system import Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, gains, ranking
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Fit, Part, Profile

@@ -23,7 +23,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE
-from pellicle.fitting.discrepancy import Evidence
+from pellicle.fitting.linear_system import Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, left_weights, marginal
 from pellicle.fitting.noise import student
 from pellicle.fitting.result import Estimate, Fit, Part, ReportMixin, Status

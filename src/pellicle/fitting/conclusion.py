@@ -15,12 +15,13 @@ from pellicle.fitting.covariance import Errors
 from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.evaluation import total_deviance
 from pellicle.fitting.marginal import Ranking
+from pellicle.fitting.minima import Minima, deviance_at, solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, Neighbourhood, flat_sides, limits
 from pellicle.fitting.result import Estimate, Profile, Rival, Status
-from pellicle.fitting.reweighting import Minima, RankedMinima, deviance_at, rank, solve
+from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.status import ORDER, RIVAL, Judged, judged, outside
 
 log = getLogger(__name__)

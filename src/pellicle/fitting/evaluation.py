@@ -6,7 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.problem import Box, Coordinates, Explained, Form, Problem, Progress, quiet
+from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.problem import Explained, Form, Problem
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.programs.cache import kept
 
 Static = tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]

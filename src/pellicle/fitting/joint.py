@@ -23,17 +23,21 @@ from pellicle.fitting.assembly import assemble
 from pellicle.fitting.brdf import fit as of_samples
 from pellicle.fitting.brdf.summary import BrdfMeasurements
 from pellicle.fitting.budget import budget
+from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film import fit as of_film
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.summary import FilmMeasurements
-from pellicle.fitting.noise import LEAST_SQUARES
+from pellicle.fitting.linear_system import Evidence
+from pellicle.fitting.minima import minima
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Box, Coordinates, Problem, Progress
+from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Estimate, Fit, Part
-from pellicle.fitting.reweighting import RankedMinima, minima, rank
+from pellicle.fitting.reweighting import RankedMinima, rank
+from pellicle.fitting.robust_losses import LEAST_SQUARES
 from pellicle.fitting.status import verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface

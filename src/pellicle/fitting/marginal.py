@@ -13,10 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.covariance import Errors, Scaled, held_within, times
-from pellicle.fitting.discrepancy import Discrepancy, Evidence, System, discrepancy
-from pellicle.fitting.noise import median, student
+from pellicle.fitting.covariance import Errors, Scaled
+from pellicle.fitting.discrepancy import Discrepancy, discrepancy
+from pellicle.fitting.linear_system import Evidence, System
+from pellicle.fitting.noise import student
+from pellicle.fitting.normal_equations import held_within, times
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
+from pellicle.fitting.robust_losses import median
 from pellicle.fitting.status import RIVAL
 
 _REACH = 3.0

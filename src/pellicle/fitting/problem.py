@@ -1,4 +1,4 @@
-"""A least-squares problem: parameters, bounds and priors, coordinates of a search, and the data to explain.
+"""A least-squares problem: parameters with bounds and priors, and the data that they explain.
 
 Spectra (`fitting.film.problem`) and BRDF samples (`fitting.brdf.problem`) are two kinds of `View`;
 whatever comes after the search takes a `Problem` and depends on neither.
@@ -6,113 +6,15 @@ whatever comes after the search takes a `Problem` and depends on neither.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
-from functools import partial
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from collections.abc import Hashable, Sequence
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.fitting.coordinates import Array, Box, Coordinates
 from pellicle.fitting.parameter import Parameter
 from pellicle.forward_model.plan import Plan
-from pellicle.optics.pair import namespace
-from pellicle.scene.priors import LogUniform, Prior
-
-Progress = Callable[[str, int, int], None]
-"""Called with the name of a stage, how much is done and how much there is."""
-
-
-def quiet(stage: str, done: int, total: int) -> None:
-    """A no-op progress callback."""
-
-
-Array: TypeAlias = jax.Array | np.ndarray
-
-LEAST_SQUARE = 1e-6
-"""Least y² in the disc: a fiftieth of a degree off the plane, where y² → y still has a slope."""
-
-
-class Box(NamedTuple):
-    """Bounds of the coordinates, and priors on the parameters in their own units, each (parameters,).
-
-    Normal and half-normal priors have a mean and a weight; `logarithmic` is 1 for a log-uniform prior, which
-    posteriors use and fits do not. `reach` is the largest deviation of a tilt in degrees.
-    """
-
-    lower: Array
-    upper: Array
-    prior_mean: Array
-    prior_weight: Array  # 1/sd, 0 for none
-    logarithmic: Array
-    reach: Array | np.floating = np.float64(0.0)
-
-    def prior_rows(self, values: Any) -> Any:
-        """Weighted distances of the values from the means of their priors, (parameters,)."""
-        return (values - self.prior_mean) * self.prior_weight
-
-    def log_prior(self, values: Any) -> Any:
-        """ln of the priors at values of the parameters, up to a constant."""
-        logarithm = jnp.log(jnp.where(self.logarithmic > 0, values, 1.0))
-        return -0.5 * jnp.sum(self.prior_rows(values) ** 2) - jnp.sum(self.logarithmic * logarithm)
-
-
-def box(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None], reach: float = 0.0) -> Box:
-    """The box between bounds (parameters,), with the prior of each parameter."""
-    rows = [prior.mean_and_weight if prior else (0.0, 0.0) for prior in priors]
-    mean, weight = np.reshape(rows, (-1, 2)).T
-    logarithmic = np.array([float(isinstance(prior, LogUniform)) for prior in priors])
-    return Box(lower, upper, mean, weight, logarithmic, np.float64(reach))
-
-
-class Coordinates(NamedTuple):
-    """Map from the unit cube to values: static and hashable, a part of a program's key."""
-
-    log: tuple[bool, ...] = ()  # coordinates that are logarithms, none where empty
-    tilt: tuple[int, int] | None = None  # positions of deviation and azimuth where they are x and y of a disc
-    folded: bool = False  # y² in the place of y
-
-    def values(self, box: Box, unit: Any) -> Any:
-        """The parameters in their own units at `unit` (..., parameters)."""
-        x = box.lower + unit * (box.upper - box.lower)
-        xp = namespace(x)
-        if any(self.log):
-            log = np.array(self.log)
-            x = xp.where(log, xp.exp(xp.where(log, x, 0.0)), x)
-        if self.tilt is None:
-            return x
-        a, b = self.tilt
-        y = xp.sqrt(x[..., b]) if self.folded else x[..., b]
-        # the square onto the disc, smoothly and edge to edge: see `log_area`
-        u, v = x[..., a] * xp.sqrt(1 - 0.5 * y**2), y * xp.sqrt(1 - 0.5 * x[..., a] ** 2)
-        # its azimuth has a slope everywhere but at the centre
-        u = xp.where(u * u + v * v < 1e-20, 1e-10, u)
-        radius, azimuth = box.reach * xp.sqrt(u * u + v * v), xp.rad2deg(xp.arctan2(v, u))
-        if xp is jnp:
-            return x.at[..., a].set(radius).at[..., b].set(azimuth)
-        x[..., a], x[..., b] = radius, azimuth
-        return x
-
-    def slope(self, box: Box, unit: np.ndarray) -> np.ndarray:
-        """∂ values / ∂ unit at one point, (parameters, parameters)."""
-        if not any(self.log) and self.tilt is None:
-            return np.diag(box.upper - box.lower)
-        return np.asarray(_slope(self, box, unit))
-
-    def log_area(self, box: Box, unit: Any) -> Any:
-        """ln of the area of the disc of tilts that a step in the unit cube covers, up to a constant; not
-        folded."""
-        if self.tilt is None:
-            return 0.0
-        x, y = (box.lower[at] + unit[at] * (box.upper[at] - box.lower[at]) for at in self.tilt)
-        sides = jnp.sqrt((1 - 0.5 * y**2) * (1 - 0.5 * x**2))
-        return jnp.log(sides - (0.5 * x * y) ** 2 / sides)
-
-
-@partial(jax.jit, static_argnums=0)
-def _slope(coordinates: Coordinates, box: Box, unit: Any) -> Any:
-    return jax.jacfwd(lambda unit: coordinates.values(box, unit))(unit)
 
 
 class Noise(NamedTuple):
@@ -246,8 +148,9 @@ class View(Protocol):
         """
         ...
 
-    def by_local_noise(self, at: Any) -> View:
-        """The view with weights by the noise of neighbouring points, where σ is not given and differs."""
+    def by_local_noise(self, values: Any) -> View:
+        """The view with weights by the noise of neighbouring points at `values` (its parameters,), where σ is
+        not given and differs."""
         ...
 
     def jacobian(self, at: Any) -> np.ndarray:
@@ -281,36 +184,6 @@ class View(Protocol):
     def off_tolerance(self, values: np.ndarray) -> float:
         """Error of the view's plan at `values`, in the unit of its signal; 0 for an exact plan."""
         ...
-
-
-class UsualView:
-    """What views do unless they say otherwise: one noise for all channels, no neighbours along a spectrum."""
-
-    @property
-    def independent_fraction(self: Any) -> Any:
-        """Effective points per point (...): correlated errors count less."""
-        return self.data.independent_fraction
-
-    @property
-    def noise_groups(self: Any) -> tuple[NoiseGroup, ...]:
-        """One group of all channels."""
-        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
-
-    def at_model(self, at: Any) -> Any:
-        """1: the noise does not depend on the model."""
-        return 1.0
-
-    def by_local_noise(self, at: Any) -> Any:
-        """The view itself: its points are not neighbours along a spectrum."""
-        return self
-
-    def counting(self: Any, fraction: Any) -> Any:
-        """The view with each point counting for `fraction` (...) of an independent one."""
-        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
-
-    def thinned(self) -> Any:
-        """The view as it is: a scan needs all of its points."""
-        return self
 
 
 class Problem(NamedTuple):

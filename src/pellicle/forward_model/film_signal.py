@@ -15,7 +15,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.empirical import AbstractDispersion, Tabulated, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Tabulated
 from pellicle.errors import UsageError
 from pellicle.forward_model import mixed_polarisations
 from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of

@@ -18,7 +18,7 @@ from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
-from pellicle.simulation.spectra import colour_table, varied_layer
+from pellicle.simulation.colours import colour_table, varied_layer
 
 EXPOSURE = (0.01, 100.0)
 """Range of a free scale, which a soap film of 1 % and an overexposed mirror need."""

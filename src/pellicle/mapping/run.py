@@ -19,7 +19,7 @@ from pellicle.data.fingerprint import fingerprint
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import ORDERS
-from pellicle.fitting.problem import Progress, quiet
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
 from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of

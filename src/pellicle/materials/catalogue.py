@@ -18,7 +18,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.dispersion.empirical import AbstractDispersion, Constant, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
+from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError, UsageError, install_command
 from pellicle.materials import contents as index
 from pellicle.materials.formats import refractiveindex_info as database

@@ -8,14 +8,8 @@ import equinox as eqx
 
 from pellicle.dispersion import oscillators
 from pellicle.dispersion.anisotropic import ParameterLocation
-from pellicle.dispersion.empirical import (
-    AbstractDispersion,
-    Cauchy,
-    CauchyUrbach,
-    Constant,
-    Sellmeier,
-    require_nonnegative,
-)
+from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
+from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free

@@ -13,8 +13,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from pellicle.data.options import parse_number, parse_range
 from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import AbstractDispersion, Constant, Shifted
+from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError, did_you_mean

@@ -19,8 +19,9 @@ import numpy as np
 from pydantic import BaseModel
 
 from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import AbstractDispersion, Constant, Sellmeier, Shifted
+from pellicle.dispersion.empirical import Constant, Sellmeier, Shifted
 from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.errors import UsageError

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic
-from pellicle.dispersion.empirical import AbstractDispersion, Constant
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial
 from pellicle.materials import material as find

@@ -33,7 +33,8 @@ from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
 from pellicle.optics.orders import airy_series
 from pellicle.optics.pair import Pair, abs2, real
-from pellicle.rendering.formula import Appearance, Formula, Key, Numbers
+from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import Formula, Key, Numbers
 from pellicle.rendering.gltf import XYZ_TO_REC709
 from pellicle.rendering.targets import Material, Target, write_grey_image
 

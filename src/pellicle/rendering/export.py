@@ -19,7 +19,8 @@ from pellicle.errors import DataError, UsageError
 from pellicle.files import write_text
 from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Fit
-from pellicle.rendering.formula import appearance, effective, physical
+from pellicle.rendering.appearance import appearance
+from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import SETS, Material, Solved, target
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert

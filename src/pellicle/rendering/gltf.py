@@ -20,7 +20,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.files import replacing
-from pellicle.rendering.formula import Appearance, Formula, Key, Numbers, series
+from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import Formula, Key, Numbers, series
 from pellicle.rendering.targets import Material, Target, share_of_range
 
 XYZ_TO_REC709 = np.array(

@@ -24,7 +24,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.files import replacing
-from pellicle.rendering.formula import Appearance, ColourError, Formula, Key, Numbers, series
+from pellicle.rendering.appearance import Appearance
+from pellicle.rendering.formula import ColourError, Formula, Key, Numbers, series
 from pellicle.rendering.formula import error as colour_error
 from pellicle.rendering.targets import Material, Target
 

@@ -25,11 +25,11 @@ from pellicle.data.formats.rgl import write_tensors
 from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
-from pellicle.rendering.formula import Appearance
+from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.targets import Material, Target, write_grey_image
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
-from pellicle.simulation.spectra import BANDS
+from pellicle.simulation.colours import BANDS
 
 ALPHA = 0.1
 """GGX roughness of a film that has none of its own: `measured` has no perfect mirrors."""

@@ -11,8 +11,9 @@ import numpy as np
 from pellicle.accuracy.case import Program
 from pellicle.accuracy.colour_methods import Films, compiled, one_film
 from pellicle.accuracy.registry import Method
-from pellicle.dispersion.empirical import AbstractDispersion
-from pellicle.rendering.formula import appearance, effective, physical
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.rendering.appearance import appearance
+from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import target
 from pellicle.scene.film import Scene
 from pellicle.scene.layers import Layer

@@ -16,7 +16,8 @@ from jaxtyping import Float
 
 from pellicle.errors import UsageError, did_you_mean, install_command
 from pellicle.files import replacing
-from pellicle.rendering.formula import ANGLES, Appearance, Formula, Solution
+from pellicle.rendering.appearance import ANGLES, Appearance
+from pellicle.rendering.formula import Formula, Solution
 
 SCHEMA = "pellicle.export/1"
 SETS = ("effective", "physical")

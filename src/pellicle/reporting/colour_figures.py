@@ -16,7 +16,7 @@ from pellicle.files import write_text
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.plain_text import csv_rows
 from pellicle.scene.film import Scene
-from pellicle.simulation.spectra import colour_table, interference_colours
+from pellicle.simulation.colours import colour_table, interference_colours
 
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""

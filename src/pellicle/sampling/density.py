@@ -16,10 +16,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.fitting.coordinates import Box
 from pellicle.fitting.covariance import Errors, scaled
-from pellicle.fitting.discrepancy import Evidence
 from pellicle.fitting.evaluation import Static, explained
-from pellicle.fitting.problem import Box, Explained, Problem
+from pellicle.fitting.linear_system import Evidence
+from pellicle.fitting.problem import Explained, Problem
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.signals.base import Signal

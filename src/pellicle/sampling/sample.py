@@ -26,7 +26,7 @@ from pellicle.fitting.film import fit as spectra
 from pellicle.fitting.film.colour_measurements import arrays
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.marginal import by_remaining, with_shift
-from pellicle.fitting.problem import Progress
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit, Status
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, linearised
 from pellicle.sampling import density

@@ -6,7 +6,7 @@ import numpy as np
 
 from pellicle.accuracy.cost import Interval
 from pellicle.accuracy.registry import Method
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.chain import empty, missing
 from pellicle.sampling.density import Target, log_density, modes

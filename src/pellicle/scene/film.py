@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.graded import AtDepth, Graded, face
@@ -31,7 +31,7 @@ from pellicle.scene.layers import (
     divided,
 )
 from pellicle.signals.base import Signal
-from pellicle.signals.one_column import FORMS
+from pellicle.signals.contrast import FORMS
 from pellicle.signals.registry import SIMULATED, of_light
 
 

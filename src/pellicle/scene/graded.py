@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.anisotropic import require_isotropic
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import AbstractDispersion
 from pellicle.dispersion.profiles import AbstractProfile, Linear
 from pellicle.errors import UsageError
 from pellicle.optics.pair import Number, namespace, narrow, parts, sqrt

@@ -15,8 +15,9 @@ import numpy as np
 
 import pellicle.dispersion
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import AbstractDispersion, Constant, known_index
+from pellicle.dispersion.empirical import Constant
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real

@@ -19,7 +19,7 @@ from pellicle.brdf.models import Model, Parameter, model
 from pellicle.brdf.sensor_bands import Quadrature, quadrature
 from pellicle.colour.observers import Sensor
 from pellicle.data.brdf_samples import spread
-from pellicle.dispersion.empirical import known_index
+from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import materials_in
 from pellicle.optics.pair import imag, real

@@ -5,9 +5,10 @@ from typing import Any
 
 from pellicle.errors import UsageError
 from pellicle.signals.base import Signal
+from pellicle.signals.contrast import Contrast
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.mueller import Mueller
-from pellicle.signals.one_column import Contrast, Counts, OneColumn, Reflectance, Transmittance
+from pellicle.signals.one_column import Counts, OneColumn, Reflectance, Transmittance
 from pellicle.signals.psi_delta import PsiDelta
 
 KINDS: dict[str, type[Signal]] = {

@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.colour import integration_bands
 from pellicle.colour.observers import Sensor, srgb_sensor
-from pellicle.dispersion.empirical import known_index
+from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, response
 from pellicle.optics.interface import allow_tunnelling
@@ -23,8 +23,8 @@ from pellicle.optics.pair import Number, to_complex
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.layers import Layer
+from pellicle.simulation.colours import BANDS, varied_layer
 from pellicle.simulation.environment import Environment, Rendering, sphere
-from pellicle.simulation.spectra import BANDS, varied_layer
 
 _BATCH = 4096
 """Films in one call: 4096 × 64 wavelengths are 2 MB in double precision."""

@@ -14,13 +14,14 @@ from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, interface, response
 from pellicle.optics import ellipsometry as waves
 from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.berreman.matrices import Elements
-from pellicle.optics.berreman.stack import DIRECT, Polarised, most_dichroic, polarised
+from pellicle.optics.berreman.slices import DIRECT
+from pellicle.optics.berreman.stack import Polarised, most_dichroic, polarised
 from pellicle.optics.interface import normal, normal_flux, transverse
 from pellicle.optics.pair import Number, abs2, is_real, to_complex, to_pair
 from pellicle.optics.response import Response

@@ -17,8 +17,8 @@ from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
 from pellicle.scene.surface import INDICES, KEYS, Surface, index_numbers
+from pellicle.simulation.colours import BANDS
 from pellicle.simulation.environment import EDGE, EYE, Environment, Rendering, sphere, studio
-from pellicle.simulation.spectra import BANDS
 
 DIRECTIONS = 192
 """Directions of the light at each pixel: half of them spread as a lobe, half as the light of a diffuser."""

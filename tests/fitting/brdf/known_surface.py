@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.fitting.reweighting import Minima
+from pellicle.fitting.minima import Minima
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 

@@ -14,8 +14,8 @@ from pellicle.brdf import direction, model
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting import conclusion as shared
 from pellicle.fitting.brdf import fit as module
-from pellicle.fitting.problem import quiet
 from pellicle.fitting.profile_likelihood import Limits
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.result import Status
 from pellicle.fitting.reweighting import linearised
 from pellicle.scene.free import Free

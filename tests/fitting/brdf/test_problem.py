@@ -9,7 +9,8 @@ import pytest
 import pellicle as pl
 from pellicle.fitting.brdf.problem import in_plane, incoherent, linear_count, make, restricted, without_layer
 from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, Local, slope
-from pellicle.fitting.problem import Coordinates, Problem
+from pellicle.fitting.coordinates import Coordinates
+from pellicle.fitting.problem import Problem
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 

@@ -12,8 +12,9 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf import search as module
 from pellicle.fitting.brdf.problem import make, without_layer
 from pellicle.fitting.brdf.search import SCAN_SAMPLES, Candidates, Effort, candidates, scan, search
-from pellicle.fitting.problem import Problem, quiet
-from pellicle.fitting.reweighting import Minima
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import quiet
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
 

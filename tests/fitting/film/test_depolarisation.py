@@ -9,10 +9,10 @@ import pellicle as pl
 from pellicle.data.repeated_sweeps import mean_spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.comparison import compare
-from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.linear_system import HALF_NORMAL
+from pellicle.fitting.progress import quiet
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.sampling.result import predictions
 

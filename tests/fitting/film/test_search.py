@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting import reweighting as solver
+from pellicle.fitting import minima as solver
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.problem import measured as as_numbers
 from pellicle.fitting.film.search import design_points, search
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.progress import quiet
 from pellicle.recipes.dispersion_models import free_model
 
 

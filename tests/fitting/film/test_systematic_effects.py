@@ -6,12 +6,12 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.dispersion.empirical import Constant
-from pellicle.fitting.discrepancy import HALF_NORMAL
 from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import systematic_effects
-from pellicle.fitting.problem import quiet
+from pellicle.fitting.linear_system import HALF_NORMAL
+from pellicle.fitting.progress import quiet
 from pellicle.scene.layers import Interface
 
 from ...differences import derivative

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.spectrum_rows import LONGEST_ASSUMED, SHORTEST_ASSUMED
-from pellicle.data.tabular.columns import WAVELENGTH_UNITS, recognise, to_nm, wavelength_unit
+from pellicle.data.tabular.columns import recognise
+from pellicle.data.tabular.units import WAVELENGTH_UNITS, to_nm, wavelength_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import DELTA, HIGHEST, LOWEST, PSI
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from pellicle.data.cubes.numpy_files import need_wavelengths
 from pellicle.data.cubes.raw_cube import COUNTS, Asked, MappedFile, RawCube, Stored
-from pellicle.data.tabular.columns import to_nm, wavelength_unit
 from pellicle.data.tabular.text import open_binary
+from pellicle.data.tabular.units import to_nm, wavelength_unit
 from pellicle.errors import DataError
 
 _TYPES = {

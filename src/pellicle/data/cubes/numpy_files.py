@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cubes.raw_cube import ANGLE, COUNTS, WAVELENGTH, Asked, MappedFile, RawCube, Stored
-from pellicle.data.tabular.columns import Column, recognise, signal_unit
+from pellicle.data.tabular.columns import Column, recognise
 from pellicle.data.tabular.text import open_binary
+from pellicle.data.tabular.units import signal_unit
 from pellicle.errors import DataError, UsageError, did_you_mean
 
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.tabular.columns import SIGNAL_UNITS, signal_unit
+from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 
 WAVELENGTH, ANGLE = "wavelength", "angle"

@@ -12,8 +12,9 @@ from pellicle.data.cubes.numpy_files import arrays_to_raw, choose_variables
 from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, Asked, RawCube, Stored
 from pellicle.data.formats.nexus import SIGNATURE
 from pellicle.data.spectrum import POLARISATIONS
-from pellicle.data.tabular.columns import recognise, wavelength_unit
+from pellicle.data.tabular.columns import recognise
 from pellicle.data.tabular.text import open_binary
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError, UsageError, decoding, needs
 
 _PIXELS = {

@@ -4,9 +4,10 @@ import re
 from collections.abc import Sequence
 
 from pellicle.data.formats.exports import Facts, Rows, export
-from pellicle.data.tabular.columns import MUELLER, wavelength_unit
+from pellicle.data.tabular.columns import MUELLER
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
 _HORIBA_DATA, _HORIBA_ANGLE = "DATA", "INCIDENCE ANGLE"

@@ -11,9 +11,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from pellicle.data.tabular.columns import Column, recognise, wavelength_unit
+from pellicle.data.tabular.columns import Column, recognise
 from pellicle.data.tabular.table import Statement, Table, declarations, plain_columns
 from pellicle.data.tabular.text import Line, is_number
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
 Rows: TypeAlias = list[tuple[Line, list[str]]]

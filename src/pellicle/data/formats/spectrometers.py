@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from pellicle.data.formats.exports import Rows, all_cells, counted, delimiter_of, export, facts, keyword
-from pellicle.data.tabular.columns import UNSTATED, recognise, wavelength_unit
+from pellicle.data.tabular.columns import UNSTATED, recognise
 from pellicle.data.tabular.table import Table, declarations
 from pellicle.data.tabular.text import Line, TextFile, is_number
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
 _UNIT = re.compile(r"\[(?P<unit>[^\]]*)\]")

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from pellicle.data.formats.exports import Rows, measured
-from pellicle.data.tabular.columns import wavelength_unit
 from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, TextFile, is_number
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 
 METHOD = "VASEmethod["

@@ -1,4 +1,4 @@
-"""Columns of a table by their names and units, in the languages that instruments write.
+"""Columns of a table by their names, in the languages that instruments write.
 
 Names are matched without regard to case, with the unit in brackets (`R (%)`, `Wavelength [um]`),
 after a separator (`wavelength_nm`, `R_percent`, `lambda / nm`) or as a sign (`%R`).
@@ -9,89 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
+from pellicle.data.tabular.units import angle_unit, signal_unit, wavelength_unit
 from pellicle.errors import UsageError
 from pellicle.signals.registry import KINDS, ONE_COLUMN
-
-HC_EV_NM = 6.62607015e-34 * 299792458 / 1.602176634e-19 * 1e9
-"""hc/e in eV nm, exact in the SI of 2019 (h = 6.62607015e-34, c = 299792458, e = 1.602176634e-19)."""
-
-THZ_NM = 299792458 / 1e12 * 1e9
-"""c in THz nm."""
-
-WAVELENGTH_UNITS = ("nm", "um", "A", "eV", "cm-1", "THz")
-SIGNAL_UNITS = ("fraction", "percent", "absorbance")
-BITS = ("8-bit", "16-bit")
-"""Units of coded colours."""
-
-_WAVELENGTH_SPELLINGS = {
-    "nm": ("nm", "nanometer", "nanometers", "nanometre", "nanometres"),
-    "um": ("um", "micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"),
-    "A": ("a", "å", "ang", "angstrom", "angstroms", "ångström", "ångstrom"),
-    "eV": ("ev",),
-    "cm-1": ("cm-1", "1/cm", "cm^-1", "cm**-1", "cm⁻¹", "cm−1", "/cm", "cm^{-1}", "percm"),
-    "THz": ("thz", "terahertz"),
-}
-_SIGNAL_SPELLINGS = {
-    "percent": ("%", "percent", "pct", "perc", "%t", "%r"),
-    "fraction": ("fraction", "frac", "1", "-", "", "0-1", "0..1", "unitless", "dimensionless"),
-    "absorbance": ("absorbance", "od", "opticaldensity"),
-}
-_BRDF_SPELLINGS = {"1/sr": ("1/sr", "sr-1", "sr^-1", "sr**-1", "sr⁻¹", "sr−1", "/sr", "persr")}
-_ANGLE_SPELLINGS = {"deg": ("deg", "degree", "degrees", "°", "º")}
-
-
-def _lookup(spellings: dict[str, tuple[str, ...]], text: str) -> str | None:
-    plain = text.strip().lower().replace(" ", "").replace("µ", "u").replace("μ", "u")
-    spelt = (plain, plain.rstrip("."))  # Shimadzu writes `nm.`
-    return next((unit for unit, known in spellings.items() if set(spelt) & set(known)), None)
-
-
-def wavelength_unit(text: str) -> str | None:
-    """Return the member of `WAVELENGTH_UNITS` that `text` spells (`µm`, `1/cm`, `Angstrom`, ...), or None."""
-    return _lookup(_WAVELENGTH_SPELLINGS, text)
-
-
-def signal_unit(text: str) -> str | None:
-    """Return the member of `SIGNAL_UNITS` that `text` spells (`%`, `-`, ...), or None.
-
-    `abs` is none: some programs write it for absolute, others for absorbance.
-    """
-    return _lookup(_SIGNAL_SPELLINGS, text)
-
-
-def colour_unit(text: str) -> str | None:
-    """Return the unit of a spectrum's signal or of colours that `text` spells, else None."""
-    return text if text in BITS else signal_unit(text)
-
-
-def angle_unit(text: str) -> str | None:
-    """Return "deg" if `text` spells degrees, else None."""
-    return _lookup(_ANGLE_SPELLINGS, text)
-
-
-def brdf_unit(text: str) -> str | None:
-    """Return "1/sr" if `text` spells the unit of a BRDF, else None."""
-    return _lookup(_BRDF_SPELLINGS, text)
-
-
-def to_nm(values: np.ndarray, unit: str) -> np.ndarray:
-    """Convert positive `values`, of any shape, in one of `WAVELENGTH_UNITS` to wavelengths in nm."""
-    match unit:
-        case "nm":
-            return values
-        case "um":
-            return values * 1e3
-        case "A":
-            return values / 10
-        case "eV":
-            return HC_EV_NM / values
-        case "cm-1":
-            return 1e7 / values
-        case "THz":
-            return THZ_NM / values
-    raise ValueError(f"`unit`: expected one of {', '.join(WAVELENGTH_UNITS)}, got {unit!r}")
 
 
 def _sigmas(*names: str) -> tuple[str, ...]:

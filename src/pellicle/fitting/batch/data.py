@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting import noise
-from pellicle.fitting.noise import MAD_TO_SIGMA, median
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.result import Status
+from pellicle.fitting.robust_losses import MAD_TO_SIGMA, median
 from pellicle.signals.sphere import ROUGH, ncs, sphere_frame, sphere_sigma
 
 NO_DATA, BY_NEIGHBOURS = "no-data", "by-neighbours"

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.fitting.discrepancy import Effect
 from pellicle.fitting.film.extended_scene import Program, simulated_side_by_side
 from pellicle.fitting.film.systematic_effects import (
     SimulatedEffect,
@@ -14,6 +13,7 @@ from pellicle.fitting.film.systematic_effects import (
     simulations_of,
 )
 from pellicle.fitting.film.view import Local, SpectrumView
+from pellicle.fitting.linear_system import Effect
 from pellicle.programs.cache import in_chunks
 from pellicle.scene.film import Scene
 

@@ -15,18 +15,20 @@ from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
 from pellicle.fitting.batch.search import BatchSearch
 from pellicle.fitting.conclusion import verdicts
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import DOUBTFUL, Discrepancy, Evidence, discrepancy
+from pellicle.fitting.discrepancy import DOUBTFUL, Discrepancy, discrepancy
 from pellicle.fitting.film.evidence import spectrum_evidence
 from pellicle.fitting.film.parts import accuracy
 from pellicle.fitting.film.problem import Measured, drifts, shortest_wavelength
 from pellicle.fitting.film.summary import bounded_by_drift, unlimited
 from pellicle.fitting.film.sweeps import sweeps
 from pellicle.fitting.film.view import Local, SpectrumView
+from pellicle.fitting.linear_system import Evidence
 from pellicle.fitting.marginal import CLEAR, above_best, by_remaining, gains, left_weights, marginal, turnable
+from pellicle.fitting.minima import Minima
 from pellicle.fitting.misfit import misfit, other_material
 from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.reweighting import Minima, RankedMinima, linearised, ranked_by_factor
+from pellicle.fitting.reweighting import RankedMinima, linearised, ranked_by_factor
 from pellicle.fitting.status import ORDER, RIVAL
 from pellicle.scene.free import is_free
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.fitting.covariance import scaled, solve, times
+from pellicle.fitting.covariance import scaled
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.nuisance import Data
@@ -17,6 +17,7 @@ from pellicle.fitting.film.search import thickness_grid
 from pellicle.fitting.film.summary import like_substrate, thinnest
 from pellicle.fitting.film.view import Local, SpectrumForm, SpectrumView
 from pellicle.fitting.noise import student
+from pellicle.fitting.normal_equations import solve, times
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Neighbourhood, flat_sides
 from pellicle.fitting.reported_layer import linearised, slope_errors

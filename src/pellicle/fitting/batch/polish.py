@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.batch.data import BatchData
+from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.view import SpectrumForm
 from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
-from pellicle.fitting.problem import Box, Coordinates
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene

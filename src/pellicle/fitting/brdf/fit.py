@@ -20,11 +20,13 @@ from pellicle.fitting.brdf.summary import LayerEvidence
 from pellicle.fitting.brdf.view import RESIDUALS
 from pellicle.fitting.budget import budget
 from pellicle.fitting.conclusion import common_rms, ranked_minima
-from pellicle.fitting.noise import LEAST_SQUARES, check_loss
-from pellicle.fitting.noise import spread as bulk_spread
-from pellicle.fitting.problem import Problem, Progress
+from pellicle.fitting.minima import Minima, deviance_at, minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Baseline, Estimate, Fit, LayerTest, Status
-from pellicle.fitting.reweighting import Minima, RankedMinima, deviance_at, minima
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import LEAST_SQUARES, check_loss
+from pellicle.fitting.robust_losses import spread as bulk_spread
 from pellicle.fitting.status import verdict
 from pellicle.scene.surface import Surface, surface_view
 

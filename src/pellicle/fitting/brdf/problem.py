@@ -7,8 +7,9 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.view import SamplesForm, samples_view
+from pellicle.fitting.coordinates import LEAST_SQUARE, Coordinates, box
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import LEAST_SQUARE, Coordinates, Problem, box
+from pellicle.fitting.problem import Problem
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.surface import FreeNumber, Surface, nonzero_numbers
 

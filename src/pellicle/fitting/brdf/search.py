@@ -17,9 +17,11 @@ import numpy as np
 
 from pellicle.fitting.brdf.problem import linear_count
 from pellicle.fitting.brdf.view import RESIDUALS, Samples, SamplesForm, slope
+from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.minima import Minima, minima, solve
 from pellicle.fitting.positive_definite import solve_positive
-from pellicle.fitting.problem import Box, Coordinates, Problem, Progress
-from pellicle.fitting.reweighting import Minima, minima, solve
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress
 from pellicle.programs.cache import in_chunks, kept
 
 log = getLogger(__name__)

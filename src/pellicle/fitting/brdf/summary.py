@@ -8,14 +8,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.brdf.directions import direction
-from pellicle.brdf.lobes import energy_warning
+from pellicle.brdf.albedo import energy_warning
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import in_plane
-from pellicle.fitting.brdf.view import Local, Samples, SamplesView, local
+from pellicle.fitting.brdf.systematic_effects import systematic_effects
+from pellicle.fitting.brdf.view import SamplesView
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.curves import BrdfCurve, Deferred
-from pellicle.fitting.discrepancy import HALF_NORMAL, Discrepancy, Effect, Evidence
+from pellicle.fitting.discrepancy import Discrepancy
+from pellicle.fitting.linear_system import Evidence
 from pellicle.fitting.misfit import Accuracy, misfit
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.profile_likelihood import Limits
@@ -23,64 +24,8 @@ from pellicle.fitting.result import Baseline, Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, expanded, limits_in_words
 from pellicle.materials import materials_in
-from pellicle.optics.orders import FWHM
 from pellicle.scene.layers import medium
-from pellicle.scene.surface import LETTERS, Surface
-
-_STEP = 0.1
-"""Finite step of a linear effect, in standard uncertainties."""
-_INDICES = {"n": "index of the film", "base_n": "index of the base", "base_k": "extinction of the base"}
-
-
-def systematic_effects(view: SamplesView, values: np.ndarray, at: Local, surface: Surface) -> list[Effect]:
-    """Every effect to which the `surface` gives an uncertainty, at `values` (the parameters of the view,).
-
-    `at` is the local model there. What is free in the surface is no effect.
-    """
-    allowed, of = surface.uncertainty, f" of {view.name}" if view.name else ""
-    numbers = {key: np.asarray(x, float) for key, x in view.form.numbers(values, view.fixed).items()}
-    model, rise, every = np.asarray(at.model)[: view.rows], view.slope_of_compared(at), list[Effect]()
-
-    def signal(changed: dict[str, Any], samples: Samples = view.data) -> np.ndarray:
-        # by the program of the fit
-        at = np.array([changed.pop(key, x) for key, x in zip(view.form.keys, values, strict=True)], float)
-        return np.asarray(local(view.form, samples, view.fixed | changed, at).model)[: view.rows]
-
-    def add(name: str, size: float, unit: str, change: np.ndarray, **kind: Any) -> None:
-        every.extend([Effect(name, size, unit, rise * change, **kind)] if size else [])
-
-    def slope(higher: np.ndarray, lower: np.ndarray) -> np.ndarray:
-        return (higher - lower) / (2 * _STEP)
-
-    for key in [key for key in _INDICES if key in numbers and key not in view.form.keys]:
-        size = allowed.index if key == "n" else allowed.base
-        ends = (signal({key: numbers[key] * (1 + s * _STEP * size)}) for s in (1, -1))
-        add(_INDICES[key], size, "", slope(*ends))
-    depth, nm = numbers.get("thickness", np.zeros(())), numbers["wavelengths"]
-    widths = [("thickness spread", "thickness", depth, allowed.thickness_spread * float(depth), 1.0)]
-    if "weights" not in numbers:
-        widths.append(("bandwidth", "wavelengths", nm, allowed.bandwidth, FWHM))
-    for name, key, mean, size, by in widths:
-        # a normal distribution by three nodes, for a variance of the prior's root mean square
-        ends = [signal({key: mean + s * math.sqrt(3) * size / by}) for s in (1, -1)]
-        add(name, size, "nm", HALF_NORMAL / 6 * (sum(ends) - 2 * model), power=2)
-    for side, name in (("i", "angle of incidence"), ("o", "viewing angle")):
-        ends = (signal({}, _turned(view.data, side, s * _STEP * allowed.angle)) for s in (1, -1))
-        add(f"{name}{of}", allowed.angle, "deg", slope(*ends), shared=False)
-    shifted = slope(*(signal({"wavelengths": nm + s * _STEP * allowed.band}) for s in (1, -1)))
-    names = [x.upper() for x in LETTERS] if view.channels == 3 else range(1, view.channels + 1)
-    for channel, own in zip(names, np.eye(view.channels), strict=True):
-        add(f"gain of {channel}", allowed.gain, "", allowed.gain * model * own)
-        add(f"wavelength of {channel}", allowed.band, "nm", shifted * own)
-    return every
-
-
-def _turned(samples: Samples, side: str, degrees: float) -> Samples:
-    """The samples with the directions on one side, "i" or "o", further from the normal."""
-    x, y, z = np.moveaxis(np.asarray(getattr(samples, side)), -1, 0)
-    polar = np.rad2deg(np.arctan2(np.hypot(x, y), z)) + degrees
-    return samples._replace(**{side: np.asarray(direction(polar, np.rad2deg(np.arctan2(y, x))))})
-
+from pellicle.scene.surface import Surface
 
 _STRUCTURED = 0.1
 """Share of independent samples below which residuals without a given σ are not noise."""

@@ -15,8 +15,9 @@ from pellicle.brdf.lobes import Evaluate, two_lobes
 from pellicle.brdf.models import model
 from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
+from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import correlation_length
-from pellicle.fitting.problem import Array, Explained, Noise, UsualView
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
 from pellicle.programs.cache import kept
@@ -110,7 +111,7 @@ def local(form: SamplesForm, samples: Samples, fixed: dict[str, Any], values: An
 
 
 @dataclass(frozen=True)
-class SamplesView(UsualView):
+class SamplesView:
     """BRDF samples of a problem; `stated` are the weights before any reweighting."""
 
     name: str  # empty where there is no other
@@ -138,6 +139,16 @@ class SamplesView(UsualView):
         """Measured numbers: samples times channels."""
         return self.rows * self.channels
 
+    @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """One group of all channels."""
+        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
+
+    @property
+    def independent_fraction(self) -> Any:
+        """Effective points per point (...): correlated errors count less."""
+        return self.data.independent_fraction
+
     def local(self, values: Any) -> Local:
         """The model around `values` (free numbers,)."""
         return local(self.form, self.data, self.fixed, values)
@@ -159,6 +170,10 @@ class SamplesView(UsualView):
         measured, computed = (slope(transform, x, samples.i[:, 2:3], samples.floor) * x for x in pair)
         ratio = np.asarray(measured) / np.asarray(computed)
         return np.where(np.array(self.relative) > 0, ratio, 1.0)[: self.rows]
+
+    def by_local_noise(self, values: Any) -> SamplesView:
+        """The view itself: its points are not neighbours along a spectrum."""
+        return self
 
     def jacobian(self, at: Local) -> np.ndarray:
         """Weighted ∂ compared number / ∂ free number, (rows · channels, free numbers)."""
@@ -183,11 +198,19 @@ class SamplesView(UsualView):
         weight[: self.rows] *= factor
         return replace(self, data=self.data._replace(weight=weight)).counting(fraction)
 
+    def counting(self, fraction: Any) -> SamplesView:
+        """The view with each point counting for `fraction` (...) of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
+
     def restricted(self, rows: np.ndarray) -> SamplesView:
         """View of the same program with weight on the samples of these rows alone."""
         kept_rows = np.zeros((len(self.data.weight), 1))
         kept_rows[rows] = 1.0
         return replace(self, data=self.data._replace(weight=self.data.weight * kept_rows))
+
+    def thinned(self) -> SamplesView:
+        """The view as it is: a look around a minimum needs all samples."""
+        return self
 
     def off_tolerance(self, values: np.ndarray) -> float:
         """Relative error of the view's plan at `values`, as in `effects.surface_plan`."""

@@ -10,8 +10,9 @@ import numpy as np
 from pellicle.fitting.film.colour_measurements import MeasuredColours
 from pellicle.fitting.film.problem import Target, make
 from pellicle.fitting.film.view import Local, SpectrumView
+from pellicle.fitting.minima import minima
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.reweighting import RankedMinima, minima
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.scene.free import free_leaves
 
 _STRUCTURE = 0.5

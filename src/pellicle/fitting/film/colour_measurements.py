@@ -13,11 +13,11 @@ from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
 from pellicle.fitting.film.extended_scene import Number, extended
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.systematic_effects import named_for, simulated_effects
+from pellicle.fitting.linear_system import Effect, Evidence
 from pellicle.fitting.misfit import Accuracy
 from pellicle.fitting.problem import Noise
 from pellicle.fitting.reported_layer import index_of_layer

@@ -16,8 +16,9 @@ import numpy as np
 
 from pellicle.colour.spaces import Encoding
 from pellicle.data.colours import Colours
-from pellicle.fitting.film.view import FilmView
-from pellicle.fitting.problem import Array, Explained, Noise
+from pellicle.fitting.coordinates import Array
+from pellicle.fitting.film.view import error_of_plan
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build
 from pellicle.forward_model.plan import Plan
@@ -88,7 +89,7 @@ class Factor:
 
 
 @dataclass(frozen=True)
-class ColoursView(FilmView):
+class ColoursView:
     """Colours of a problem, one at each angle of incidence.
 
     `scene` has anonymous free parameters and the wavelengths of the sensor, one after the other for each
@@ -112,6 +113,10 @@ class ColoursView(FilmView):
         return ColourForm(self.plan.static_key)
 
     @property
+    def arrays(self) -> tuple[Scene, ColourData]:
+        return self.scene, self.data
+
+    @property
     def rows(self) -> int:
         """Number of colours."""
         return len(self.data.values)
@@ -127,6 +132,16 @@ class ColoursView(FilmView):
         value, lowest, highest = (np.asarray(x) for x in (self.data.values, *self.data.clipped))
         return max(int(np.sum((value > lowest) & (value < highest))), 1)
 
+    @property
+    def noise_groups(self) -> tuple[NoiseGroup, ...]:
+        """One group of all channels."""
+        return (NoiseGroup(tuple(range(self.channels)), self.noise.known, self.independent),)
+
+    @property
+    def independent_fraction(self) -> Any:
+        """Effective points per point (...): correlated errors count less."""
+        return self.data.independent_fraction
+
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return local(self.form, self.scene, self.data, values)
@@ -134,6 +149,14 @@ class ColoursView(FilmView):
     def residuals(self, at: Local) -> np.ndarray:
         """Weighted residuals (colours, 3), of the model as the camera clips it."""
         return np.asarray(at.residual)
+
+    def at_model(self, at: Any) -> float:
+        """1: the noise of colours does not depend on the model."""
+        return 1.0
+
+    def by_local_noise(self, values: Any) -> ColoursView:
+        """The view itself: its points are not neighbours along a spectrum."""
+        return self
 
     def response(self, at: Local) -> np.ndarray:
         """The matrix (3, 3) from colours of the sensor to recorded linear channels."""
@@ -181,6 +204,18 @@ class ColoursView(FilmView):
         """Weights times `factor` (a number, (channels,) or (rows, channels)), each point for `fraction` of
         one."""
         return replace(self, data=self.data._replace(weight=self.data.weight * factor)).counting(fraction)
+
+    def counting(self, fraction: Any) -> ColoursView:
+        """The view with each point counting for `fraction` (...) of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
+
+    def thinned(self) -> ColoursView:
+        """The view as it is: the integral needs all wavelengths."""
+        return self
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        return error_of_plan(self.plan, self.scene, values)
 
     def encoded(self, linear: Any) -> np.ndarray:
         """Linear channels (..., 3) in the space of the data."""

@@ -11,13 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pellicle.fitting.coordinates import box
 from pellicle.fitting.film import residual_structure
 from pellicle.fitting.film.parameters import bounds, with_bounds
 from pellicle.fitting.film.problem import Target, make
 from pellicle.fitting.film.search import search
+from pellicle.fitting.minima import MOST, Minima, distinct, minima, solve
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem, Progress, box
-from pellicle.fitting.reweighting import MOST, Minima, RankedMinima, distinct, minima, rank, solve
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress
+from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.status import RIVAL
 
 log = getLogger(__name__)

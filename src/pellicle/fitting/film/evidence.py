@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from pellicle.fitting.covariance import Scaled
-from pellicle.fitting.discrepancy import Effect, Evidence
 from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_evidence
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.film.systematic_effects import systematic_effects
 from pellicle.fitting.film.view import Local, SpectrumView
-from pellicle.fitting.noise import DRIFT_CORRELATION, median, short_range_noise
+from pellicle.fitting.linear_system import Effect, Evidence
+from pellicle.fitting.noise import DRIFT_CORRELATION, short_range_noise
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import median
 
 LEAST_NOISE = 1e-9
 """Least noise, as a share of the signal's level: rounding in simulated data."""

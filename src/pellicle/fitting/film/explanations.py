@@ -8,17 +8,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.errors import DataError
-from pellicle.fitting.discrepancy import Contribution, huber_roots
+from pellicle.fitting.discrepancy import Contribution
 from pellicle.fitting.film import mistakes
 from pellicle.fitting.film.mistakes import Mistake
 from pellicle.fitting.film.other_readings import Data, folded, readings
 from pellicle.fitting.film.parameters import thickness_name
 from pellicle.fitting.film.problem import Measured, Target, make
 from pellicle.fitting.film.search import search
+from pellicle.fitting.linear_system import huber_roots
+from pellicle.fitting.minima import minima
 from pellicle.fitting.noise import short_range_noise
-from pellicle.fitting.problem import Problem, Progress, quiet
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Estimate, Fit, Status
-from pellicle.fitting.reweighting import RankedMinima, minima
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, describe
 
 log = getLogger(__name__)

@@ -34,10 +34,12 @@ from pellicle.fitting.film.problem import Target, make, measured, without_scale
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.sweeps import with_sweeps
-from pellicle.fitting.noise import LEAST_SQUARES, ROBUST, check_loss
-from pellicle.fitting.problem import Problem, Progress, quiet
+from pellicle.fitting.minima import Minima
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Estimate, Fit, Rival, Status
-from pellicle.fitting.reweighting import Minima, RankedMinima
+from pellicle.fitting.reweighting import RankedMinima
+from pellicle.fitting.robust_losses import LEAST_SQUARES, ROBUST, check_loss
 from pellicle.fitting.status import expanded, verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, remembered

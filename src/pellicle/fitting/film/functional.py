@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
+from pellicle.fitting.coordinates import Array, Box
 from pellicle.fitting.evaluation import Static, Until, polished
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
-from pellicle.fitting.problem import Array, Box
-from pellicle.fitting.reweighting import MOST, STEPS
+from pellicle.fitting.minima import MOST, STEPS
 from pellicle.scene.film import Scene
 
 

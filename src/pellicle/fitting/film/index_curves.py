@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.empirical import HC, CauchyUrbach, Constant, known_index
+from pellicle.dispersion.base import HC, known_index
+from pellicle.dispersion.empirical import CauchyUrbach, Constant
 from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.fitting.assembly import Assembly
@@ -24,11 +25,12 @@ from pellicle.fitting.conclusion import Conclusion
 from pellicle.fitting.curves import at_each_wavelength
 from pellicle.fitting.film.parameters import thickness_name
 from pellicle.fitting.film.problem import Measured, Target, make
+from pellicle.fitting.minima import solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.reported_layer import reported_layer, reported_medium
 from pellicle.fitting.result import Estimate, Part, Status
-from pellicle.fitting.reweighting import RankedMinima, solve
+from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, WELL_KNOWN, apart_from, distinct_rivals, expanded
 from pellicle.optics.pair import imag, real
 from pellicle.scene.free import Free, free_leaves, insert

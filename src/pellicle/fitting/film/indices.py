@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.dispersion.anisotropic import ordinary_index
-from pellicle.dispersion.empirical import known_index
+from pellicle.dispersion.base import known_index
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert, remembered

@@ -8,7 +8,8 @@ from logging import INFO, getLogger
 
 import numpy as np
 
-from pellicle.dispersion.empirical import AbstractDispersion, Constant
+from pellicle.dispersion.base import AbstractDispersion
+from pellicle.dispersion.empirical import Constant
 from pellicle.fitting.film.colour_measurements import MeasuredColours
 from pellicle.fitting.film.problem import Target
 from pellicle.fitting.problem import Problem

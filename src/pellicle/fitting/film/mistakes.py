@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import numpy as np
 
-from pellicle.dispersion.empirical import AbstractDispersion, known_index
+from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.errors import DataError
 from pellicle.fitting.film.problem import Measured
 from pellicle.materials import Material, material

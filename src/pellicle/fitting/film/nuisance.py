@@ -15,9 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ScalarLike
 
-from pellicle.fitting.covariance import times
+from pellicle.fitting.coordinates import Array
+from pellicle.fitting.normal_equations import times
 from pellicle.fitting.positive_definite import nonnegative
-from pellicle.fitting.problem import Array
 from pellicle.scene.free import remembered
 from pellicle.scene.instrument import Drift, Instrument
 

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from pellicle.dispersion.anisotropic import ParameterLocation, locate_parameter
-from pellicle.dispersion.empirical import AbstractDispersion
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
     CodyLorentz,

@@ -12,12 +12,13 @@ from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import exact, plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting import noise
+from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_view
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.parameters import anonymous, bounds, shared
 from pellicle.fitting.film.sweeps import sweeps_of
 from pellicle.fitting.film.view import ROUND, SpectrumView
-from pellicle.fitting.problem import Noise, Problem, box
+from pellicle.fitting.problem import Noise, Problem
 from pellicle.forward_model.film_signal import depolarises, tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Light, Scene, coherent_layers, with_wavelength

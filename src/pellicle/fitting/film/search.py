@@ -18,9 +18,10 @@ import numpy as np
 from pellicle.fitting.evaluation import scanned
 from pellicle.fitting.film.fringes import proposed
 from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem, Progress
-from pellicle.fitting.reweighting import MOST, SLOTS, Minima, Scan, settled, solve
+from pellicle.fitting.problem import Problem
+from pellicle.fitting.progress import Progress
 
 log = getLogger(__name__)
 

@@ -13,7 +13,7 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.empirical import Shifted
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.curves import Curve
-from pellicle.fitting.discrepancy import Discrepancy, Evidence
+from pellicle.fitting.discrepancy import Discrepancy
 from pellicle.fitting.film import fringes, parts, residual_structure
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.evidence import evidence
@@ -21,10 +21,12 @@ from pellicle.fitting.film.indices import indices
 from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
 from pellicle.fitting.film.problem import Target, drifts, shortest_wavelength
 from pellicle.fitting.film.view import SpectrumView
-from pellicle.fitting.noise import local_noise, spread, student
+from pellicle.fitting.linear_system import Evidence
+from pellicle.fitting.noise import local_noise, student
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
+from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.status import RIVAL
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene

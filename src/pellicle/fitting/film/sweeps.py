@@ -17,8 +17,9 @@ from jaxtyping import Float, Int
 from pellicle.data.colours import Colours
 from pellicle.data.repeated_sweeps import deviations
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.covariance import Scaled, by_singular_values
+from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.noise import integrated_time
+from pellicle.fitting.normal_equations import by_singular_values
 from pellicle.fitting.repeated_measurements import Agreement, RepeatedParameter, short
 from pellicle.fitting.result import Estimate
 from pellicle.fitting.reweighting import RankedMinima

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.dispersion.effective_medium import AbstractMixture
-from pellicle.fitting.discrepancy import HALF_NORMAL, Effect
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.extended_scene import ExtendedScene, Number, extended
 from pellicle.fitting.film.view import Local, SpectrumView
+from pellicle.fitting.linear_system import HALF_NORMAL, Effect
 from pellicle.optics.orders import FWHM
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free

@@ -11,11 +11,12 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
+from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
-from pellicle.fitting.problem import Array, Explained, Noise, NoiseGroup, UsualView
+from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
@@ -82,24 +83,17 @@ SCAN_POINTS = 448
 """Wavelengths used while scanning: enough for four samples in a fringe of 5 µm at index 2."""
 
 
-class FilmView(UsualView):
-    """A view of data that a `scene` explains by its plan."""
-
-    @property
-    def arrays(self: Any) -> tuple[Scene, Any]:
-        return self.scene, self.data
-
-    def off_tolerance(self: Any, values: np.ndarray) -> float:
-        """Error of the view's plan at `values`, in the unit of its signal."""
-        if not self.plan.tolerance:
-            return 0.0
-        at = np.asarray(values)[None]
-        planned, whole = (signals(p, self.scene, at, build) for p in (self.plan, full_plan(self.scene)))
-        return largest_difference(planned, whole, self.plan.degrees)
+def error_of_plan(plan: Plan, scene: Scene, values: np.ndarray) -> float:
+    """Error of a plan of a scene with its free parameters at `values`, in the unit of the signal."""
+    if not plan.tolerance:
+        return 0.0
+    at = np.asarray(values)[None]
+    planned, whole = (signals(each, scene, at, build) for each in (plan, full_plan(scene)))
+    return largest_difference(planned, whole, plan.degrees)
 
 
 @dataclass(frozen=True)
-class SpectrumView(FilmView):
+class SpectrumView:
     """One spectrum of a problem, or many of one scene and grid, whose data have leading axes (...).
 
     `scene` has anonymous free parameters and sampled media; `takes` are the positions of its parameters in
@@ -121,6 +115,10 @@ class SpectrumView(FilmView):
     @property
     def form(self) -> SpectrumForm:
         return SpectrumForm(self.plan.static_key, self.signal)
+
+    @property
+    def arrays(self) -> tuple[Scene, Data]:
+        return self.scene, self.data
 
     @property
     def rows(self) -> int:
@@ -149,6 +147,11 @@ class SpectrumView(FilmView):
             for group in self.signal.groups(self.channels, self.data.frame is not None)
         )
 
+    @property
+    def independent_fraction(self) -> Any:
+        """Effective points per point (...): correlated errors count less."""
+        return self.data.independent_fraction
+
     def local(self, values: Any) -> Local:
         """The model around `values` (its parameters,)."""
         return local(self.form, self.scene, self.data, values)
@@ -171,11 +174,16 @@ class SpectrumView(FilmView):
         """Number of coefficients: a spectrum determines nearly all of them."""
         return float(len(self.nuisances(at)))
 
-    def by_local_noise(self, at: Local) -> SpectrumView:
-        """The view with weights by the noise of neighbouring points, where σ is not given and differs."""
+    def at_model(self, at: Any) -> float:
+        """1: the noise of a spectrum does not depend on the model."""
+        return 1.0
+
+    def by_local_noise(self, values: Any) -> SpectrumView:
+        """The view with weights by the noise of neighbouring points at `values` (its parameters,), where σ is
+        not given and differs."""
         if self.noise.known:
             return self
-        columns = self.residuals(at).T
+        columns = self.residuals(self.local(values)).T
         ratio = np.stack([uneven_noise(column, self.sweeps) for column in columns], axis=-1)
         return self.reweighted(1 / ratio, self.independent_fraction) if np.any(ratio > 1) else self
 
@@ -205,6 +213,10 @@ class SpectrumView(FilmView):
         most = 1 / DRIFT_CORRELATION if self.noise.drifting else 1.0
         data = self.data._replace(weight=self.data.weight * whole)
         return replace(self, data=data).counting(np.minimum(fraction, most))
+
+    def counting(self, fraction: Any) -> SpectrumView:
+        """The view with each point counting for `fraction` (...) of an independent one."""
+        return replace(self, data=self.data._replace(independent_fraction=np.asarray(fraction, float)[()]))
 
     def thinned(self) -> SpectrumView:
         """Every so-many-th wavelength, at most about `SCAN_POINTS`, with the weight of those left out."""
@@ -243,6 +255,10 @@ class SpectrumView(FilmView):
             return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
 
         return jax.tree_util.tree_map(pick, (self.scene, self.data))
+
+    def off_tolerance(self, values: np.ndarray) -> float:
+        """Error of the view's plan at `values`, in the unit of its signal."""
+        return error_of_plan(self.plan, self.scene, values)
 
     @property
     def rounding(self) -> Any:

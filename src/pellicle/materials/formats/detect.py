@@ -11,8 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from pellicle.data.tabular.columns import recognise_all, wavelength_unit
+from pellicle.data.tabular.columns import recognise_all
 from pellicle.data.tabular.text import Line, in_file
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 from pellicle.materials.formats import optical_constants as optical
 from pellicle.materials.formats import plain_table, refractiveindex_info

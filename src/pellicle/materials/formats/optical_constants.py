@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.data.tabular.columns import to_nm
 from pellicle.data.tabular.table import Table, plain_columns
 from pellicle.data.tabular.text import Line, content_lines, is_number, open_binary, text_of
-from pellicle.dispersion.empirical import AbstractDispersion, WithExtinction
+from pellicle.data.tabular.units import to_nm
+from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Table as InterpolatedTable
+from pellicle.dispersion.empirical import WithExtinction
 from pellicle.errors import DataError
 
 LARGEST_FILE = 64 * 2**20

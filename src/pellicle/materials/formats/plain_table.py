@@ -9,10 +9,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pellicle.data.tabular.columns import Column, is_unit_row, recognise_all, wavelength_unit
+from pellicle.data.tabular.columns import Column, is_unit_row, recognise_all
 from pellicle.data.tabular.layout import header_cells, read_table
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import split
+from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
 from pellicle.materials.formats.optical_constants import (
     MaterialFile,
