@@ -74,7 +74,12 @@ def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Sp
 
     Without a file of the reference, its counts and those without light lie beside those of the sample.
     """
-    from pellicle.data.read_counts import read_counts, read_counts_beside, reflectance_from_counts
+    from pellicle.data.read_counts import (
+        read_counts,
+        read_counts_beside,
+        reflectance_from_counts,
+        without_dark_edges,
+    )
 
     if options.signal not in (None, "R"):
         raise UsageError("--reference turns counts into reflectance: leave --signal out, or give R")
@@ -88,6 +93,8 @@ def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Sp
     )
     if reference is None:
         raise UsageError(f"{path}: has no column of reference counts; give their file with --reference")
+    if options.range is None:
+        sample = without_dark_edges(sample, reference, dark)
     known = _reference_reflectance(sample, options, stack)
     return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise))
 

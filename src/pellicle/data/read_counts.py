@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from pellicle.data.formats.detect import read_tables
+from pellicle.data.noisy_edges import noisy_edges
 from pellicle.data.read_power import beside_wavelength, by_position, read_signal
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.column_selection import Selection, named_columns, only
 from pellicle.data.tabular.columns import COUNTS, listed
 from pellicle.data.tabular.table import Table
 from pellicle.errors import DataError, UsageError
-from pellicle.signals.limits import check_noise, check_power
+from pellicle.signals.limits import HIGHEST, check_noise, check_power
 
 
 def read_counts(
@@ -144,6 +145,25 @@ def reflectance_from_ratio(ratio: Spectrum, reference_reflectance: np.ndarray) -
     sweeps = [reflectance_from_ratio(sweep, known) for sweep in ratio.sweeps]
     note = "relative to the reference, and multiplied by its reflectance"
     return _reflectance(ratio, ratio.values * known, sigma, sweeps, "ratio", note)
+
+
+def without_dark_edges(sample: Spectrum, reference: Spectrum, dark: Spectrum | None = None) -> Spectrum:
+    """Leave out the edges of the counts of a sample where the reference has no light, with a note.
+
+    **Arguments:** as in `reflectance_from_counts`; a `sample` of several sweeps stays as it is.
+    """
+    other = [sample, reference] if dark is None else [sample, reference, dark]
+    if sample.sweeps or any(not np.array_equal(sample.wavelength, one.wavelength) for one in other):
+        return sample
+    background = 0.0 if dark is None else dark.values
+    full = reference.values - background
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient = np.where(full > 0, (sample.values - background) / full, 2 * HIGHEST)
+    good = noisy_edges(sample.wavelength, quotient, full)
+    if good is None:
+        return sample
+    kept = sample.cut(*sample.wavelength[good.rows][[0, -1]].tolist())
+    return replace(kept, left_out=good.left_out, notes=(*sample.notes, good.note))
 
 
 def _known(reference_reflectance: np.ndarray, sample: Spectrum) -> np.ndarray:

@@ -1,10 +1,14 @@
 """Reading of reflectance, transmittance and counts from a table: their columns, units and checks."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from pellicle.data.detector_overlap import detectors, joined
+from pellicle.data.noisy_edges import noisy_edges, readable_range
+from pellicle.data.repeated_sweeps import one_way
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import Reading, Rows, axis_unit
 from pellicle.data.tabular import column_selection as selection
@@ -229,23 +233,49 @@ def read_power(table: Table, chosen: selection.Selection, asked: Reading) -> Spe
         )
     axis_unit(table, chosen.axis.wavelength, asked.wavelength_unit)  # asked for before that of the signal
     scale = signal_scale(table, chosen, asked.signal_unit)
-    rows = read_signal(table, chosen, asked.wavelength_unit)
+    rows = read_signal(table, chosen, asked.wavelength_unit, detectors)
     columns, notes = scale.fractions(**rows.columns), [scale.note(kind, calibrated)]
     if asked.noise is not None:
         notes += ["the given noise replaces the column of standard deviations"] if chosen.errors else []
         columns["sigma"] = np.full(len(columns["values"]), float(asked.noise))
-    rows = replace(rows, columns=columns, notes=(*rows.notes, *notes)).cut(asked.range)
+    rows = replace(rows, columns=columns, notes=(*rows.notes, *notes))
+    overlap = None if rows.axis.setting is not None else detectors(rows.axis.wavelength)
+    if overlap is not None:
+        rows = joined(rows, *overlap)
+    rows = rows.cut(asked.range)
+    words: dict[str, Any] = {"signal": kind, "calibrated": calibrated}
+    if asked.range is None and not chosen.errors and one_way(rows.axis.wavelength):
+        light = None if overlap else _light(table, asked)
+        good = noisy_edges(rows.axis.wavelength, rows.columns["values"], light, calibrated=calibrated)
+        if good is not None:
+            rows, words["left_out"] = rows.taken(good.rows, good.note), good.left_out
     _check(rows, chosen, kind, calibrated, scale.stated)
-    polarisation = named or declared or asked.polarisation or "unpolarised"
-    return rows.spectrum((), rows.columns, signal=kind, polarisation=polarisation, calibrated=calibrated)
+    words["polarisation"] = named or declared or asked.polarisation or "unpolarised"
+    return rows.spectrum((), rows.columns, **words)
 
 
-def read_signal(table: Table, chosen: selection.Selection, unit: str | None) -> Rows:
+def _light(table: Table, asked: Reading) -> np.ndarray | None:
+    """Counts of the reference less the dark, None where the file has no such columns."""
+    named = selection.named_columns(table, asked.columns) or ()
+    counts = [column.position for role in COUNTS[1:] for column in named if column.role == role]
+    try:
+        reference, dark = table.numbers(counts) if len(counts) == 2 else (None, None)
+    except DataError:
+        return None
+    return None if reference is None else reference - dark
+
+
+def read_signal(
+    table: Table,
+    chosen: selection.Selection,
+    unit: str | None,
+    overlapping: Callable[[np.ndarray], object] = lambda _: False,
+) -> Rows:
     """Read `values` and, if there is one, their `sigma`, against an axis in the `unit` that the user gives.
 
-    A quotient of counts is infinite where the reference has none. Raises as `Rows.read` does.
+    A quotient of counts is infinite where the reference has none. `overlapping` and errors as of `Rows.read`.
     """
-    rows = Rows.read(table, chosen, unit)
+    rows = Rows.read(table, chosen, unit, overlapping)
     values, *sigma = (rows.columns[column.role] for column in (*chosen.values, *chosen.errors))
     if chosen.others:
         reference, background = rows.columns["reference counts"], rows.columns.get("dark counts", 0.0)
@@ -332,10 +362,13 @@ def _check(rows: Rows, chosen: selection.Selection, signal: str, calibrated: boo
                 f"{table.path}: {table.label(column.position)} is nowhere positive; check what it holds"
             )
         return
-    remedy = "leave it out with `range`, or correct that row"
+    readable = readable_range(rows.axis.wavelength, values)
+    limits = "`range`" if readable is None else "`range=({:g}, {:g})`".format(*readable)
+    remedy = f"leave it out with {limits}, or correct that row"
     too_high = (
         'if the file is in percent or an absorbance, say so with `signal_unit="percent"` or '
         '`signal_unit="absorbance"`, or in its header'
+        + ("" if readable is None else f"; if it is noise, leave it out with {limits}")
     )
     kind = KINDS[signal]()
     assert isinstance(kind, OneColumn)

@@ -24,6 +24,14 @@ _OF_PARTS = ("values", "sigma", "delta", "delta_sigma")
 _REMEDY = "correct or delete that point"
 
 
+class LeftOut(NamedTuple):
+    """Points that are not fitted: wavelengths in nm, values as fractions; and the reason."""
+
+    wavelength: Float[np.ndarray, " points"]
+    values: Float[np.ndarray, " points"]
+    reason: str
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Spectrum:
     """One measured signal against wavelength.
@@ -57,6 +65,7 @@ class Spectrum:
     - `ratios`: names of the columns of `values`, `delta` and their errors, some of "ane", "aps" and "asp"
       (`pellicle.signals.generalised`), for "generalised-psi-delta".
     - `transmission`: Ψ and Δ are those of t_p/t_s, for "psi-delta".
+    - `left_out`: points of the file at noisy edges of its range (`data.noisy_edges`), for figures.
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -87,6 +96,7 @@ class Spectrum:
     azimuth: np.ndarray | None = None
     ratios: tuple[str, ...] = ()
     transmission: bool = False
+    left_out: LeftOut | None = None
 
     def __post_init__(self) -> None:
         for name in _ARRAYS:

@@ -78,13 +78,21 @@ class Rows:
     notes: tuple[str, ...]
 
     @classmethod
-    def read(cls, table: Table, chosen: Selection, unit: str | None) -> Rows:
+    def read(
+        cls,
+        table: Table,
+        chosen: Selection,
+        unit: str | None,
+        overlapping: Callable[[np.ndarray], object] = lambda _: False,
+    ) -> Rows:
         """Read the chosen axis in the `unit` that the user gives, or None, and columns by their roles.
+
+        `overlapping` tells of wavelengths (rows,) that are not monotone whether the caller can read them.
 
         Raises DataError or UsageError.
         """
         unit = axis_unit(table, chosen.axis.wavelength, unit)
-        axis, values = read_axis(table, chosen.axis, chosen.columns, unit)
+        axis, values = read_axis(table, chosen.axis, chosen.columns, unit, overlapping)
         columns = {column.role: x for column, x in zip(chosen.columns, values, strict=True)}
         notes = (*table.notes, *chosen.notes, f"wavelength unit: {unit or 'nm, assumed'}")
         return cls(table, np.arange(len(axis.wavelength)), axis, columns, notes)
@@ -93,12 +101,15 @@ class Rows:
         """The rows within limits (nm), with a note; all of them without limits. Raises as `Spectrum.cut`."""
         if limits is None:
             return self
-        inside, note = inside_range(self.axis.wavelength, limits, self.table.path)
+        return self.taken(*inside_range(self.axis.wavelength, limits, self.table.path))
+
+    def taken(self, rows: Any, note: str) -> Rows:
+        """Some of the rows, by an index of arrays, with a note."""
         return replace(
             self,
-            positions=self.positions[inside],
-            axis=self.axis.taken(inside),
-            columns={name: x[inside] for name, x in self.columns.items()},
+            positions=self.positions[rows],
+            axis=self.axis.taken(rows),
+            columns={name: x[rows] for name, x in self.columns.items()},
             notes=(*self.notes, note),
         )
 
@@ -157,13 +168,17 @@ def axis_unit(table: Table, column: Column, requested: str | None) -> str | None
 
 
 def read_axis(
-    table: Table, axis: AxisColumns, others: Sequence[Column], unit: str | None
+    table: Table,
+    axis: AxisColumns,
+    others: Sequence[Column],
+    unit: str | None,
+    overlapping: Callable[[np.ndarray], object] = lambda _: False,
 ) -> tuple[Axis, list[np.ndarray]]:
     """Return the axis and other columns, in file order.
 
     `unit` is the result of `axis_unit`; None means nm, assumed. Raises DataError for a cell that is not a
     finite number, an impossible wavelength or angle, or an axis that is not strictly monotone within one
-    angle and azimuth and is not that of several complete sweeps.
+    angle and azimuth and is neither that of several complete sweeps nor `overlapping`.
     """
     wavelength, angle, azimuth = axis
     columns = [wavelength, *others, *(column for column in (angle, azimuth) if column)]
@@ -185,7 +200,7 @@ def read_axis(
             f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
     converted = Axis(to_nm(values, unit or "nm"), angles, azimuths)
-    if converted.setting is None and one_way(values):
+    if converted.setting is None and (one_way(values) or overlapping(values)):
         return converted, read
     if are_sweeps(values, converted.setting, sweep_numbers(values, converted.setting)):
         return converted, read

@@ -54,7 +54,7 @@ def measured(spectrum: Spectrum) -> Section:
     x, label = abscissa(spectrum)
     settings, panels = lines_of(spectrum), []
     for q in columns:
-        lines, bands = [], []
+        lines, bands = _left_out(spectrum, q), []
         for j, (rows, name) in enumerate(settings):
             colour = "residual" if name is None else SERIES[j % len(SERIES)]
             drawn = stroke(x, q.data, rows, q.turns)
@@ -72,7 +72,7 @@ def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) ->
     settings, panels = lines_of(spectrum), []
     for q in columns:
         assert q.model is not None
-        lines = [Line(x, q.data, "data", "points", "point")]
+        lines = [*_left_out(spectrum, q), Line(x, q.data, "data", "points", "point")]
         for j, (rows, setting) in enumerate(settings):
             name = "fit" if setting is None else f"fit, {setting}"
             dashed = j // len(SERIES) % 2
@@ -81,6 +81,15 @@ def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) ->
             lines.append(Line(*stroke(x, q.model, rows, q.turns), name, SERIES[j % len(SERIES)], **style))
         panels.append(_values(q, lines, [], "inside" if q is columns[0] else ""))
     return [*_in_rows(spectrum, columns, panels), [_residuals(spectrum, columns, x)]]
+
+
+def _left_out(spectrum: Spectrum, q: Quantity) -> list[Line]:
+    """Grey points of noisy edges, those near the range of the others."""
+    if (points := spectrum.left_out) is None:
+        return []
+    low, high = float(np.min(q.data)), float(np.max(q.data))
+    near = np.abs(points.values - (low + high) / 2) < 0.75 * (high - low)
+    return [Line(points.wavelength[near], points.values[near], points.reason, "#BBBBBB", "point")]
 
 
 def _values(q: Quantity, lines: list[Line], bands: list[Band], legend: Place) -> Panel:

@@ -99,6 +99,7 @@ def _part(part: Part, fit: Fit) -> dict[str, Any]:
         **({"ratios": ratios} if ratios else {}),
         **({} if azimuth is None else {"azimuths_deg": np.unique(azimuth)}),
         **({"spectrum": name} if (name := getattr(data, "name", "")) else {}),
+        **left_out(data),
     }
     measured, model = (getattr(curve, f"depolarisation_{x}", None) for x in ("data", "model"))
     if measured is not None and model is not None:
@@ -113,6 +114,13 @@ def _part(part: Part, fit: Fit) -> dict[str, Any]:
             "probability": lack.probability,
         }
     return record | (taken(part, "rms", "chi2_reduced", "effective_points") if fit.joint else {})
+
+
+def left_out(data: object) -> dict[str, Any]:
+    """The record of points at noisy edges of a spectrum that are not fitted; empty without them."""
+    if (points := getattr(data, "left_out", None)) is None:
+        return {}
+    return {"left_out": {"points": len(points.wavelength), "reason": points.reason}}
 
 
 def _index(index: Index) -> list[dict[str, float]]:

@@ -11,7 +11,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.cube import Cube
 from pellicle.data.cubes.checks import sample
 from pellicle.data.spectrum import Spectrum
-from pellicle.reporting.json_record import strict, taken, versions
+from pellicle.reporting.json_record import left_out, strict, taken, versions
 from pellicle.reporting.plain_text import described
 from pellicle.reporting.quantities import colour_codes
 from pellicle.signals.registry import KINDS
@@ -52,6 +52,7 @@ def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
             "noise": {name: scatter(x) for name, x in _values(measured).items()},
             **{name: None if x is None else [x.min(), x.max()] for name, x in errors.items()},
             "declared": dict(measured.declared),
+            **left_out(measured),
         }
     else:
         record = _colours_record(measured) if isinstance(measured, Colours) else _cube_record(measured)

@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.errors import DataError, UsageError
+from pellicle.signals.local_scatter import local_scatter
 
 HIGHEST = 1.5  # a calibration may be off by half; 49 is a percentage without its unit
 LOWEST = -0.05  # without σ: what dark current and drift may do
+LOWEST_OF_NOISE = -0.1  # without σ, where the local scatter explains it
 LOWEST_WITH_SIGMA = -0.01  # with σ: the same for a good instrument, or −5 σ if that is lower
 
 PSI = (0.0, 90.0)
@@ -79,12 +81,15 @@ def check_power(
     """Refuse what no sample reflects or transmits; `noun` names it. Raises DataError.
 
     Values are at most 1.5 and at least -0.05, or with σ at least −5 σ or -0.01, whichever is lower: an offset
-    of the dark current reaches that. `too_high` and `remedy` are the advice for too high and too low values.
+    of the dark current reaches that. Without σ, −5 times the local scatter are accepted down to -0.1.
+    `too_high` and `remedy` are the advice for too high and too low values.
     """
     if values.max() > HIGHEST:
         high = values == values.max()
         refuse_first(values, high, where, f"is above {HIGHEST} for a {noun}; {too_high}")
     limit = np.full(values.shape, LOWEST) if sigma is None else np.minimum(LOWEST_WITH_SIGMA, -5 * sigma)
+    if sigma is None and values.min() < LOWEST:
+        limit = np.clip(-5 * local_scatter(values), LOWEST_OF_NOISE, LOWEST)
     lowest = int(np.argmin(values - limit))
     if values[lowest] < limit[lowest]:
         reason = f"is a {noun} below zero by more than noise ({limit[lowest]:g}); {remedy}"

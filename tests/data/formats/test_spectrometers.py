@@ -113,7 +113,7 @@ def test_counts_of_a_jaz_that_has_not_divided_them(write, refused):
 def test_a_reference_without_counts_is_left_out_by_its_range(write, refused):
     rows = "".join(f"{400 + i}\t10\t35\t{10 if i == 2 else 60}\n" for i in range(8))
     text = JAZ.partition("W\t")[0] + "W\tD\tS\tR\n" + rows
-    refused(text, "line 10", "inf is above 1.5", "`range`", signal="T")
+    refused(text, "line 10", "inf is above 1.5", "`range=(403, 407)`", signal="T")
     spectrum = read_spectrum(write(text), signal="T", range=(402.5, 410))
     np.testing.assert_allclose(spectrum.values, [0.5] * 5)
 
