@@ -78,21 +78,21 @@ def test_a_map_in_python_with_a_white_and_a_free_exposure(colours, tmp_path):
 
 @pytest.mark.slow  # another map; tests/data has the gamma
 def test_neighbours_choose_the_order_along_a_strip(pellicle, write, colours, tmp_path):
-    """With the exposure free some colours are those of thicker films too."""
+    """A red that is 4 % too bright and 1 % of flare leave most colours two thicknesses, or a wrong one."""
     random = np.random.default_rng(2)
-    path = photo(tmp_path / "wedge.png", np.clip(colours + random.normal(0, 0.004, colours.shape), 0, 1))
-    text = film_recipe(
-        'signal = "srgb"', "material = 1.46\nthickness = { lower = 20, upper = 800 }", substrate="3.9"
-    )
-    film = write(text + '\n[instrument]\nscale = "free"\n', "film.toml")
-    found = []
-    for more, code in (([], 4), (["--neighbours"], 0)):
+    linear = colours * [1.04, 1.0, 1.0] + 0.01
+    path = photo(tmp_path / "wedge.png", np.clip(linear + random.normal(0, 0.004, linear.shape), 0, 1))
+    layer = "material = 1.46\nthickness = { lower = 20, upper = 800 }"
+    film = write(film_recipe('signal = "srgb"', layer, substrate="3.9"), "film.toml")
+    undecided = []
+    for more in ([], ["--neighbours"]):
         words = ("map", path, "--recipe", film, "--strip", "0,6,59,6", "--json", *more)
-        [record] = pellicle(*words, code=code).objects
-        found.append(np.abs(np.array(record["positions"]["thickness"]) - THICKNESS) > 20)
+        [record] = pellicle(*words).objects
+        off = np.abs(np.array(record["positions"]["thickness"]) - THICKNESS)
         states = np.array(record["positions"]["status"])
-    assert np.sum(found[0]) > 2
-    assert not np.any(found[1][states != "ambiguous"])
+        assert not np.any((off > 20) & (states != "ambiguous"))
+        undecided.append(np.sum(states == "ambiguous"))
+    assert undecided[0] > 20 + undecided[1]
     assert np.sum(states == "by-neighbours") > 20
 
 

@@ -112,6 +112,25 @@ def test_a_wide_range_of_the_exposure_has_a_grid_as_fine(table):
     assert np.all(np.nanmin(np.abs(found.thickness - truth[:, None]) / found.stderr, axis=1) < 4)
 
 
+def test_orders_with_an_error_of_the_camera(table):
+    """Against a sum over the flare, which a Gaussian of 0.02 has, of the posterior by noise alone."""
+    flare, truth = 0.02, np.array([150.0, 333.0, 480.0])
+    linear = np.asarray(film_colour(truth, OXIDE, SILICON, method="uniform-64").linear_srgb)
+    colours = np.asarray(srgb(linear + 0.7 * flare))
+    found = ColourInverse.build(table, errors=lambda linear: [np.full(linear.shape, flare)])(colours)
+    nm, size = np.linspace(0, TOP, 9001), np.linspace(-4, 4, 81)
+    films = np.asarray(film_colour(nm, OXIDE, SILICON, method="uniform-64").linear_srgb)
+    shown = np.asarray(srgb(np.clip(films[:, None] + flare * size[:, None], 0, None)))
+    for colour, orders, probability in zip(colours, found.thickness, found.probability, strict=True):
+        chi2 = np.sum(((shown - colour) / SIGMA) ** 2, axis=-1) + size**2
+        posterior = np.sum(np.exp(-0.5 * (chi2 - chi2.min())), axis=1)
+        edges = 0.5 * (np.sort(orders[np.isfinite(orders)])[1:] + np.sort(orders[np.isfinite(orders)])[:-1])
+        share = np.bincount(np.digitize(nm, edges), posterior, len(edges) + 1) / posterior.sum()
+        order = np.argsort(orders[np.isfinite(orders)])
+        np.testing.assert_allclose(probability[np.isfinite(orders)][order], share, atol=0.05)
+        assert np.min(np.abs(nm[np.argmax(posterior)] - orders[:1])) < 5
+
+
 def test_status(table):
     assert invert(table, [0.1, 0.9, 0.1]).status == "misfit"
     beyond = measured(np.array([411.0]), (0.0, 60.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,6 +23,8 @@ _PRUNED, _SCREENED = 30.0, 90.0
 _APART = 1.5
 """Two maxima nearer than this many times the sum of their standard deviations are one order."""
 _STEP = 1.01
+Errors = Callable[[np.ndarray], Sequence[np.ndarray]]
+"""Function from linear channels (..., 3) to changes of them by one standard uncertainty of each error."""
 _MANY, _CHUNK = 4096, 2_000_000
 _FINEST, _COARSEST, _MOST = 0.02, 1.0, 16_384
 
@@ -62,6 +64,7 @@ class ColourInverse:
     gain: tuple[float, float]  # exposure to the power of the space
     white: np.ndarray
     single: bool  # one angle, for which colours have no axis
+    errors: Errors | None = None  # of the camera
 
     @classmethod
     def build(
@@ -73,6 +76,7 @@ class ColourInverse:
         sigma: Any = SIGMA,
         exposure: float | tuple[float, float] = 1.0,
         thickness: tuple[float, float] | None = None,
+        errors: Errors | None = None,
     ) -> ColourInverse:
         """Compute the colours. Arguments and errors are those of `invert`."""
         angles, code = np.atleast_1d(np.asarray(angle, float)), encoding(space, table.white)
@@ -111,7 +115,7 @@ class ColourInverse:
         known_as = (float(gain[0]), float(gain[1]))
         return cls(
             *(grid, np.gradient(grid), channels, roots, homogeneous, code, deviation, known_as),
-            *(np.asarray(table.white), np.ndim(angle) == 0),
+            *(np.asarray(table.white), np.ndim(angle) == 0, errors),
         )
 
     def __call__(self, colours: Any, orders: int = 8) -> ColourThickness:
@@ -138,6 +142,20 @@ class ColourInverse:
         shown = self.space.encode(self.channels[node], self.roots[node], gain[:, None])
         return (shown.reshape(colours.shape) - colours) / self.sigma
 
+    def precision(self, colours: np.ndarray) -> np.ndarray:
+        """Inverse covariance (N, channels, channels) of noise and camera errors of colours (N, channels), in
+        units of σ. Errors are taken to first order at the measured colours; a clipped channel has none."""
+        count = colours.shape[1]
+        covariance = np.broadcast_to(np.eye(count), (len(colours), count, count))
+        if self.errors is not None:
+            linear = self.space.decoded(colours.reshape(len(colours), -1, 3))
+            inside = _inside(colours, self.space) / self.sigma
+            rise = self.space.rise(linear)
+            for change in self.errors(linear):
+                coded = np.einsum("naij,naj->nai", rise, change).reshape(colours.shape) * inside
+                covariance = covariance + coded[:, :, None] * coded[:, None, :]
+        return np.linalg.inv(covariance)
+
 
 def invert(
     table: FilmColourTable, colours: Any, angle: Any = 0.0, *, orders: int = 8, **how: Any
@@ -160,6 +178,9 @@ def invert(
     - `exposure`: factor between the film's colours and the measured ones, relative to a perfect reflector:
       a number where it is known, (lowest, highest) where it is free and common to all angles of a colour.
     - `thickness`: range (nm) within that of the table, which is the default.
+    - `errors`: function from linear channels (..., 3) to a list of changes of them (..., 3), each by one
+      standard uncertainty of an error of the camera, common to all channels and angles of a colour. They add
+      to the covariance of σ.
 
     sRGB channels of 0 and 1 are limits: the film may be darker or brighter.
 
@@ -176,37 +197,54 @@ def invert(
     return ColourInverse.build(table, angle, **how)(colours, orders)
 
 
-def _screened(colours: np.ndarray, model: ColourInverse) -> tuple[np.ndarray, np.ndarray]:
+def _inside(colours: np.ndarray, space: Encoding) -> np.ndarray:
+    """1 where a channel (N, channels) is a measurement, 0 where it is a limit."""
+    return ((colours > 0) & (colours < 1)).astype(float) if space.clips else np.ones_like(colours)
+
+
+def _screened(
+    colours: np.ndarray, model: ColourInverse, precision: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """χ² (colours, grid) by linear regression on the gain, and the gain.
 
     Channels at their limits are left out, and dark ones follow the power: it is exact for a known exposure.
     """
     space, angles = model.space, model.channels.shape[1]
+    inside = _inside(colours, space)
+    within = (precision * inside[:, :, None] * inside[:, None, :]).astype(np.float32)
     value = ((colours - np.tile(space.base, angles)) / model.sigma).astype(np.float32)
-    inside = ((colours > 0) & (colours < 1) if space.clips else np.ones_like(colours)).astype(np.float32)
+    weighted = np.einsum("nij,nj->ni", within, value)
     h = model.homogeneous.astype(np.float32)
-    along, square = (value * inside) @ h.T, inside @ (h * h).T
+    products = (h[:, :, None] * h[:, None, :]).reshape(len(h), -1)
+    along, square = weighted @ h.T, within.reshape(len(within), -1) @ products.T
     gain = np.clip(along / np.maximum(square, 1e-20), *np.array(model.gain, np.float32))
-    chi2 = np.sum(value * value * inside, axis=1)[:, None] + gain * (gain * square - 2 * along)
+    chi2 = np.sum(weighted * value, axis=1)[:, None] + gain * (gain * square - 2 * along)
     return chi2, gain
 
 
 def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.ndarray, ...]:
     """The columns of `ColourThickness` of colours (colours, channels)."""
     each = np.arange(len(colours))
-    chi2, gain = _screened(colours, model)
+    precision = model.precision(colours)
+    chi2, gain = _screened(colours, model, precision)
     row, node = np.nonzero(chi2 < chi2.min(axis=1, keepdims=True) + _SCREENED)
     gain = gain[row, node].astype(float)
-    missed = model.missed(colours[row], node, gain)
+    whitening = np.linalg.cholesky(precision)
+
+    def missed_at(gain: np.ndarray) -> np.ndarray:
+        """Residuals (N, channels) in standard deviations of noise and errors, without correlation."""
+        return np.einsum("nij,ni->nj", whitening[row], model.missed(colours[row], node, gain))
+
+    missed = missed_at(gain)
     log_volume: Any = 0.0
     if model.gain[1] > model.gain[0]:  # one step of Gauss and Newton in ln(gain), exact for dark channels
-        slope = (model.missed(colours[row], node, gain * _STEP) - missed) / np.log(_STEP)
+        slope = (missed_at(gain * _STEP) - missed) / np.log(_STEP)
         curvature = np.sum(slope * slope, axis=1)
         gain = gain * np.exp(
             np.clip(-np.sum(slope * missed, axis=1) / np.maximum(curvature, 1e-9), -0.2, 0.2)
         )
         gain = np.clip(gain, *model.gain)
-        missed = model.missed(colours[row], node, gain)
+        missed = missed_at(gain)
         # width of the likelihood in ln(gain), at most that of the prior
         log_volume = -0.5 * np.log(curvature / (2 * np.pi) + np.log(model.gain[1] / model.gain[0]) ** -2)
     chi2 = np.sum(missed * missed, axis=1)

@@ -201,7 +201,7 @@ def _photograph_colours(
         value, sigma, sentences = _region_colour(region, photograph, seen.coding, reference)
         of_region = None if angles is None else np.atleast_1d(angles if angles.ndim == 0 else angles[number])
         rows = ColourRows(space, value, sigma, of_region, None, (*told, *sentences), str(region))
-        rows = rows._replace(balance=_UNBALANCED if white is flat_field is None else None)
+        rows = rows._replace(balance=white_balance_error(white, flat_field))
         films.append(rows._replace(path=photograph.path, sha256=photograph.sha256))
     if angles is None or not angles.ndim:
         return films, seen
@@ -229,6 +229,11 @@ def check_photograph(photograph: photographs.Photograph, space: str | None) -> s
             " photograph to sRGB"
         )
     return space or "srgb"
+
+
+def white_balance_error(white: Pixels | None, flat_field: str | os.PathLike[str] | None) -> float | None:
+    """Relative standard uncertainty of a photograph's white balance, None for the usual one."""
+    return _UNBALANCED if white is flat_field is None else None
 
 
 def against_white(

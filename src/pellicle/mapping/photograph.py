@@ -6,15 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.colour import ColourInverse
-from pellicle.colour.inverse import ColourThickness
+from pellicle.colour.inverse import ColourThickness, Errors
 from pellicle.colour.observers import Sensor
 from pellicle.data.cameras import Camera, Sight, sight
 from pellicle.data.colours import USUAL_NOISE
 from pellicle.data.photographs import Photograph, Region, parse_regions, read_photograph
 from pellicle.data.photographs import strip as strip_of
-from pellicle.data.read_colours import against_white, check_photograph
+from pellicle.data.read_colours import against_white, check_photograph, white_balance_error
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
+from pellicle.fitting.film.camera_errors import channel_errors
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -96,7 +97,21 @@ def map_photograph(
     if space == "rgb":  # a camera's channels are linear, with the σ of their median
         middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
         spread = sigma * gamma * middle ** (1 - 1 / gamma)
-    inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread)
+    balance = white_balance_error(white, flat_field)
+
+    def errors(linear: np.ndarray) -> list[np.ndarray]:
+        """Changes of linear channels (..., 3) by one standard uncertainty of each error of the camera."""
+        every = channel_errors(
+            *(linear, scene.uncertainty, space),
+            balance=balance,
+            coded=space == "srgb" or gamma != 1,
+            scaled=not isinstance(scene.instrument.scale, Drift),
+            # all pixels have one camera: what mixes its channels hardly tells neighbours apart
+            mixed=not neighbours and (space == "srgb" or sensitivities is None),
+        )
+        return [size * change for _, size, change in every if size]
+
+    inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread, errors)
     films = inverse(coded if space == "srgb" else exposed, ORDERS[neighbours])
     if neighbours:
         films, decided = _by_neighbours(films)
@@ -166,9 +181,16 @@ def _by_neighbours(films: ColourThickness) -> tuple[ColourThickness, str]:
 
 
 def _inverse(
-    scene: Scene, eye: Sensor, space: str, bounds: Free, layer: str | None, spread: np.ndarray
+    scene: Scene,
+    eye: Sensor,
+    space: str,
+    bounds: Free,
+    layer: str | None,
+    spread: np.ndarray,
+    errors: Errors,
 ) -> ColourInverse:
-    """The inverse of the film's colours, whose channels have the standard deviations `spread`."""
+    """The inverse of the film's colours, whose channels have the standard deviations `spread` and these
+    errors of the camera."""
     light: Any = scene.light.angle
     if np.ndim(light):
         raise UsageError("a photograph has one angle of incidence: give the scene one number as `angle`")
@@ -178,4 +200,4 @@ def _inverse(
     scale = scene.instrument.scale
     exposure = EXPOSURE if isinstance(scale, Drift) else float(getattr(scale, "start", scale))
     coding = "srgb" if space == "srgb" else "xyz"
-    return ColourInverse.build(table, angle, space=coding, sigma=spread, exposure=exposure)
+    return ColourInverse.build(table, angle, space=coding, sigma=spread, exposure=exposure, errors=errors)

@@ -1,7 +1,6 @@
 """Colours in a fit: their target and view, their part and curve, evidence of a discrepancy, probabilities."""
 
 from collections.abc import Iterator
-from itertools import permutations
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -13,6 +12,7 @@ from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import plan
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.curves import ColourCurve
+from pellicle.fitting.film.camera_errors import channel_errors
 from pellicle.fitting.film.colour_view import ColourData, ColoursView, Local, camera_response
 from pellicle.fitting.film.extended_scene import Number, extended
 from pellicle.fitting.film.parameters import anonymous
@@ -186,28 +186,17 @@ def colours_evidence(
 def camera_errors(
     view: ColoursView, at: Local, measured: MeasuredColours
 ) -> Iterator[tuple[str, float, np.ndarray]]:
-    """Errors of the recorded linear channels (colours, 3): name, standard uncertainty, change by one of it.
-
-    Those of a colorimeter are its scale and balance.
-    """
-    allowed, colours, model = measured.scene.uncertainty, measured.colours, np.asarray(at.model)
-    photographed = colours.space in ("srgb", "rgb")
-    if not any(name.startswith("white_balance") for name in view.modes):
-        if not isinstance(measured.scene.instrument.scale, Drift):
-            yield "scale", allowed.scale, model
-        stated = allowed.white_balance if photographed else allowed.scale
-        size = stated if colours.balance is None or not stated else colours.balance
-        yield "balance of red", size, model * [1.0, 0.0, 0.0]
-        yield "balance of blue", size, model * [0.0, 0.0, 1.0]
-    if photographed:  # a camera's own channels are linear where it has no gamma
-        yield "flare or black level", allowed.flare, np.ones(model.shape)
-        curve = allowed.camera * (colours.space == "srgb" or colours.gamma != 1)
-        yield "tone curve", curve, model * np.log(np.maximum(model, 1e-3))
-    if colours.space == "srgb" or not colours.calibrated:
-        yield "saturation", allowed.camera, 2 * (model - model.mean(axis=1, keepdims=True))
-        for i, j in permutations(range(3), 2):
-            mixed = np.eye(3)[i] * (model[:, j] - model[:, i])[:, None]
-            yield f"share of {'RGB'[j]} in channel {'RGB'[i]}", allowed.camera, mixed
+    """Errors of the recorded linear channels (colours, 3): name, standard uncertainty, change by one unit."""
+    colours, allowed = measured.colours, measured.scene.uncertainty
+    errors = channel_errors(
+        *(np.asarray(at.model), allowed, colours.space),
+        balance=colours.balance,
+        coded=colours.space == "srgb" or colours.gamma != 1,
+        scaled=not isinstance(measured.scene.instrument.scale, Drift),
+        mixed=colours.space == "srgb" or not colours.calibrated,
+    )
+    balanced = any(name.startswith("white_balance") for name in view.modes)
+    return (error for error in errors if not (balanced and error[0].startswith(("scale", "balance"))))
 
 
 def lamp_errors(
