@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import BSpline
+from scipy.special import digamma, wofz
 
 sys.path.insert(0, str(Path(__file__).parent / "verdicts"))
 
@@ -83,6 +84,114 @@ def drude(ep: float, gamma: float, eps_inf: float) -> Index:
     return index
 
 
+def of_energy(epsilon: Callable[[np.ndarray], np.ndarray]) -> Index:
+    """Index of a permittivity as a function of the photon energy (eV)."""
+    return lambda wavelength: np.sqrt(epsilon(HC / np.asarray(wavelength)) + 0j)
+
+
+def smith(ep: float, gamma: float, c: float, eps_inf: float) -> Index:
+    """N. Smith, Phys. Rev. B 64, 155106 (2001)."""
+    return of_energy(lambda e: eps_inf - ep**2 / (e**2 + 1j * gamma * e) * (1 + c / (1 - 1j * e / gamma)))
+
+
+def poles(a_uv: float, e_uv: float, a_ir: float, eps_inf: float) -> Index:
+    return of_energy(lambda e: eps_inf + a_uv / (e_uv**2 - e**2) - a_ir / e**2)
+
+
+def critical_point(a: float, e0: float, gamma: float, degrees: float, eps_inf: float) -> Index:
+    """P. Etchegoin and others, J. Chem. Phys. 125, 164705 (2006)."""
+    turn = np.exp(1j * np.radians(degrees))
+    return of_energy(
+        lambda e: eps_inf + a * e0 * (turn / (e0 - e - 1j * gamma) + np.conj(turn) / (e0 + e + 1j * gamma))
+    )
+
+
+def parabolic_bands(a: float, e0: float, gamma: float, degrees: float, eps_inf: float) -> Index:
+    turn = np.exp(1j * np.radians(degrees))
+    return of_energy(lambda e: eps_inf + a * turn * gamma / (2 * e0 - 2 * e - 1j * gamma))
+
+
+def adachi_m0(a: float, e0: float, gamma: float, eps_inf: float) -> Index:
+    def epsilon(e: np.ndarray) -> np.ndarray:
+        x = (e + 1j * gamma) / e0
+        return eps_inf + a * e0**-1.5 * (2 - np.sqrt(1 + x) - np.sqrt(1 - x)) / x**2
+
+    return of_energy(epsilon)
+
+
+def adachi_m1(a: float, e0: float, gamma: float, eps_inf: float) -> Index:
+    def epsilon(e: np.ndarray) -> np.ndarray:
+        x = (e + 1j * gamma) / e0
+        return eps_inf - a * np.log(1 - x**2) / x**2
+
+    return of_energy(epsilon)
+
+
+def tanguy(a: float, eg: float, r: float, gamma: float, eps_inf: float) -> Index:
+    """C. Tanguy, Phys. Rev. Lett. 75, 4090 (1995), with ψ(1 − ξ) in place of ψ(ξ) + π cot πξ."""
+
+    def g(z: np.ndarray) -> np.ndarray:
+        xi = np.sqrt(r / (eg - z))
+        return 2 * np.log(xi) - 2 * digamma(1 - xi) - 1 / xi
+
+    def epsilon(e: np.ndarray) -> np.ndarray:
+        z = e + 1j * gamma
+        return eps_inf + a * np.sqrt(r) / z**2 * (g(z) + g(-z) - 2 * g(0 * z))
+
+    return of_energy(epsilon)
+
+
+def brendel_bormann(a: float, e0: float, gamma: float, sigma: float, eps_inf: float) -> Index:
+    """A. Rakić and others, Appl. Opt. 37, 5271 (1998)."""
+
+    def epsilon(e: np.ndarray) -> np.ndarray:
+        root, width = np.sqrt(e**2 + 1j * gamma * e), np.sqrt(2) * sigma
+        both = wofz((root - e0) / width) + wofz((root + e0) / width)
+        return eps_inf + 0.5j * np.sqrt(np.pi) * a / (root * width) * both
+
+    return of_energy(epsilon)
+
+
+def triangle(a: float, e0: float, fwhm: float, left: float, right: float, eps_inf: float) -> Index:
+    """Psemi with straight pieces: a triangle of ε₂, broadened numerically."""
+    width = fwhm / (2 * np.sqrt(np.log(2)))
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+
+    def loss(e: np.ndarray) -> np.ndarray:
+        total = np.zeros(np.shape(e))
+        for low, high in ((e0 - left, e0), (e0, e0 + right)):
+            x = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+            height = a * np.interp(x, [e0 - left, e0, e0 + right], [0, 1, 0]) * weights * 0.5 * (high - low)
+            for sign in (1, -1):
+                at = (e[..., None] - sign * x) / width
+                total += sign * (np.exp(-(at**2)) @ height) / (np.sqrt(np.pi) * width)
+        return total
+
+    return absorbing(eps_inf, loss)
+
+
+def amorphous(n_inf: float, eg: float, f: float, e0: float, gamma: float) -> Index:
+    """A. Forouhi and I. Bloomer, Phys. Rev. B 34, 7018 (1986)."""
+    b, c = 2 * e0, e0**2 + gamma**2
+    q = 0.5 * np.sqrt(4 * c - b**2)
+    b0 = f / q * (-(b**2) / 2 + eg * b - eg**2 + c)
+    c0 = f / q * ((eg**2 + c) * b / 2 - 2 * eg * c)
+
+    def index(wavelength: np.ndarray) -> np.ndarray:
+        e = HC / np.asarray(wavelength)
+        below = e**2 - b * e + c
+        return n_inf + (b0 * e + c0) / below + 1j * f * np.maximum(e - eg, 0) ** 2 / below
+
+    return index
+
+
+def phonon(eps_inf: float, to: float, to_loss: float, lo: float, lo_loss: float) -> Index:
+    """F. Gervais and B. Piriou, Phys. Rev. B 10, 1642 (1974)."""
+    return of_energy(
+        lambda e: eps_inf * (lo**2 - e**2 - 1j * lo_loss * e) / (to**2 - e**2 - 1j * to_loss * e)
+    )
+
+
 def urbach(a: float, b: float, k0: float, eu: float) -> Index:
     return lambda wavelength: a + b / wavelength**2 + 1j * k0 * np.exp((HC / wavelength - 3.1) / eu)
 
@@ -143,25 +252,70 @@ MODELS: dict[str, Draw] = {
         r.uniform(0.5, 3.0),
         r.uniform(1.0, 2.5),
     ),
+    "drude-smith": lambda r: smith(
+        r.uniform(1.2, 3.0), r.uniform(0.1, 0.5), r.uniform(-0.7, -0.2), r.uniform(3.0, 5.0)
+    ),
+    "uv-pole": lambda r: poles(r.uniform(60, 250), r.uniform(8, 13), 0.0, r.uniform(1, 2.5)),
+    "ir-pole": lambda r: poles(0.0, 10.0, r.uniform(0.02, 1.0), r.uniform(2.2, 5.0)),
+    "critical-point": lambda r: critical_point(
+        r.uniform(0.3, 2), r.uniform(2, 6), r.uniform(0.1, 0.8), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+    ),
+    "cppb": lambda r: parabolic_bands(
+        r.uniform(1, 6), r.uniform(2, 6), r.uniform(0.2, 1.2), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+    ),
+    "adachi-m0": lambda r: adachi_m0(
+        r.uniform(8, 60), r.uniform(1.8, 5), r.uniform(0.02, 0.3), r.uniform(1.5, 4.0)
+    ),
+    "adachi-m1": lambda r: adachi_m1(
+        r.uniform(0.5, 5), r.uniform(1.8, 5), r.uniform(0.02, 0.4), r.uniform(1.5, 4.0)
+    ),
+    "tanguy": lambda r: tanguy(
+        r.uniform(3, 20), r.uniform(2.2, 4), r.uniform(0.02, 0.1), r.uniform(0.02, 0.15), r.uniform(1.5, 4.0)
+    ),
+    "brendel-bormann": lambda r: brendel_bormann(
+        r.uniform(3, 30), r.uniform(2, 6), r.uniform(0.05, 0.5), r.uniform(0.1, 0.8), r.uniform(1.5, 4.0)
+    ),
+    "psemi": lambda r: triangle(
+        r.uniform(2, 12),
+        r.uniform(2.5, 5.5),
+        r.uniform(0.1, 0.6),
+        r.uniform(0.4, 1.5),
+        r.uniform(0.4, 2.0),
+        r.uniform(1.2, 3.0),
+    ),
+    "new-amorphous": lambda r: amorphous(
+        r.uniform(1.4, 2.4), r.uniform(1.0, 3.0), r.uniform(0.02, 0.4), r.uniform(3.2, 7), r.uniform(0.4, 2.0)
+    ),
+    "forouhi-bloomer": lambda r: amorphous(
+        r.uniform(1.4, 2.4), r.uniform(1.0, 3.0), r.uniform(0.02, 0.4), r.uniform(3.2, 7), r.uniform(0.4, 2.0)
+    ),
+    "gervais": lambda r: phonon(
+        r.uniform(1.8, 4.0),
+        r.uniform(0.06, 0.12),
+        r.uniform(0.001, 0.005),
+        r.uniform(0.13, 0.16),
+        r.uniform(0.005, 0.01),
+    ),
     "spline": lambda r: knotted(
         r.uniform(1.4, 2.4) + r.uniform(0.05, 0.5) * np.exp(-np.arange(len(KNOTS)) / 2), falling(r)
     ),
     "spline-kk": lambda r: knotted_absorption(r.uniform(1.4, 2.2), falling(r)),
 }
-"""Films of ordinary numbers; TCO-like ones for drude."""
+"""Films of ordinary numbers; TCO-like ones for drude and drude-smith."""
 GLASS = 1.52
 
 
 def spectrum(model: str, index: Index, thickness: float, random: np.random.Generator) -> pl.Spectrum:
     """Ψ and Δ at two angles from 300 to 1000 nm, on an index of 1.52; R from 400 to 1700 nm of a
-    transparent conductor."""
+    transparent conductor; Ψ and Δ from 5 to 25 µm of phonons."""
     stack = Stack(((index, thickness),), cauchy(GLASS, 0.0))
-    if model == "drude":
+    if model in ("drude", "drude-smith"):
         view: View = spectrum_view("R", 400, 1700, 131)
         values = seen(stack, Conditions(), 0.0, view)
         noisy = values + NOISE * random.normal(size=values.shape)
         return pl.Spectrum(view.wavelength, noisy, "R", sigma=np.full(values.shape, NOISE))
-    view = ellipsometer_view(300, 1000, 71, 60.0, 70.0)
+    low, high, count = (5000, 25000, 161) if model == "gervais" else (300, 1000, 71)
+    view = ellipsometer_view(low, high, count, 60.0, 70.0)
     psi, delta = recorded_angles(seen(stack, Conditions(), 0.0, view), Conditions())
     sigma = np.full(psi.shape, 0.06), np.full(psi.shape, 0.15)
     psi, delta = (x + s * random.normal(size=x.shape) for x, s in zip((psi, delta), sigma, strict=True))

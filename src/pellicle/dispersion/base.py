@@ -18,10 +18,12 @@ HC = 1239.841984
 class AbstractDispersion(eqx.Module):
     """n + ik as a function of wavelength. Subclasses are final.
 
-    `units` names the unit of each parameter that has one.
+    `units` names the unit of each parameter that has one. `kramers_kronig` is True if n and k obey the
+    Kramers-Kronig relations, of a sum if all of its terms do.
     """
 
     units: ClassVar[dict[str, str]] = {}
+    kramers_kronig: ClassVar[bool] = False
 
     @abc.abstractmethod
     def index(self, wavelength: Any) -> Number:

@@ -1,6 +1,6 @@
-"""Permittivity as a sum of oscillators: Lorentz, Drude, Gaussian, Tauc-Lorentz, Cody-Lorentz.
+"""Permittivity as a sum of oscillators: Lorentz, Drude, Gaussian, Tauc-Lorentz, Cody-Lorentz, poles.
 
-Energies are in eV. Each term has ε₂ ≥ 0 and is Kramers-Kronig consistent by itself.
+Energies are in eV. Each term of this module has ε₂ ≥ 0 and is Kramers-Kronig consistent by itself.
 """
 
 import abc
@@ -16,13 +16,14 @@ from pellicle.optics.special import arctan_over_root, dawson, log_abs, scaled_ei
 
 
 class AbstractOscillator(eqx.Module):
-    """One term of a permittivity. Subclasses are final."""
+    """One term of a permittivity. Subclasses are final; `kramers_kronig` is True where ε₁ belongs to ε₂."""
 
     units: ClassVar[dict[str, str]] = {}
+    kramers_kronig: ClassVar[bool] = True
 
     @abc.abstractmethod
-    def epsilon(self, energy: Any) -> Pair:
-        """Its share of ε₁ + iε₂ at photon energy `energy` (eV, any shape)."""
+    def epsilon(self, energy: Any) -> Any:
+        """Its share of ε₁ + iε₂, a `Pair`, at photon energy `energy` (eV, any shape)."""
 
 
 def check(model: str, *, gap: Any = None, centre: Any = None, **not_below_zero: Any) -> None:
@@ -37,8 +38,9 @@ def check(model: str, *, gap: Any = None, centre: Any = None, **not_below_zero: 
 
 @final
 class Oscillators(AbstractDispersion):
-    """n + ik = √(eps_inf + Σ terms), Im ≥ 0."""
+    """n + ik = √(eps_inf + Σ terms), Im ≥ 0. Where the terms give ε₂ < 0, as critical points can, ε₂ is 0."""
 
+    kramers_kronig: ClassVar = True
     eps_inf: Any
     terms: tuple[AbstractOscillator, ...]
 
@@ -48,7 +50,9 @@ class Oscillators(AbstractDispersion):
     def index(self, wavelength):
         energy = HC / wavelength
         shares = [term.epsilon(energy) for term in self.terms]
-        return pair.sqrt(Pair(self.eps_inf + sum(s.re for s in shares), sum(s.im for s in shares)))
+        loss = sum(s.im for s in shares)
+        loss = namespace(loss).where(loss < 0, 0.0, loss)  # not `maximum`, which halves the slope at 0
+        return pair.sqrt(Pair(self.eps_inf + sum(s.re for s in shares), loss))
 
 
 @final
@@ -91,6 +95,62 @@ class Drude(AbstractOscillator):
     def epsilon(self, energy):
         scale = self.Ep * self.Ep / (energy * energy + self.gamma * self.gamma)
         return Pair(-scale, scale * self.gamma / energy)
+
+
+@final
+class DrudeSmith(AbstractOscillator):
+    """ε = −Ep²/(E² + i gamma E) [1 + c gamma/(gamma − iE)]: free charges that scatter backwards.
+
+    N. Smith, Phys. Rev. B 64, 155106 (2001), with its first term: `c` from −1 (every first collision
+    reverses the velocity) to 0 (Drude) has no unit; `Ep` and `gamma` as of `Drude`.
+    """
+
+    units: ClassVar = {"Ep": "eV", "gamma": "eV"}
+    Ep: Any
+    gamma: Any
+    c: Any = 0.0
+
+    def __check_init__(self):
+        check("drude-smith", Ep=self.Ep, gamma=self.gamma)
+        bounds = bounds_of(self.c)
+        if bounds is not None and not -1 <= bounds[0] <= bounds[1] <= 0:
+            wrong = bounds[0] if bounds[0] < -1 else bounds[1]
+            raise ValueError(f"drude-smith: c must lie in -1 to 0, got {wrong:g}")
+
+    def epsilon(self, energy):
+        total = energy * energy + self.gamma * self.gamma
+        scale, back = self.Ep * self.Ep / total, self.c * self.gamma / total
+        free = Pair(-scale, scale * self.gamma / energy)
+        return free * Pair(1 + back * self.gamma, back * energy)
+
+
+@final
+class UVPole(AbstractOscillator):
+    """ε = A/(E0² − E²): absorption above the spectrum, at `E0` (eV); `A` in eV²."""
+
+    units: ClassVar = {"A": "eV^2", "E0": "eV"}
+    A: Any
+    E0: Any
+
+    def __check_init__(self):
+        check("uv-pole", A=self.A, E0=self.E0)
+
+    def epsilon(self, energy):
+        return Pair(self.A / (self.E0 * self.E0 - energy * energy), 0.0 * energy)
+
+
+@final
+class IRPole(AbstractOscillator):
+    """ε = −A/E²: absorption below the spectrum; `A` in eV². Programs that add A/E² have the other sign."""
+
+    units: ClassVar = {"A": "eV^2"}
+    A: Any
+
+    def __check_init__(self):
+        check("ir-pole", A=self.A)
+
+    def epsilon(self, energy):
+        return Pair(-self.A / (energy * energy), 0.0 * energy)
 
 
 @final

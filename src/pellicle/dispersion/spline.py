@@ -79,6 +79,7 @@ class KramersKronigSpline(AbstractDispersion):
     """
 
     units: ClassVar = {"A_uv": "eV²", "A_ir": "eV²"}
+    kramers_kronig: ClassVar = True
     knots: tuple[float, ...] = eqx.field(static=True, converter=_knots)
     k: tuple[Any, ...] = eqx.field(converter=tuple)
     n_inf: Any = 1.5

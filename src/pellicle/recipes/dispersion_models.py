@@ -6,10 +6,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 
-from pellicle.dispersion import oscillators
+from pellicle.dispersion import critical_points, oscillators
 from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
 from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
+from pellicle.dispersion.forouhi_bloomer import ForouhiBloomer, NewAmorphous
+from pellicle.dispersion.phonons import Gervais
+from pellicle.dispersion.psemi import Psemi
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free
@@ -81,8 +84,82 @@ TERMS: dict[str, dict[str, ParameterSpec]] = {
         "Et": ParameterSpec(0.0, 1.0, 0.0, (0.0, 3.0), False),
         "Eu": ParameterSpec(0.01, 0.5, 0.05, (0.001, 2.0), False),
     },
+    "drude-smith": {
+        "Ep": ParameterSpec(0.0, 15.0, 3.0, (0.0, 20.0)),
+        "gamma": ParameterSpec(0.01, 2.0, 0.1, _WIDTH),
+        "c": ParameterSpec(-1.0, 0.0, -0.5, (-1.0, 0.0)),
+    },
+    # above the spectrum of nearly every instrument, 6.5 eV at 190 nm, and below it
+    "uv-pole": {
+        "A": ParameterSpec(0.0, 300.0, 50.0, (0.0, 1000.0)),
+        "E0": ParameterSpec(7.0, 15.0, 10.0, (6.6, 50.0)),
+    },
+    "ir-pole": {"A": ParameterSpec(0.0, 2.0, 0.1, (0.0, 100.0))},
+    "critical-point": {
+        "A": ParameterSpec(0.0, 10.0, 1.0, (0.0, 100.0)),
+        "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+        "gamma": ParameterSpec(0.01, 4.0, 0.5, _WIDTH),
+        "phase": ParameterSpec(-90.0, 90.0, 0.0, (-180.0, 180.0)),
+        "mu": ParameterSpec(0.25, 2.0, 1.0, (0.05, 4.0), False),
+    },
+    "cppb": {
+        "A": ParameterSpec(0.0, 20.0, 2.0, (0.0, 100.0)),
+        "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+        "gamma": ParameterSpec(0.02, 4.0, 0.5, _WIDTH),
+        "phase": ParameterSpec(-90.0, 90.0, 0.0, (-180.0, 180.0)),
+        "mu": ParameterSpec(-1.0, 2.0, 1.0, (-1.0, 4.0), False),
+    },
+    "adachi-m0": {
+        "A": ParameterSpec(0.0, 100.0, 5.0, (0.0, 1000.0)),
+        "E0": ParameterSpec(1.0, 8.0, 3.0, _ENERGY),
+        "gamma": ParameterSpec(0.001, 1.0, 0.1, (0.0001, 20.0)),
+    },
+    "adachi-m1": {
+        "A": ParameterSpec(0.0, 10.0, 2.0, (0.0, 100.0)),
+        "E0": ParameterSpec(1.0, 8.0, 3.0, _ENERGY),
+        "gamma": ParameterSpec(0.001, 1.0, 0.1, (0.0001, 20.0)),
+    },
+    # the exciton of GaAs is bound by 4 meV, that of ZnO by 60 meV, of layered crystals by up to 0.5 eV
+    "tanguy": {
+        "A": ParameterSpec(0.0, 50.0, 5.0, (0.0, 500.0)),
+        "Eg": ParameterSpec(1.0, 6.0, 3.0, (0.1, 20.0)),
+        "R": ParameterSpec(0.005, 0.3, 0.05, (0.0005, 2.0)),
+        "gamma": ParameterSpec(0.005, 0.5, 0.05, _WIDTH),
+    },
+    "brendel-bormann": {
+        "A": ParameterSpec(0.0, 50.0, 5.0, (0.0, 1000.0)),
+        "E0": ParameterSpec(1.0, 10.0, 4.0, _ENERGY),
+        "gamma": ParameterSpec(0.0, 2.0, 0.1, (0.0, 20.0)),
+        "sigma": ParameterSpec(0.02, 2.0, 0.3, _WIDTH),
+    },
+    "psemi": {
+        "A": ParameterSpec(0.0, 30.0, 5.0, (0.0, 200.0)),
+        "E0": ParameterSpec(1.0, 8.0, 4.0, _ENERGY),
+        "fwhm": ParameterSpec(0.02, 1.0, 0.2, (0.001, 20.0)),
+        "WL": ParameterSpec(0.2, 4.0, 1.0, (0.01, 10.0)),
+        "WR": ParameterSpec(0.2, 4.0, 1.0, (0.01, 10.0)),
+        **dict.fromkeys(("PL", "PR"), ParameterSpec(0.1, 0.9, 0.5, (0.01, 0.99), False)),
+        **dict.fromkeys(("AL", "AR"), ParameterSpec(0.0, 1.0, 0.5, (0.0, 2.0), False)),
+        **dict.fromkeys(("OL", "OR"), ParameterSpec(-1.0, 1.0, 0.0, (-1.0, 1.0), False)),
+    },
 }
 """Oscillators and their parameters; energies in eV, the strength A of lorentz and gaussian without unit."""
+
+
+def _numbered(
+    count: int, specs: Mapping[str, ParameterSpec], more: Mapping[str, float]
+) -> dict[str, ParameterSpec]:
+    """Parameters of `count` parts: the first free, the others with values `more`, which add nothing."""
+    others = {key: spec._replace(value=more.get(key, spec.value), free=False) for key, spec in specs.items()}
+    return {f"{key}{i}": x for i in range(1, count + 1) for key, x in (specs if i == 1 else others).items()}
+
+
+_AMORPHOUS = {
+    "n_inf": ParameterSpec(1.0, 3.0, 1.5, (0.5, 6.0)),
+    "Eg": ParameterSpec(0.5, 6.0, 2.5, (0.0, 12.0)),
+}
+# from 8 cm^-1 to 2000 cm^-1; the reststrahlen bands of quartz lie at 1080 cm^-1, those of NaCl at 164 cm^-1
+_PHONON, _DAMPING = (0.001, 0.25), (1e-5, 0.2)
 
 # silver has the least n of metals (0.05), and n or k above 10 are those of metals beyond 2 um
 _INDEX = {"n": ParameterSpec(1.2, 4.0, 1.5, (0.01, 10.0)), "k": ParameterSpec(0.0, 2.0, 0.01, (0.0, 20.0))}
@@ -110,6 +187,43 @@ MODELS: dict[str, dict[str, ParameterSpec]] = {
         "B3": ParameterSpec(0.0, 6.0, 0.0, _B, False),
         "C3": ParameterSpec(1e6, 1e9, 1e8, (6.4e5, 1e10), False),
     },
+    "new-amorphous": {
+        **_AMORPHOUS,
+        **_numbered(
+            4,
+            {
+                "f": ParameterSpec(0.0, 1.0, 0.1, (0.0, 10.0)),
+                "E": ParameterSpec(2.0, 10.0, 5.0, _ENERGY),
+                "gamma": ParameterSpec(0.2, 5.0, 1.0, (0.01, 20.0)),
+            },
+            {"f": 0.0},
+        ),
+    },
+    "forouhi-bloomer": {
+        **_AMORPHOUS,
+        **_numbered(
+            4,
+            {
+                "A": ParameterSpec(0.0, 1.0, 0.1, (0.0, 10.0)),
+                "B": ParameterSpec(4.0, 20.0, 10.0, (0.04, 40.0)),
+                "C": ParameterSpec(4.0, 125.0, 26.0, (0.0, 800.0)),
+            },
+            {"A": 0.0},
+        ),
+    },
+    "gervais": {
+        "eps_inf": _EPS_INF,
+        **_numbered(
+            8,
+            {
+                "TO": ParameterSpec(0.03, 0.2, 0.1, _PHONON),
+                "gamma_TO": ParameterSpec(0.0005, 0.02, 0.002, _DAMPING),
+                "LO": ParameterSpec(0.03, 0.22, 0.12, _PHONON),
+                "gamma_LO": ParameterSpec(0.0005, 0.02, 0.003, _DAMPING),
+            },
+            {"LO": 0.1, "gamma_LO": 0.002},
+        ),
+    },
     **{name: {**specs, "eps_inf": _EPS_INF} for name, specs in TERMS.items()},
     "spline": _INDEX,
     "spline-kk": {
@@ -124,6 +238,14 @@ MODELS: dict[str, dict[str, ParameterSpec]] = {
 energies in eV. `spline` has one n and one k at each knot."""
 
 SPLINES = ("spline", "spline-kk")
+
+SERIES = {
+    "sellmeier": ("B", "C"),
+    "new-amorphous": ("f", "E", "gamma"),
+    "forouhi-bloomer": ("A", "B", "C"),
+    "gervais": ("TO", "gamma_TO", "LO", "gamma_LO"),
+}
+"""Fields with one number for each part of a model, whose parameters are `B1`, `C1`, `B2` and so on."""
 
 KNOTS = (300.0, 400.0, 500.0, 650.0, 850.0, 1100.0)
 """Default knots of a spline (nm)."""
@@ -176,9 +298,10 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
     if name == "constant":
         require_nonnegative("constant", **given)
         return Constant(given["n"], None if given["k"] == 0 else given["k"])
-    if name == "sellmeier":  # terms beyond the last one given are absent
-        last = max((key[1] for key in values), default="1")
-        given = {x: tuple(given[key] for key in given if key[0] == x and key[1] <= last) for x in "BC"}
+    if name in SERIES:  # parts beyond the last one given are absent
+        last = max((int(key[-1]) for key in values if key[-1].isdigit()), default=1)
+        parts = {x: tuple(given.pop(f"{x}{i}") for i in range(1, last + 1)) for x in SERIES[name]}
+        given = {key: x for key, x in given.items() if not key[-1].isdigit()} | parts
     if name in SPLINES:
         knots = given.setdefault("knots", KNOTS)
         if not isinstance(knots, list | tuple) or not all(isinstance(x, int | float) for x in knots):
@@ -232,6 +355,19 @@ KINDS: dict[str, type[Any]] = {
     "gaussian": oscillators.Gaussian,
     "tauc-lorentz": oscillators.TaucLorentz,
     "cody-lorentz": oscillators.CodyLorentz,
+    "drude-smith": oscillators.DrudeSmith,
+    "uv-pole": oscillators.UVPole,
+    "ir-pole": oscillators.IRPole,
+    "critical-point": critical_points.CriticalPoint,
+    "cppb": critical_points.ParabolicBand,
+    "adachi-m0": critical_points.AdachiM0,
+    "adachi-m1": critical_points.AdachiM1,
+    "tanguy": critical_points.Tanguy,
+    "brendel-bormann": critical_points.BrendelBormann,
+    "psemi": Psemi,
+    "new-amorphous": NewAmorphous,
+    "forouhi-bloomer": ForouhiBloomer,
+    "gervais": Gervais,
 }
 """The class of each model, and of each oscillator in `TERMS`."""
 

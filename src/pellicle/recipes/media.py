@@ -18,6 +18,7 @@ from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.profiles import PROFILES
+from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
@@ -31,6 +32,13 @@ _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
 _DECIMAL_COMMA = re.compile(r"\s*\d+,\d+\s*")
 _LIKE_AN_INDEX = 0.9
 """A lower bound of what is added to an index beyond which the index itself is meant."""
+
+_COMPOSED: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "oscillators": (Oscillators, ("terms",)),
+    "thermo-optic": (ThermoOptic, ("base",)),
+    "at-temperature": (AtTemperature, ("media", "temperatures")),
+}
+"""Models of several parts, and the keys that they need."""
 
 _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
@@ -81,7 +89,7 @@ def medium(
     elif isinstance(value, schema.MixTable):
         dispersion = _mixture(value.mix, dict(value.model_extra or {}), folder)
     elif isinstance(value, schema.MediumTable):
-        dispersion = _model(value.model, dict(value.model_extra or {}))
+        dispersion = _model(value.model, dict(value.model_extra or {}), folder)
     else:
         word = str(value).strip()
         if folder is not None and Path(word).suffix.lower() in MATERIAL_SUFFIXES:
@@ -128,7 +136,7 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
     try:
         return material(text)
     except UnknownMaterial as error:
-        if text.lower() in (*MIXTURES, "oscillators"):
+        if text.lower() in (*MIXTURES, *_COMPOSED):
             raise UsageError(f"{text} consists of several parts: describe it in a recipe") from None
         if _DECIMAL_COMMA.fullmatch(text):
             raise UsageError(
@@ -172,10 +180,12 @@ def _graded(table: schema.GradedTable, values: dict[str, Any], folder: Path | No
     return Graded(first, second, PROFILES[name](**numbers), table.mix)
 
 
-def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
-    """A model by its name, or a sum of oscillators."""
+def _model(name: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
+    """A model by its name, a sum of oscillators, or a medium at a temperature."""
+    if name in _COMPOSED and name != "oscillators":
+        return _at_temperature(name, values, folder)
     if name != "oscillators":
-        _check_word(name, [*models.MODELS, "oscillators"], "dispersion model")
+        _check_word(name, [*models.MODELS, *_COMPOSED], "dispersion model")
         parameter, more = (_parameters, ["knots"]) if name in models.SPLINES else (_parameter, [])
         _check_keys(values, [*models.MODELS[name], *more], f"{name} has no parameter")
         return models.build_model(name, {key: parameter(key, value) for key, value in values.items()})
@@ -196,6 +206,21 @@ def _model(name: str, values: dict[str, Any]) -> AbstractDispersion:
         )
     with models.usage_errors():
         return Oscillators(eps_inf, tuple(built))
+
+
+def _at_temperature(name: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:
+    """A medium changed by thermo-optic terms, or media at several temperatures."""
+    kind, part = _COMPOSED[name]
+    _check_keys(values, [field.name for field in fields(kind)], f"{name} has no parameter")
+    if missing := [key for key in (*part, "temperature") if key not in values]:
+        raise UsageError(f"{name} needs {' and '.join(missing)}")
+    given: dict[str, Any] = {key: _parameters(key, x) for key, x in values.items() if key not in part[:1]}
+    first = values[part[0]]
+    if part[0] == "media" and not (isinstance(first, list) and isinstance(given["temperatures"], list)):
+        raise UsageError(f"{name}: media and temperatures must be lists, one medium for each temperature")
+    made = [_component(part[0], x, folder) for x in (first if part[0] == "media" else [first])]
+    with models.usage_errors(f"{name}: "):
+        return kind(**given, **{part[0]: made if part[0] == "media" else made[0]})
 
 
 def _mixture(rule: str, values: dict[str, Any], folder: Path | None) -> AbstractDispersion:

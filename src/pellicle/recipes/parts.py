@@ -21,13 +21,14 @@ from pydantic import BaseModel
 from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import Constant, Sellmeier, Shifted
+from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.profiles import PROFILES
+from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes import schema
-from pellicle.recipes.dispersion_models import KINDS, MODELS, SPLINES, fixed_model, free_model
+from pellicle.recipes.dispersion_models import KINDS, MODELS, SERIES, SPLINES, fixed_model, free_model
 from pellicle.recipes.media import free_numbers, medium, number, scattering_back
 from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
@@ -112,17 +113,27 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         both = {key: written_medium(getattr(dispersion, key), name, folder) for key in ("host", "inclusion")}
         fraction = written_number(dispersion.fraction, f"{name}: fraction")
         return {"mix": _NAME[kind], **both, "fraction": fraction}
-    if isinstance(dispersion, Sellmeier) and len(dispersion.B) <= 3:
-        terms = enumerate(zip(dispersion.B, dispersion.C, strict=True), 1)
-        keys = {f"{key}{i}": x for i, pair in terms for key, x in zip("BC", pair, strict=True)}
-        return {"model": "sellmeier"} | {key: written_number(x, f"{name}: {key}") for key, x in keys.items()}
+    if isinstance(dispersion, ThermoOptic):
+        base = {"base": written_medium(dispersion.base, name, folder)}
+        return {"model": "thermo-optic", **base, **_numbers(dispersion, name, ("base",))}
+    if isinstance(dispersion, AtTemperature):
+        media = {"media": [written_medium(x, name, folder) for x in dispersion.media]}
+        return {"model": "at-temperature", **media, **_numbers(dispersion, name, ("media",))}
+    if (model := _NAME.get(kind)) in SERIES:
+        fields_of = SERIES[model]
+        keys = _numbers(dispersion, name, fields_of)
+        for i, numbers in enumerate(zip(*(getattr(dispersion, x) for x in fields_of), strict=True), 1):
+            numbered = zip(fields_of, numbers, strict=True)
+            keys |= {f"{key}{i}": written_number(x, f"{name}: {key}{i}") for key, x in numbered}
+        if keys.keys() <= MODELS[model].keys():
+            return {"model": model, **keys}
     if isinstance(dispersion, Oscillators):
         eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
         terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
         if len(terms) != 1:
             return {"model": "oscillators", **eps_inf, "terms": terms}
         return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
-    if kind in KINDS.values() and kind is not Sellmeier and getattr(dispersion, "k", 0.0) is not None:
+    if kind in KINDS.values() and model not in SERIES and getattr(dispersion, "k", 0.0) is not None:
         return {"model": _NAME[kind], **_numbers(dispersion, name)}
     raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
 
@@ -161,9 +172,11 @@ def _constant(dispersion: Constant, name: str) -> Any:
     return f"{n!r}+{k!r}j" if k else n
 
 
-def _numbers(module: AbstractDispersion | AbstractOscillator | Any, name: str) -> dict[str, Any]:
+def _numbers(
+    module: AbstractDispersion | AbstractOscillator | Any, name: str, without: Sequence[str] = ()
+) -> dict[str, Any]:
     """The numbers of a module by its fields, lists of one for each knot included."""
-    given = {field.name: getattr(module, field.name) for field in fields(module)}
+    given = {field.name: getattr(module, field.name) for field in fields(module) if field.name not in without}
     return {
         key: [written_number(one, f"{name}: {key}") for one in x]
         if isinstance(x, tuple)

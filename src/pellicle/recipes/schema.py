@@ -12,6 +12,7 @@ from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.options import CameraOptions, FitOptions, ReadingOptions
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.profiles import PROFILES
+from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import did_you_mean
 from pellicle.recipes.dispersion_models import MODELS, SPLINES, TERMS
 from pellicle.scene.layers import Uncertainty
@@ -148,6 +149,11 @@ def _model_schema(schema: dict[str, Any]) -> None:
     choices.append(
         _table_schema({"model": {"const": "oscillators"}, "eps_inf": _NUMBER, "terms": terms}, "terms")
     )
+    for name, kind in (("thermo-optic", ThermoOptic), ("at-temperature", AtTemperature)):
+        keys = dict.fromkeys((field.name for field in fields(kind)), True)
+        choices.append(
+            _table_schema(keys | {"model": {"const": name}, "temperature": _NUMBER}, "temperature")
+        )
     _choose(schema, choices)
 
 

@@ -11,12 +11,11 @@ from pellicle.dispersion.anisotropic import ParameterLocation, locate_parameter
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
-    CodyLorentz,
     Drude,
+    DrudeSmith,
     Gaussian,
     Lorentz,
     Oscillators,
-    TaucLorentz,
 )
 from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
@@ -41,8 +40,6 @@ _NATURAL_ZERO = (
     *_NATURAL_ONE,
     *WIDTHS,
 )
-_STRENGTHS = (Lorentz, Gaussian, TaucLorentz, CodyLorentz)
-"""Their A is a strength, which cannot be negative; the A of Cauchy is an index."""
 _SEARCHED = (
     "thickness",
     "n",
@@ -55,6 +52,10 @@ _SEARCHED = (
     "Eg",
     "eps_inf",
     "n_inf",
+    "f1",
+    "E1",
+    "TO1",
+    "LO1",
     "fraction",
     "top",
     "bottom",
@@ -117,11 +118,14 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     full = _full_name(scene, path, location.name, name)
     if key in _NATURAL_ONE and free.upper > 1:
         raise UsageError(f"`{key}` must be at most 1: its upper bound is {free.upper:g}")
-    strength = key == "A" and issubclass(owner, _STRENGTHS)
+    # the A of an oscillator is a strength, which cannot be negative; that of Cauchy is an index
+    strength = key in ("A", "f1") and (issubclass(owner, AbstractOscillator) or key == "f1")
     # a search moves the index of a spline as a whole
     group = full.removesuffix(key) + field if owner in (Spline, KramersKronigSpline, FreeProfile) else full
     oscillator = owner is Oscillators or issubclass(owner, AbstractOscillator)
-    drude = any(isinstance(x, Drude) for x in [location.owner, *getattr(location.owner, "terms", ())])
+    drude = any(
+        isinstance(x, Drude | DrudeSmith) for x in [location.owner, *getattr(location.owner, "terms", ())]
+    )
     resonances = sum(getattr(steps[-1], "name", "") == "E0" for steps, _ in free_leaves(scene))
     sole = resonances == 1 and issubclass(owner, Lorentz | Gaussian)
     levels = (_DRUDE if drude else _RESONANCE if sole else {}).get(key, _FEW)
