@@ -126,6 +126,37 @@ def test_nxellipsometry(write):
     assert facts["sample"] == "2nm SiO2 on Si"
 
 
+def in_the_wild(target):
+    """Fill a file as public ones are: axes of environment and time, units elsewhere, other names."""
+
+    def fill(file):
+        data = nxellipsometry(file, kind="NOT_PROVIDED")
+        del data["measured_data"], data["wavelength"], data["wavelength_spectrum"]
+        data["psi_50deg"], data["delta_50deg"] = 0.0, 0.0
+        values = np.stack((PSI, DELTA), axis=1)[None, None]
+        data["measured_data"], data["data_error"] = values, np.full(values.shape, 0.1)
+        spectrometer = group(file["entry/instrument"], "spectrometer", "NXmonochromator")
+        if target:
+            put(spectrometer, "axis", ANGSTROM, "Angstroms")
+            data["wavelength"] = ANGSTROM
+            of_axis = {"units": "NOT_PROVIDED", "target": "/entry/instrument/spectrometer/axis"}
+            data["wavelength"].attrs.update(of_axis)
+        else:
+            put(spectrometer, "wavelength", ANGSTROM)
+            put(spectrometer, "wavelength_spectrum", ANGSTROM, "Angstroms")
+
+    return fill
+
+
+@pytest.mark.parametrize("target", [True, False])
+def test_nxellipsometry_in_the_wild(write, target):
+    found = read_spectrum(write(nexus(in_the_wild(target))))
+    at = found.angle == 60.5
+    np.testing.assert_allclose(found.wavelength[at], [400, 500, 600])
+    np.testing.assert_allclose(found.delta[at], DELTA[1])
+    np.testing.assert_allclose(found.delta_sigma, 0.1)
+
+
 def test_nxellipsometry_of_n_c_s(write):
     psi, delta = np.deg2rad(PSI), np.deg2rad(DELTA)
     ncs = np.cos(2 * psi), np.sin(2 * psi) * np.cos(delta), np.sin(2 * psi) * np.sin(delta)

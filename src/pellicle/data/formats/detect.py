@@ -6,16 +6,27 @@ the file is put in front here. Cells, units and axes are then checked as in any 
 """
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
-from pellicle.data.formats import accurion, jcamp, nexus, spectrometers, vendor_binary, woollam
-from pellicle.data.formats.ellipsometers import film_sense, horiba, regress_pro, spectraray
-from pellicle.data.formats.several_tables import scans_side_by_side, stacked_tables
+from pellicle.data.formats import (
+    accurion,
+    jcamp,
+    nexus,
+    plug_ins,
+    spectrometers,
+    spreadsheet,
+    vendor_binary,
+    woollam,
+)
+from pellicle.data.formats.ellipsometers import against_angle, film_sense, horiba, regress_pro, spectraray
+from pellicle.data.formats.several_tables import numbered_columns, scans_side_by_side, stacked_tables
 from pellicle.data.tabular.layout import bulk_layout, layout_of
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import TextFile, in_file, read_bytes, text_file
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 TextReader = Callable[[TextFile], Sequence[Table] | None]
 BinaryReader = Callable[[bytes], Sequence[Table] | None]
@@ -33,10 +44,20 @@ TEXT_READERS: tuple[TextReader, ...] = (
     spectrometers.jasco,
     spectrometers.stellarnet,
     spectrometers.bruker_dpt,
+    against_angle,
+    numbered_columns,
     scans_side_by_side,
     stacked_tables,
 )
-BINARY_READERS: tuple[BinaryReader, ...] = (vendor_binary.procspec, nexus.read, vendor_binary.by_openreadout)
+BINARY_READERS: tuple[BinaryReader, ...] = (
+    plug_ins.read,
+    vendor_binary.procspec,
+    nexus.read,
+    vendor_binary.by_openreadout,
+)
+
+_COMPLETE_EASE = (".se", ".sesnap", ".ise")
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x19]")
 
 
 def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[Table]:
@@ -48,6 +69,13 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     content, digest = read_bytes(path)
     with in_file(path):
         binary = next((tables for reader in BINARY_READERS if (tables := reader(content))), ())
+        if not binary and spreadsheet.is_workbook(content):
+            binary = _workbook(content, str(path), digest)
+        if not binary and Path(path).suffix.lower() in _COMPLETE_EASE and _CONTROL.search(content):
+            raise DataError(
+                "is a binary file of CompleteEASE; open it there, and save its measured data as a text file "
+                "(.dat)"
+            )
     if binary:
         return [replace(table, path=str(path), sha256=digest) for table in binary]
     if spot is None:
@@ -62,6 +90,29 @@ def read_tables(path: str | os.PathLike[str], spot: int | None = None) -> list[T
     with in_file(path):
         tables = _export_tables(file, spot) or [layout_of(file)]
     return [replace(table, path=file.path, sha256=digest) for table in tables]
+
+
+def _workbook(content: bytes, path: str, sha256: str) -> list[Table]:
+    """The tables of all sheets that have one. Raises DataError as the first sheet, where none has."""
+    tables, refusals = [], []
+    for title, file in spreadsheet.sheets(content, path, sha256):
+        try:
+            found = _export_tables(file, None) or [layout_of(file)]
+        except DataError as refusal:
+            refusals.append(refusal)
+            continue
+        note = f"read from the sheet {title!r}"
+        tables += [
+            replace(one, name=" ".join(filter(None, (title, one.name))), remarks=(note, *one.remarks))
+            for one in found
+        ]
+    if not tables:
+        raise (
+            refusals[0]
+            if refusals
+            else DataError("is a workbook without cells that can be read; save its sheet as CSV")
+        )
+    return tables if len(tables) > 1 else [replace(tables[0], name="")]
 
 
 def _export_tables(file: TextFile, spot: int | None) -> Sequence[Table] | None:

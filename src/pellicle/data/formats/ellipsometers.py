@@ -3,8 +3,8 @@
 import re
 from collections.abc import Sequence
 
-from pellicle.data.formats.exports import Facts, Rows, export
-from pellicle.data.tabular.columns import MUELLER
+from pellicle.data.formats.exports import Facts, Rows, all_cells, export
+from pellicle.data.tabular.columns import MUELLER, recognise_all
 from pellicle.data.tabular.table import Table
 from pellicle.data.tabular.text import Line, TextFile, is_number
 from pellicle.data.tabular.units import wavelength_unit
@@ -19,6 +19,12 @@ _SENTECH_AXES = {"WAVELENGTH": "wavelength", "ENERGY": "energy", "WAVENUMBER": "
 
 _ROW = "SE"
 _ALPHA_BETA, _TAN_COS = [_ROW, "ALPHA", "BETA"], [_ROW, "PSI", "DELTA"]
+
+_ONE_WAVELENGTH = re.compile(
+    r"^[\s\"'#;]*(?:wave ?length|lambda|λ)\s*[:=\t;, ]\s*(?P<value>\d+(?:[.,]\d+)?)\s*(?P<unit>[^\s\"';,]+)",
+    re.IGNORECASE,
+)
+_MOST_HEADING = 40
 
 _FILM_SENSE = "Film_Sense_"
 _STATIC, _DYNAMIC = "Film_Sense_Data", "Film_Sense_Dyn_Data"
@@ -119,6 +125,29 @@ def spectraray(file: TextFile) -> list[Table] | None:
     names = (_SENTECH_AXES[word.upper()], "angle_deg", *quantities)
     notes = [f"measured at {', '.join(angles)} degrees"]
     return [export("Sentech SpectraRay text", names, rows, notes=notes, decimal=".")]
+
+
+def against_angle(file: TextFile) -> list[Table] | None:
+    """Return Ψ and Δ against the angle of incidence at one wavelength, or None for another format.
+
+    A line or comment above the names gives the wavelength: `Wavelength: 632.8 nm`.
+    """
+    lines = file.lines
+    for header, line in enumerate(lines[:_MOST_HEADING]):
+        names = all_cells(line.text)
+        roles = [column.role for column in recognise_all(names)]
+        if "wavelength" in roles or not {"angle", "psi", "delta"} <= set(roles):
+            continue
+        above = [comment for comment in file.comments if comment.number < line.number]
+        stated = [match for each in (*above, *lines[:header]) if (match := _ONE_WAVELENGTH.search(each.text))]
+        rows = [(below, all_cells(below.bare)) for below in lines[header + 1 :]]
+        if len(stated) != 1 or not rows or not (unit := wavelength_unit(stated[0]["unit"])):
+            return None
+        number = stated[0]["value"].replace(",", ".")
+        points = [(below, [number, *(cell.replace(",", ".") for cell in cells)]) for below, cells in rows]
+        note = f"against the angle of incidence, at {number} {unit}"
+        return [export("angle scan", [f"wavelength ({unit})", *names], points, notes=[note], decimal=".")]
+    return None
 
 
 def regress_pro(file: TextFile) -> list[Table] | None:

@@ -35,6 +35,8 @@ _MOST_GROUPS = 1000
 _MOST_LINKS = 20  # soft links that point to soft links
 _MOST_DEPTH = 20
 _MEASURED = "measured_data"
+_NOT_PROVIDED = "NOT_PROVIDED"
+_SPECTROMETER = "instrument/spectrometer"
 _OBSERVABLES = {"psi/delta": ("psi", "delta"), "n/c/s": ("N", "C", "S")}
 """Columns of `measured_data` by its `data_type`."""
 _QUANTITIES = [quantity for kind in KINDS.values() for quantity in kind().quantities]
@@ -157,17 +159,39 @@ def _dataset(group: Any, name: str) -> tuple[np.ndarray | None, str]:
     return values, "" if values is None else attribute(dataset, "units")
 
 
+def _with_units(group: Any, name: str) -> tuple[np.ndarray | None, str]:
+    """Numbers and unit of a dataset; without a unit, that of its attribute `target`, or of a dataset of equal
+    values beside it or in the instrument."""
+    values, units = _dataset(group, name)
+    if values is None or units not in ("", _NOT_PROVIDED):
+        return values, units
+    target = attribute(member(group, name), "target")
+    holders = [(group, target)] if target else []
+    for holder in (group, member(group.parent, _SPECTROMETER)):
+        holders += [(holder, child) for child in list(holder or ())[:_MOST_MEMBERS]]
+    for holder, child in holders:
+        other, stated = _dataset(holder, child)
+        if other is not None and stated not in ("", _NOT_PROVIDED) and np.array_equal(other, values):
+            return values, stated
+    return values, ""
+
+
 def _ellipsometry(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[str]]:
     """The columns of `measured_data` of NXellipsometry, one row for each angle and wavelength."""
-    stated = text(member(group, "data_type"))
+    stated = text(member(group, "data_type")).replace(_NOT_PROVIDED, "")
     slices = {child.lower().partition("_")[0] for child in group}
     kind = stated or ("Psi/Delta" if {"psi", "delta"} <= slices else "not stated")
     observables = _OBSERVABLES.get(kind.lower())
     if observables is None:
         raise DataError(f"{name} measures {kind!r}; export psi and delta in degrees, or N, C and S, as CSV")
-    axis = next((child for child in group if recognise(_named(child, "")).role == "wavelength"), "")
-    values, units = _dataset(group, axis) if axis else (None, "")
-    measured, _ = _dataset(group, _MEASURED)
+    holder, axis = (
+        group,
+        next((child for child in group if recognise(_named(child, "")).role == "wavelength"), ""),
+    )
+    if not axis and member(group.parent, f"{_SPECTROMETER}/wavelength") is not None:
+        holder, axis = member(group.parent, _SPECTROMETER), "wavelength"
+    values, units = _with_units(holder, axis) if axis else (None, "")
+    measured = _without_single_axes(_dataset(group, _MEASURED)[0])
     if values is None or measured is None or measured.shape[1:] != (len(observables), values.size):
         raise DataError(
             f"{name}/{_MEASURED} has the shape {None if measured is None else measured.shape}, where "
@@ -180,11 +204,18 @@ def _ellipsometry(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[st
     degrees = " (deg)" if "psi" in observables else ""
     columns |= {f"{o}{degrees}": measured[:, i].reshape(-1) for i, o in enumerate(observables)}
     for child in (f"{_MEASURED}_errors", "data_error"):
-        errors = _dataset(group, child)[0]
+        errors = _without_single_axes(_dataset(group, child)[0])
         if errors is not None and errors.shape == measured.shape and degrees:
             columns |= {f"{_ERRORS[o]} (deg)": errors[:, i].reshape(-1) for i, o in enumerate(observables)}
             break
     return columns, [f"{_MEASURED} read as {kind}" + ("" if stated else ", by the names beside it")]
+
+
+def _without_single_axes(values: np.ndarray | None) -> np.ndarray | None:
+    """Values without leading axes of length 1, such as environment and time, before the last three."""
+    while values is not None and values.ndim > 3 and values.shape[0] == 1:
+        values = values[0]
+    return values
 
 
 def _angles(group: Any, count: int, points: int) -> dict[str, np.ndarray]:
@@ -195,7 +226,7 @@ def _angles(group: Any, count: int, points: int) -> dict[str, np.ndarray]:
             dataset = member(holder, place)
             angles = numbers(dataset, place)
             if angles is not None and angles.size == count:
-                units = attribute(dataset, "units") or "not stated"
+                units = attribute(dataset, "units").replace(_NOT_PROVIDED, "") or "not stated"
                 return {f"angle ({units})": np.repeat(angles.reshape(-1), points)}
     if count > 1:
         raise DataError(

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, facts, told_apart
+from pellicle.data.formats.exports import Rows, all_cells, decimal_mark, delimiter_of, facts, told_apart
 from pellicle.data.tabular.columns import Column, is_header, recognise
 from pellicle.data.tabular.layout import layout_of
 from pellicle.data.tabular.table import Table, declarations, plain_columns
@@ -44,6 +44,26 @@ def scans_side_by_side(file: TextFile) -> list[Table] | None:
                 named = bool(names and names[0]) and not any(names[1:]) and not is_number(names[0], ",")
             if groups and (len(groups) > 1 or named):
                 return _scans(file, header, delimiter, groups, names)
+    return None
+
+
+def numbered_columns(file: TextFile) -> list[Table] | None:
+    """Return the table whose heads are a wavelength and numbers, as times of a series, or None for another.
+
+    The rows below begin with numbers; a table whose rows begin with names has its wavelengths in the head.
+    """
+    for header, line in enumerate(file.lines[:_MOST_HEADING]):
+        delimiter = delimiter_of(line.text)
+        names = all_cells(line.text, delimiter)
+        if len(names) < 3 or delimiter == " " or recognise(names[0]).role != "wavelength":
+            continue
+        rows = [(below, all_cells(below.bare, delimiter)) for below in file.lines[header + 1 :]]
+        if not all(is_number(name, ",") for name in names[1:]) or not rows:
+            continue
+        if not all(is_number(cells[0], ",") and len(cells) == len(names) for _, cells in rows):
+            continue
+        mark = "." if delimiter == "," else decimal_mark(rows)
+        return [plain_columns(names, rows, [f"{len(names) - 1} spectra, named by the head"], decimal=mark)]
     return None
 
 

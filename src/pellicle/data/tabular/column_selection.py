@@ -88,7 +88,7 @@ def axis_columns(table: Table, columns: Sequence[Column], example: str) -> AxisC
     if wavelength is None and angle is not None:
         raise DataError(
             f"{table.path}: has angles of incidence but no wavelength among {listed(columns)}; add a column "
-            "wavelength_nm with that of the light"
+            "wavelength_nm, or a line `# wavelength: 632.8 nm` above the names, with that of the light"
         )
     if wavelength is None:
         raise DataError(

@@ -99,6 +99,7 @@ for _role in RATIO_COLUMNS:
     NAMES[_role] = (_role, _role.replace("_", " "), "{}({})".format(*_role.split("_")))
     NAMES[f"sigma_{_role}"] = _sigmas(_role)
 NAMES |= {word: kind.names for word, kind in KINDS.items() if kind.names}
+NAMES["R"] = (*NAMES["R"], "sci", "sce")  # of Konica Minolta: with and without the specular component
 FOREIGN = (
     *("absorptance", "cd", "circular dichroism", "ellipticity", "emission", "f(r)", "fluorescence"),
     *("irradiance", "k/s", "kubelka-munk", "mdeg", "photoluminescence", "pl", "pl intensity", "power"),

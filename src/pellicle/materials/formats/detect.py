@@ -140,7 +140,8 @@ def woollam(text: optical.MaterialText) -> optical.MaterialFile | None:
     title, first_row = [], 0
     for i, line in enumerate(text.lines):
         words = re.findall(r"[^\s,;/]+", line.text.lower())
-        stated = _unit_and_kind(words) if i else None  # the first line is the title, whatever it says
+        # the first line is the title, whatever it says, and may be blank
+        stated = _unit_and_kind(words) if line.number > 1 else None
         if stated is not None:
             unit, dielectric = stated[0] or unit, dielectric if stated[1] is None else stated[1]
         elif len(words) == 1 and words[0].isascii() and words[0].isdigit():
