@@ -19,6 +19,7 @@ READERS = {
     **{r.__module__.split(".")[-1] if r.__name__ == "read" else r.__name__: r for r in TEXT_READERS},
 }
 READING = {
+    "numbered_columns": {"signal": "R"},
     "ocean_optics": {"signal": "R", "signal_unit": "percent"},
     "stellarnet": {"signal": "R"},
     "jcamp/affn.txt": {"calibrated": False},
