@@ -41,6 +41,7 @@ from pellicle.scene.film import Reference as Reference
 from pellicle.scene.film import Scene as Scene
 from pellicle.scene.free import Free as Free
 from pellicle.scene.graded import Graded as Graded
+from pellicle.scene.groups import Group as Group
 from pellicle.scene.instrument import Instrument as Instrument
 from pellicle.scene.layers import Interface as Interface
 from pellicle.scene.layers import Layer as Layer

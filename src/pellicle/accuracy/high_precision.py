@@ -4,6 +4,7 @@ Source: H. A. Macleod, Thin-Film Optical Filters, chapter 2; incoherent plates b
 The indices of the media are those of the forward model, rounded to float64.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import mpmath
@@ -14,6 +15,7 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Scene, groups, thickness_spread, with_wavelength
 from pellicle.scene.free import insert
+from pellicle.scene.groups import written_out
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.psi_delta import PsiDelta
 
@@ -73,7 +75,7 @@ class _Point(NamedTuple):
 
 
 def _points(scene: Scene) -> list[_Point]:
-    described, plates = groups(scene)
+    described, plates = groups(replace(scene, layers=written_out(scene.layers)))
     # a scene with several plates collects all light
     part = plates[0] if len(plates) == 1 else None
     share = 1.0 if part is None or part.back_collected is None else part.back_collected

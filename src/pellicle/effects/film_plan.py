@@ -108,8 +108,11 @@ def _removals(effect: str, stage: removal.Stage) -> Iterator[removal.Step]:
     }
     removals = []
     if effect == "opaque" and not light.kind.transmitted:
-        # a graded layer is no half space
-        plain = (isinstance(x, Layer) and not isinstance(x.material, Graded) for x in scene.layers)
+        # a graded layer is no half space, and a layer in a group is not the last of them
+        plain = (
+            isinstance(x, Layer) and x.repeats == 1 and not isinstance(x.material, Graded)
+            for x in scene.layers
+        )
         opaque = (one and absorbs(x.material) for one, x in zip(plain, scene.layers, strict=True))
         removals = [removal.FilmRemoval(effect, depth) for depth, may_be in enumerate(opaque) if may_be]
     elif stage.plan.on(effect) and not meaningless.get(effect, False):

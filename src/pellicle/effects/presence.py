@@ -130,7 +130,7 @@ def absorption(scene: Scene) -> Row:
 
 def stack(scene: Scene) -> Row:
     """On where the closed form of one layer does not apply: several layers, or rough faces."""
-    count = max(len(group.layers) for group in groups(scene)[0])
+    count = max(sum(layer.repeats for layer in group.layers) for group in groups(scene)[0])
     if is_graded(scene):
         return Row("stack", True, "a graded layer: a product of the characteristic matrices of its slices")
     if count > 1:

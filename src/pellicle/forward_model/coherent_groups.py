@@ -4,16 +4,19 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.optics import coherent, interface, orders, plate, response
 from pellicle.optics.anisotropy import Principal, each_index, mixes_polarisations, seen_by
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.pair import imag, real
-from pellicle.scene.film import Group, Scene, groups, thickness_spread
+from pellicle.optics.repeats import Repeats
+from pellicle.scene.film import CoherentLayers, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
+from pellicle.scene.groups import runs, written_out
 from pellicle.scene.layers import Layer, Plate
 
 
@@ -29,6 +32,7 @@ class CoherentGroup(NamedTuple):
     collected: plate.Collection | None  # part of the light from beneath that plate, None for all
     roughness: list[Any] | None  # k₀σ of each face, None where all are smooth
     phase_variance: Any  # of the round-trip phase, None without damped orders; may be `PerPolarisation`
+    repeats: Repeats  # of layers that stand in `layers` once
 
 
 class PerPolarisation(NamedTuple):
@@ -50,6 +54,8 @@ def _of(number: Any, polarisation: str) -> Any:
 def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     """The coherent groups of a scene from the ambient down."""
     wavelength = scene.light.wavelength
+    if plan.row("anisotropy").count >= GENERAL:  # matrices of 4×4 have no powers
+        scene = eqx.tree_at(lambda s: s.layers, scene, written_out(scene.layers))
     described, plates = groups(scene)
     if not plan.on("back-face"):
         described, plates = described[:1], ()
@@ -81,6 +87,10 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
                 collected=collected,
                 roughness=None if smooth else rough,
                 phase_variance=_phase_variance(plan, scene, group, angle),
+                repeats=Repeats(
+                    tuple((count, len(own)) for count, own in runs(group.layers)),
+                    tuple(layer.drift for layer in group.layers),
+                ),
             )
         )
     return evaluated
@@ -139,7 +149,9 @@ def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response
     """The response of a group to one polarisation."""
     film = (group.above, group.layers, group.below, group.phases, group.angle, polarisation)
     propagating = not plan.on("tunnelling")
-    return coherent.responses(*film, propagating=propagating, roughness=group.roughness)[0]
+    return coherent.responses(
+        *film, propagating=propagating, roughness=group.roughness, repeats=group.repeats
+    )[0]
 
 
 def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
@@ -157,7 +169,7 @@ def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powe
     )
 
 
-def _phase_variance(plan: Plan, scene: Scene, group: Group, angle: Any) -> Any:
+def _phase_variance(plan: Plan, scene: Scene, group: CoherentLayers, angle: Any) -> Any:
     """Variance of the round-trip phase from bandwidth and thickness spread; None without damped orders."""
     if not plan.on("orders") or not group.layers:
         return None

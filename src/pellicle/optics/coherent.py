@@ -8,17 +8,20 @@ products of a few cannot overflow, and an opaque layer halves the fields.
 `stack` divides the fields by their norm after each layer, so that 50 layers with an opaque one among them
 stay finite without clamping. Complex arithmetic: separate real arrays bring nothing here. One `lax.scan` runs
 over the layers; unrolled, 50 of them do not compile in minutes. A graded layer is a row of slices in that
-loop (`pellicle.optics.gradient`).
+loop (`pellicle.optics.gradient`). The matrix of a group of layers that repeat is raised to a power
+by squaring.
 
 Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrices).
 """
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pellicle.optics.anisotropy import Index, Principal, mixes_polarisations, seen_by, tangential_permittivity
 from pellicle.optics.characteristic import matrix_elements, propagating_elements
@@ -34,6 +37,7 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.pair import Number, Pair, abs2, is_real, times_i, to_complex
+from pellicle.optics.repeats import Repeats, matrix_power, places
 from pellicle.optics.response import Amplitudes, Response
 
 
@@ -45,6 +49,7 @@ def stack(
     angle: Any = None,
     polarisations: str = "sp",
     roughness: Sequence[Any] | None = None,
+    repeats: Repeats | None = None,
 ) -> tuple[Response, ...]:
     """Return the response of a stack, for each letter of `polarisations`.
 
@@ -52,6 +57,9 @@ def stack(
     """
     a, q0 = transverse(ambient, angle)
     rows = _rows((ambient, substrate, a), layers, phases, roughness)
+    if repeats is not None and repeats.count > 1:
+        counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
+        rows = _repeated(rows, repeats, counts)
     shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
 
     bottom, top, q_top = (_full(number, shape, dtype) for number in (substrate, ambient, q0))
@@ -60,7 +68,9 @@ def stack(
     empty = equal_media(ambient, substrate, *uniform)
     if is_graded(layers):
         empty = empty & jnp.all(jnp.stack(rows.points) == top, axis=(0, 1))
-    upside_down = _Rows(jax.tree.map(lambda x: x[::-1], rows.points[::-1]), rows.depth[::-1], None)
+    upside_down = _Rows(
+        jax.tree.map(lambda x: x[::-1], rows.points[::-1]), rows.depth[::-1], None, rows.runs[::-1]
+    )
     responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
@@ -93,6 +103,7 @@ class _Rows(NamedTuple):
     points: tuple[Any, ...]  # complex or `Principal` index, three at Gauss points where a layer is graded
     depth: Any  # k₀ times the thickness
     rough: Any  # k₀σ of each face, one more than layers; None where all are smooth
+    runs: tuple[tuple[int, int], ...] = ()  # (repeats, rows) from the first row on; () is each row once
 
 
 def _rows(
@@ -141,6 +152,25 @@ def _rows(
     return _Rows(points, depth, jnp.real(joined(rough)))
 
 
+def _repeated(rows: _Rows, repeats: Repeats, counts: Sequence[int]) -> _Rows:
+    """Return rows with their runs, or written out where they drift or a face is rough.
+
+    `counts` are the rows of each layer. The size of a program does not depend on the number of repeats.
+    """
+    ends = np.cumsum([0, *counts])[np.cumsum([0, *(n for _, n in repeats.runs)])]
+    runs = [(count, range(*pair)) for (count, _), pair in zip(repeats.runs, pairwise(ends), strict=True)]
+    if rows.rough is None and all(x is None for x in repeats.drift):
+        return rows._replace(runs=tuple((count, len(own)) for count, own in runs))
+    order = np.concatenate([np.tile(own, count) for count, own in runs])
+    place = np.concatenate([np.repeat(places(count), len(own)) for count, own in runs])
+    drift = [jnp.broadcast_to(0.0 if x is None else x, rows.depth.shape[1:]) for x in repeats.drift]
+    change = jnp.repeat(jnp.stack(drift), np.array(counts), 0, total_repeat_length=len(rows.depth))
+    factor = 1 + change[order] * place.reshape(-1, *[1] * (change.ndim - 1))
+    rough = None if rows.rough is None else jnp.concatenate([rows.rough[:-1][order], rows.rough[-1:]])
+    points = jax.tree.map(lambda x: x[order], rows.points)
+    return _Rows(points, rows.depth[order] * factor.astype(rows.depth.dtype), rough)
+
+
 def _full(number: Index, shape: tuple[int, ...], dtype: Any) -> Any:
     if isinstance(number, Principal):
         return Principal(*(_full(x, shape, dtype) for x in number))
@@ -179,6 +209,17 @@ def _expm1_ratio(x: Any) -> Any:
 
 def _scaled_fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
     """Return (E, H) at the far face for a unit wave in the last medium, the first row first, and |scale|²."""
+    if rows.runs:
+        return _repeated_fields(rows, admittance, a, polarisation)
+    start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
+    inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
+    ((E, H), scale_square), _ = _through(start, rows, inner, a, polarisation)
+    return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square
+
+
+def _through(start: Any, rows: _Rows, faces: Any, a: Any, polarisation: str) -> Any:
+    """Scan over rows from ((E, H), |scale|²); E and H may have several columns along a further first axis."""
+    columns = start[0][0].ndim - start[1].ndim
 
     def through_layer(carry, layer):
         (E, H), scale_square = carry
@@ -194,13 +235,32 @@ def _scaled_fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisatio
             c, f, layer_scale, _ = matrix_elements(square, k)
             E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
+        size = jnp.sum(size, axis=0) if columns else size
         shrink = jax.lax.rsqrt(size)
         return ((E * shrink, H * shrink), scale_square * layer_scale / size), None
 
-    start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
-    inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
-    ((E, H), scale_square), _ = jax.lax.scan(through_layer, start, (rows.points, rows.depth, inner))
-    return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square
+    return jax.lax.scan(through_layer, start, (rows.points, rows.depth, faces))
+
+
+def _repeated_fields(rows: _Rows, admittance: Any, a: Any, polarisation: str) -> Any:
+    """`_scaled_fields` of smooth rows, some of which are repeated: the matrix of a run to the power of its
+    repeats, by squaring, divided by its norm at each step."""
+    one, zero = jnp.ones_like(admittance), jnp.zeros_like(admittance)
+    (E, H), scale_square = (one, admittance), jnp.ones_like(jnp.real(admittance))
+    first = 0
+    for count, length in rows.runs:
+        own = jax.tree.map(lambda x, at=slice(first, first + length): x[at], (rows.points, rows.depth))
+        own, first = _Rows(*own, None), first + length
+        if count == 1:
+            ((E, H), scale_square), _ = _through(((E, H), scale_square), own, None, a, polarisation)
+            continue
+        identity = (jnp.stack([one, zero]), jnp.stack([zero, one])), jnp.ones_like(scale_square)
+        period = _through(identity, own, None, a, polarisation)[0]
+        ((e, h), (e_, h_)), scale = matrix_power(identity, period, count)
+        E, H = e * E + h * H, e_ * E + h_ * H
+        size = jax.lax.stop_gradient(abs2(E) + abs2(H))
+        E, H, scale_square = (*(x * jax.lax.rsqrt(size) for x in (E, H)), scale_square * scale / size)
+    return (E, H), scale_square
 
 
 FEW = 3
@@ -268,6 +328,7 @@ def responses(
     *,
     propagating: bool = False,
     roughness: Sequence[Any] | None = None,
+    repeats: Repeats | None = None,
 ) -> tuple[Response, ...]:
     """Return the response of coherent layers between two half spaces, for each polarisation in its order.
 
@@ -284,6 +345,8 @@ def responses(
     - `polarisations`: "s", "p" or "sp".
     - `propagating`: promises that no wave is totally reflected in a real layer: a cheaper film.
     - `roughness`: k₀σ of each interface from the top down, one more than there are layers.
+    - `repeats`: groups of layers that are repeated, each of which is in `layers` once. The face above such a
+      layer is as rough in all repeats.
 
     ```python
     >>> from pellicle.optics.response import reflectance
@@ -298,8 +361,9 @@ def responses(
     results: list[Response] = []
     for letters in polarisations if apart else [polarisations]:
         above, *between, below = (seen_by(n, letters) for n in (ambient, *layers, substrate))
-        if roughness is not None or is_graded(layers) or len(layers) > FEW:
-            results += stack(above, between, below, phases, angle, letters, roughness)
+        several = repeats is not None and repeats.count > 1
+        if several or roughness is not None or is_graded(layers) or len(layers) > FEW:
+            results += stack(above, between, below, phases, angle, letters, roughness, repeats)
         elif len(layers) == 1:
             results += film(above, between[0], below, phases[0], angle, letters, propagating)
         else:

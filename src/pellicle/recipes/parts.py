@@ -25,7 +25,7 @@ from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.dispersion.oscillators import AbstractOscillator, Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
-from pellicle.errors import UsageError
+from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes import schema
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SERIES, SPLINES, fixed_model, free_model
@@ -33,6 +33,7 @@ from pellicle.recipes.media import free_numbers, medium, number, scattering_back
 from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
+from pellicle.scene.groups import Group, unlisted
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
 from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, StandardUncertainties, Substrate
 from pellicle.scene.priors import HalfNormal, Normal
@@ -200,7 +201,7 @@ def _without_default_bounds(dispersion: AbstractDispersion) -> Sequence[Abstract
     return [made, Constant(made.n)] if isinstance(made, Constant) else [made]
 
 
-_SIGNED = ("wavelength_shift", "angle_shift")
+_SIGNED = ("wavelength_shift", "angle_shift", "drift")
 """Numbers that may be negative."""
 
 
@@ -240,6 +241,43 @@ def layer(table: schema.LayerTable, folder: Path) -> Layer | Interface | Plate:
     return _part(Layer if table.plate_mm is None else Plate, table, material=material)
 
 
+def layers(table: schema.SceneTable | schema.ReferenceTable, folder: Path) -> list[Any]:
+    """The layers and groups of a table, from the ambient down. Raises UsageError."""
+    names, every = [one.name for one in table.layer], [layer(one, folder) for one in table.layer]
+    below: list[list[Group]] = [[] for _ in range(len(every) + 1)]
+    for group in table.group:
+        place = len(every) if group.after is None else group.after
+        if isinstance(place, str):
+            if place not in names:
+                known = [name for name in names if name]
+                raise UsageError(
+                    f"group: after: no layer is named {place!r}{did_you_mean(place, known)}; give the name of"
+                    " a layer, or the number of layers above the group"
+                )
+            place = names.index(place) + 1
+        if not 0 <= place <= len(every):
+            raise UsageError(f"group: after: {place} layers cannot lie above it: there are {len(every)}")
+        below[place].append(Group([layer(one, folder) for one in group.layer], group.repeat))
+    return [*below[0], *(x for one, groups in zip(every, below[1:], strict=True) for x in (one, *groups))]
+
+
+def layer_tables(layers: Sequence[Layer | Interface | Plate], owner: str, folder: Path) -> dict[str, Any]:
+    """The tables `layer` and `group` of an owner, the inverse of `layers`. Raises UsageError."""
+    single: list[dict[str, Any]] = []
+    groups: list[dict[str, Any]] = []
+    position = 0
+    for item in unlisted(layers):
+        if not isinstance(item, Group):
+            single.append(layer_keys(item, position, folder))
+            position += 1
+            continue
+        own = [layer_keys(x, position + i, folder) for i, x in enumerate(item.layers)]
+        groups.append({"repeat": item.repeat, "after": len(single), "layer": own})
+        position += len(own)
+    groups = [{k: x for k, x in g.items() if k != "after" or x < len(single)} for g in groups]
+    return {f"{owner}.layer": single, f"{owner}.group": groups}
+
+
 def layer_keys(layer: Layer | Interface | Plate, position: int, folder: Path) -> dict[str, Any]:
     """The table of a layer, the inverse of `layer`. Raises UsageError, naming it."""
     label = layer.name or f"layer {position + 1}"
@@ -248,7 +286,7 @@ def layer_keys(layer: Layer | Interface | Plate, position: int, folder: Path) ->
         head["between"] = layer.mix
     else:
         head |= layer_medium(layer.material, label, folder)
-    keys = _keys(layer, label, ("name", "mix", "material"))
+    keys = _keys(layer, label, ("name", "mix", "material", "group"))
     if isinstance(layer, Plate):
         keys = {"plate_mm": written_number(layer.plate_mm, f"{label}: plate_mm"), **keys}
     return head | keys
@@ -278,8 +316,7 @@ def substrate_keys(substrate: Substrate, folder: Path) -> Any:
 
 def reference(table: schema.ReferenceTable, folder: Path) -> Reference:
     """Return the reference of a recipe, whose reflectance is known."""
-    layers = [layer(one, folder) for one in table.layer]
-    return Reference(substrate(table.substrate, folder, "R"), layers, table.form)
+    return Reference(substrate(table.substrate, folder, "R"), layers(table, folder), table.form)
 
 
 def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
@@ -287,7 +324,7 @@ def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
     form = {} if reference.form == "relative" else {"form": reference.form}
     return {
         "reference": {"substrate": substrate_keys(reference.substrate, folder), **form},
-        "reference.layer": [layer_keys(one, i, folder) for i, one in enumerate(reference.layers)],
+        **layer_tables(reference.layers, "reference", folder),
     }
 
 

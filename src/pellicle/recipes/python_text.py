@@ -14,6 +14,7 @@ from pellicle.materials import material as find
 from pellicle.scene.film import Light, Reference, Scene
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
+from pellicle.scene.groups import Group, unlisted
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
 from pellicle.scene.layers import Interface, Layer, Plate, StandardUncertainties, Substrate
 from pellicle.scene.surface import Surface
@@ -27,6 +28,7 @@ _PLACES = {
 _POSITIONAL = {
     Scene: ("layers", "substrate"),
     Layer: ("material", "thickness"),
+    Group: ("layers",),
     Interface: ("thickness",),
     Plate: ("material", "plate_mm"),
     Substrate: ("material",),
@@ -145,7 +147,9 @@ def _module(module: Any) -> str:
 def _shortened(module: Any, name: str, value: Any) -> Any:
     """The value of a field as its converter takes it: one layer, and a plain substrate by its material."""
     if isinstance(module, Scene | Reference) and name == "layers":
-        return value[0] if len(value) == 1 else list(value)
+        return value[0] if len(value) == 1 else unlisted(value)
+    if isinstance(module, Group):
+        return list(value) if name == "layers" else _Text(value)
     if isinstance(module, Scene | Reference) and name == "substrate" and value == Substrate(value.material):
         return value.material
     return dict(value) if isinstance(module, Surface) and name == "numbers" else value

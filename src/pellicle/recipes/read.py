@@ -194,7 +194,7 @@ class FilmRecipe:
         with _of_recipe(self.path, ValueError):
             lit = light(data, tables.camera.transmitted, azimuth)
             scene = Scene(
-                [parts.layer(layer, folder) for layer in described.layer],
+                parts.layers(described, folder),
                 parts.substrate(described.substrate, folder, lit.signal),
                 ambient=medium(described.ambient, name="ambient", folder=folder),
                 light=lit,

@@ -229,6 +229,7 @@ class LayerTable(_Table):
     back_reflections: int | None = None
     thickness_spread: Number | None = None
     roughness: Number | None = None
+    drift: Number | None = None
     index_uncertainty: Uncertain = None
     free: list[str] = []
 
@@ -238,7 +239,7 @@ class LayerTable(_Table):
             raise ValueError('a layer has a material, or between = "bruggeman" to mix its neighbours')
         if (self.thickness is None) == (self.plate_mm is None):
             raise ValueError("a layer has a thickness in nm, or plate_mm where it is an incoherent plate")
-        of_layer = {"thickness_spread", "roughness", "index_uncertainty"}
+        of_layer = {"thickness_spread", "roughness", "drift", "index_uncertainty"}
         if self.between is not None:
             kind, foreign = "between, a mixed interface", {*of_layer, *BACK, "plate_mm", "free"}
         elif self.plate_mm is not None:
@@ -248,6 +249,15 @@ class LayerTable(_Table):
         if rejected := self.model_fields_set & foreign:
             raise ValueError(f"{' and '.join(sorted(rejected))} does not go with {kind}")
         return self
+
+
+class GroupTable(_Table):
+    """One `[[scene.group]]`: layers that are repeated. It lies below the layer that `after` names, or below
+    so many `[[scene.layer]]`; without it, below all of them."""
+
+    repeat: int
+    after: str | int | None = None
+    layer: list[LayerTable]
 
 
 class GridTable(_Table):
@@ -336,8 +346,15 @@ class SceneTable(_uncertainties(name for name in _EVERY if name in _OF_SCENE)):
 
     ambient: Medium = 1.0
     substrate: Medium | PlateTable
-    layer: list[LayerTable] = Field(min_length=1)
+    layer: list[LayerTable] = Field([])
+    group: list[GroupTable] = Field([])
     uncertainty: Literal["usual", "none"] = "usual"
+
+    @model_validator(mode="after")
+    def _has_layers(self):
+        if not self.layer and not self.group:
+            raise ValueError("a scene has at least one [[scene.layer]] or [[scene.group]]")
+        return self
 
 
 class ReferenceTable(_Table):
@@ -345,6 +362,7 @@ class ReferenceTable(_Table):
 
     substrate: Medium | PlateTable
     layer: list[LayerTable] = []
+    group: list[GroupTable] = []
     form: Literal["relative", "normalised"] = "relative"
 
 

@@ -92,7 +92,7 @@ def recipe_text(
                 "substrate": parts.substrate_keys(scene.substrate, place),
                 **of_scene,
             },
-            "scene.layer": [parts.layer_keys(layer, i, place) for i, layer in enumerate(scene.layers)],
+            **parts.layer_tables(scene.layers, "scene", place),
             **({} if scene.reference is None else parts.reference_tables(scene.reference, place)),
             "instrument": parts.instrument_keys(scene.instrument) | of_instrument,
             "camera": camera,

@@ -18,6 +18,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, free_leaves
 from pellicle.scene.graded import AtDepth, Graded, face
+from pellicle.scene.groups import listed
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import (
     Interface,
@@ -49,9 +50,7 @@ class Reference(eqx.Module):
     """
 
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
-    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(
-        converter=lambda x: tuple(x) if isinstance(x, list | tuple) else (x,), default=()
-    )
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=listed, default=())
     form: str = eqx.field(static=True, default="relative")
 
     def __check_init__(self):
@@ -131,23 +130,14 @@ def check_polarisation(polarisation: str) -> None:
         raise ValueError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
 
 
-def _layers(value: Any) -> tuple[Layer | Interface | Plate, ...]:
-    """One layer or several as a tuple. Raises UsageError for what is no layer."""
-    layers = tuple(value) if isinstance(value, list | tuple) else (value,)
-    for layer in layers:
-        if not isinstance(layer, Layer | Interface | Plate):
-            shown = repr(layer) if isinstance(layer, str) else type(layer).__name__
-            raise UsageError(f"a layer of a scene must be as pl.Layer('SiO2', 100.0), not {shown}")
-    return layers
-
-
 @final
 class Scene(eqx.Module):
     """Layers on a substrate, the ambient, the light and the instrument.
 
     **Arguments:**
 
-    - `layers`: one `Layer`, or several from the ambient down; an `Interface` or a `Plate` may be among them.
+    - `layers`: one `Layer`, or several from the ambient down; an `Interface`, a `Plate` or a
+      `Group` may be among them.
     - `substrate`: a `Substrate`, or its material.
     - `ambient`: the medium of the incident light, which must not absorb.
     - `light`: a `Light`.
@@ -162,7 +152,7 @@ class Scene(eqx.Module):
     'SiO2'
     """
 
-    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=_layers)
+    layers: tuple[Layer | Interface | Plate, ...] = eqx.field(converter=listed)
     substrate: Substrate = eqx.field(converter=lambda s: s if isinstance(s, Substrate) else Substrate(s))
     ambient: AbstractDispersion = eqx.field(converter=ambient_medium, default=1.0)
     light: Light = Light()
@@ -210,8 +200,11 @@ class Scene(eqx.Module):
                 )
 
 
-class Group(NamedTuple):
-    """Coherent layers between two thick media, and the roughness of each face from the top down."""
+class CoherentLayers(NamedTuple):
+    """Coherent layers between two thick media, and the roughness of each face from the top down.
+
+    Layers of a `Group` stand there once.
+    """
 
     above: AbstractDispersion
     layers: tuple[Layer, ...]
@@ -219,7 +212,7 @@ class Group(NamedTuple):
     roughness: tuple[Quantity | None, ...]
 
 
-def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
+def groups(scene: Scene) -> tuple[tuple[CoherentLayers, ...], tuple[Plate, ...]]:
     """Return the coherent groups from the ambient down, and the plates between them."""
     substrate = scene.substrate
     plates = [layer for layer in scene.layers if isinstance(layer, Plate)]
@@ -241,7 +234,7 @@ def groups(scene: Scene) -> tuple[tuple[Group, ...], tuple[Plate, ...]]:
     media = [scene.ambient, *(plate.material for plate in plates), last]
     feet = [substrate.roughness if i == foot else None for i in range(len(runs))]
     coherent = [
-        Group(above, tuple(run), below, (*(layer.roughness for layer in run), roughness))
+        CoherentLayers(above, tuple(run), below, (*(layer.roughness for layer in run), roughness))
         for above, run, below, roughness in zip(media[:-1], runs, media[1:], feet, strict=True)
     ]
     return tuple(coherent), tuple(plates)
@@ -311,8 +304,18 @@ def sliced(scene: Scene, count: int) -> Scene:
 
 
 def coherent_layers(scene: Scene) -> tuple[Layer, ...]:
-    """Return every coherent layer from the ambient down, interfaces as their slices."""
-    return tuple(layer for group in groups(scene)[0] for layer in group.layers)
+    """Return every coherent layer from the ambient down, interfaces as their slices.
+
+    A layer of a `Group` is returned once, with the thickness and its spread of all repeats.
+    """
+    every = (layer for group in groups(scene)[0] for layer in group.layers)
+    return tuple(layer if layer.repeats == 1 else in_all_repeats(layer) for layer in every)
+
+
+def in_all_repeats(layer: Layer) -> Layer:
+    """Return a layer with the thickness and the spread of all its repeats."""
+    spread = None if layer.thickness_spread is None else divided(layer.thickness_spread, 1 / layer.repeats)
+    return replace(layer, thickness=divided(layer.thickness, 1 / layer.repeats), thickness_spread=spread)
 
 
 def thickness_spread(scene: Scene, layer: Layer) -> Quantity | None:

@@ -6,7 +6,7 @@ import math
 import os
 import re
 from dataclasses import dataclass, fields
-from typing import Any, TypeAlias, final
+from typing import Any, NamedTuple, TypeAlias, final
 
 import equinox as eqx
 import jax
@@ -224,6 +224,13 @@ def none_if_zero(number: Quantity | None) -> Quantity | None:
     return None if isinstance(number, int | float) and number == 0 else number
 
 
+class Repetition(NamedTuple):
+    """Number of repeats of a group of layers, and the number of the group in its scene."""
+
+    repeats: int
+    number: int
+
+
 @final
 class Layer(eqx.Module):
     """Coherent layer.
@@ -238,8 +245,11 @@ class Layer(eqx.Module):
       Croce, 1980).
 
     - `index_uncertainty`: relative standard uncertainty of a given index; None takes the scene's.
+    - `drift`, in a `Group`: linear change of the thickness from the uppermost to the lowest repeat, relative
+      to `thickness`, which is then the mean of all repeats.
+    - `group`: the group that the layer is repeated in, which a scene sets.
 
-    A `thickness_spread` or `roughness` of None or 0 is absent.
+    A `thickness_spread`, `roughness` or `drift` of None or 0 is absent.
 
     **Raises:** ValueError for an unknown material, gain, a negative length or uncertainty.
 
@@ -253,6 +263,13 @@ class Layer(eqx.Module):
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     roughness: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     index_uncertainty: float | None = eqx.field(static=True, default=None)
+    drift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    group: Repetition | None = eqx.field(static=True, default=None)
+
+    @property
+    def repeats(self) -> int:
+        """Number of times that the layer stands in its scene."""
+        return 1 if self.group is None else self.group.repeats
 
     def __check_init__(self):
         check_uncertainty("index", self.index_uncertainty)
@@ -302,7 +319,7 @@ class Interface(eqx.Module):
         return tuple(Layer(rule(above, below, (i + 0.5) / self.steps), thickness) for i in range(self.steps))
 
 
-def divided(thickness: Quantity, parts: int) -> Quantity:
+def divided(thickness: Quantity, parts: float) -> Quantity:
     """Return one of several equal parts of a thickness; a free one keeps its bounds, divided."""
     if isinstance(thickness, Free):
         return Free(thickness.lower / parts, thickness.upper / parts, start=thickness.start / parts)

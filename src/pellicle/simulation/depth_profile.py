@@ -30,6 +30,7 @@ from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Scene, all_collected, groups, sliced, with_wavelength
 from pellicle.scene.free import insert, start_values
 from pellicle.scene.graded import Graded
+from pellicle.scene.groups import written_out
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate
 
@@ -225,9 +226,10 @@ def depth_profile(scene: Scene, at: ArrayLike, wavelength: ArrayLike) -> DepthPr
         raise UsageError("the wavelengths of a depth profile must be numbers of nm above zero")
     with jax.enable_x64(True):
         fixed = all_collected(insert(scene, start_values(scene)))
+        fixed = replace(fixed, layers=written_out(fixed.layers))
+        names, runs = _names(fixed)
         plane = [replace(x, thickness_spread=None) if isinstance(x, Layer) else x for x in fixed.layers]
         fixed = eqx.tree_at(lambda s: (s.layers, s.instrument), fixed, (tuple(plane), Instrument()))
-        names, runs = _names(scene)
         fixed = sliced(fixed, SLICES)
         every = with_wavelength(fixed, np.concatenate([nm, chosen]))
         plan = exact(every)

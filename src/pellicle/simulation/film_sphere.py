@@ -70,6 +70,8 @@ def stack(
     varied, bands = varied_layer(scene, layer), integration_bands(BANDS, observer, illuminant)
     eye = Sensor(bands.wavelength, bands.weights)
     fixed: Any = insert(scene, start_values(scene))
+    if not all(x.repeats == 1 for x in fixed.layers if isinstance(x, Layer)):
+        raise UsageError("a sphere has no groups of layers: list every layer")
     if not all(isinstance(each, Layer) for each in fixed.layers):
         raise UsageError("a sphere has coherent layers only: leave out plates and mixed interfaces")
     media = [fixed.ambient, *(each.material for each in fixed.layers), fixed.substrate.material]

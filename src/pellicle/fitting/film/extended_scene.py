@@ -218,7 +218,8 @@ class ExtendedScene:
     def _faces(self, layers: list[Any]) -> list[Any]:
         """The layers with a roughness, an oxide and a mixed interface of no size."""
         plain, top, foot = tuple(layers), layers[0], self._fitted.layers[-1]
-        if isinstance(top, Layer) and top.roughness is None and computes_roughness(self._fitted):
+        single = isinstance(top, Layer) and top.repeats == 1  # a face in a group is rough in every repeat
+        if single and top.roughness is None and computes_roughness(self._fitted):
             self.roughness, rough = self._number(0.0)
             layers = [replace(top, roughness=rough), *plain[1:]]
             self._with_face[self.roughness.position] = tuple(layers)

@@ -72,6 +72,7 @@ def phase_per_thickness(
     others = [float(np.max(n)) * np.asarray(depth).item() for n, depth in layers if depth != thickness]
     if (
         len(layers) < len(scene.layers)
+        or any(x.repeats > 1 for x in scene.layers if isinstance(x, Layer))
         or np.ptp(angle[rows]) > 0
         or len(own) != 1
         or max(others, default=0.0) >= _THIN * wavelength.min()

@@ -197,7 +197,7 @@ class Structure(NamedTuple):
     """Structure of a view that scene and grid alone determine: the same for every spectrum.
 
     `scene` has padded wavelengths, sampled media and anonymous parameters; `largest_index` is that of its
-    coherent layers over the bounds.
+    coherent layers over the bounds, times the repeats of a layer in a group, which share its thickness.
     """
 
     plan: Plan
@@ -217,7 +217,9 @@ def structure(scene: Scene, tolerance: float) -> Structure:
     scene = with_wavelength(scene, wavelength, *turns)
     chosen = plan(scene, tolerance, _KEPT_EFFECTS)
     scene = tabulated(scene, chosen.on("coherence") or scene.instrument.wavelength_shift is not None)
-    steepest = max((largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0)
+    steepest = max(
+        (x.repeats * largest_index(x.material, wavelength) for x in coherent_layers(scene)), default=1.0
+    )
     return Structure(chosen, constant(anonymous(scene)), steepest, parts)
 
 
