@@ -249,8 +249,8 @@ def _repeated_fields(rows: _Rows, admittance: Any, a: Any, polarisation: str) ->
     (E, H), scale_square = (one, admittance), jnp.ones_like(jnp.real(admittance))
     first = 0
     for count, length in rows.runs:
-        own = jax.tree.map(lambda x, at=slice(first, first + length): x[at], (rows.points, rows.depth))
-        own, first = _Rows(*own, None), first + length
+        points, depth = jax.tree.map(lambda x: x[first : first + length], (rows.points, rows.depth))  # noqa: B023
+        own, first = _Rows(points, depth, None), first + length
         if count == 1:
             ((E, H), scale_square), _ = _through(((E, H), scale_square), own, None, a, polarisation)
             continue

@@ -353,7 +353,9 @@ class SceneTable(_uncertainties(name for name in _EVERY if name in _OF_SCENE)):
     @model_validator(mode="after")
     def _has_layers(self):
         if not self.layer and not self.group:
-            raise ValueError("a scene has at least one [[scene.layer]] or [[scene.group]]")
+            raise ValueError(
+                "scene.layer is missing: a scene has at least one [[scene.layer]] or [[scene.group]]"
+            )
         return self
 
 

@@ -12,6 +12,7 @@ from typing import Any, final
 import equinox as eqx
 
 from pellicle.errors import UsageError
+from pellicle.optics.repeats import places
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Interface, Layer, Plate, Repetition
@@ -102,17 +103,13 @@ def written_out(layers: Sequence[Any]) -> tuple[Layer | Interface | Plate, ...]:
     """Return every repeat of every layer, of a scene in numbers."""
     every: list[Any] = []
     for repeats, own in runs(layers):
-        for j in range(repeats):
-            place = 0.0 if repeats == 1 else j / (repeats - 1) - 0.5
-            every += [
-                replace(
-                    x,
-                    thickness=x.thickness * (1 + place * (0.0 if x.drift is None else x.drift)),
-                    drift=None,
-                    group=None,
-                )
-                if isinstance(x, Layer) and x.group is not None
-                else x
-                for x in own
-            ]
+        grouped = isinstance(own[0], Layer) and own[0].group is not None
+        for place in places(repeats):
+            every += [_at(x, float(place)) for x in own] if grouped else own
     return tuple(every)
+
+
+def _at(layer: Any, place: float) -> Any:
+    """The layer in the repeat at a place of its drift, −½ to ½."""
+    drift = 0.0 if layer.drift is None else layer.drift
+    return replace(layer, thickness=layer.thickness * (1 + place * drift), drift=None, group=None)
