@@ -67,6 +67,7 @@ def corpus() -> list[bytes]:
         *ROOT.glob("measurements/**/*"),
         *ROOT.glob("docs/examples/*"),
         *ROOT.glob("docs/surfaces/*.toml"),
+        *ROOT.glob("tests/data/formats/samples/*/*"),
     ]
     content = [path.read_bytes() for path in sorted(files) if path.is_file()]
     found = dict.fromkeys([*samples_of_tests(), *content])
@@ -186,7 +187,7 @@ def run(inputs: int, folder: Path) -> tuple[collections.Counter[str], list[str]]
     """Give this many inputs to the readers; returns the outcomes, and the failures with their tracebacks."""
     outcomes: collections.Counter[str] = collections.Counter()
     failures: list[str] = []
-    path, suffixes = folder / "input", (".csv", ".toml", ".mat", ".binary")
+    path, suffixes = folder / "input", (".csv", ".toml", ".mat", ".SEsnap")
     samples = corpus()
     content = st.one_of(st.binary(max_size=300), damaged(samples), damaged(samples), damaged(samples))
     settings = hypothesis.settings(

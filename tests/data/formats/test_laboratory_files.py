@@ -32,6 +32,9 @@ def film(level):
     return [["Film 3"], [], ["Wavelength (nm)", "R (%)"], *([int(nm), level] for nm in NM)]
 
 
+WORKBOOK = workbook(("Film", film(20)), ("Thick", film(30)))  # for `make fuzz`
+
+
 def test_a_workbook(tmp_path):
     """Empty sheets and a sheet of text are passed over."""
     path = tmp_path / "film.xlsx"
