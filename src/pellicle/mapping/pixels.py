@@ -10,9 +10,10 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError
+from pellicle.fitting.batch.candidates import BatchSearch, prepared
 from pellicle.fitting.batch.data import BatchFits, batch_data
 from pellicle.fitting.batch.errors import BatchErrors
-from pellicle.fitting.batch.search import BatchSearch, minima, prepared
+from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import Measured, make
 from pellicle.fitting.parameter import Parameter

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.fitting.batch import polish
+from pellicle.fitting.batch.candidates import BatchSearch
 from pellicle.fitting.batch.data import CODES, NO_DATA, BatchData, BatchFits, BatchMinima
 from pellicle.fitting.batch.effects import BatchEffects, nodes
 from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
-from pellicle.fitting.batch.search import BatchSearch
 from pellicle.fitting.conclusion import verdicts
 from pellicle.fitting.covariance import Scaled
 from pellicle.fitting.discrepancy import DOUBTFUL, Discrepancy, discrepancy

@@ -8,33 +8,24 @@ scan predicts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from logging import getLogger
-from typing import NamedTuple
 
 import numpy as np
 
 from pellicle.fitting.batch import polish
+from pellicle.fitting.batch.candidates import BatchSearch, Candidates, candidates
 from pellicle.fitting.batch.data import ORDERS, BatchData, BatchMinima
-from pellicle.fitting.batch.lookup import Layout, Lookup, scan, table
-from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.parameter import Parameter
-from pellicle.fitting.problem import Problem
-from pellicle.programs.cache import in_chunks
 from pellicle.scene.instrument import Drift
 
 log = getLogger(__name__)
 
-_MOST_PRODUCTS = 4_000_000
-"""Numbers of the product of a block of spectra with the table, 16 MB: larger tables have smaller blocks."""
-_MOST_PIXELS, _FEWEST_PIXELS = 1024, 64
 _CHANCE, _REACH = 20.0, 1.25
 """Candidates that are polished, chosen as in `fitting.film.search`."""
 _SCALE = 0.02
 """Relative error of a scene or an instrument: candidates that it could put before the best are polished too,
 because differences of χ² count less by what a scene may leave out."""
-_ROUNDING = 1e-5
-"""Error of a predicted deviance as a share of the data's square: the table is in single precision."""
 _NEAR, _SETTLED = 1e-5, 1e-10
 """Fall of the deviance, in units of the noise, that may be left in a minimum before and after its last step:
 the second is 1e-5 of a standard error."""
@@ -44,63 +35,6 @@ last."""
 
 _REWEIGHTED = 3
 """Times that weights are adapted to the residuals, where priors weigh beside the data."""
-
-
-class BatchSearch(NamedTuple):
-    """A problem's one spectrum as of any spectrum, and the table that finds its minima."""
-
-    problem: Problem
-    view: SpectrumView
-    common: polish.Common
-    lookup: Lookup
-    layout: Layout
-    thickness: np.ndarray
-    dark: float  # known offset
-
-    @property
-    def static(self) -> polish.Static:
-        return self.view.form, self.problem.coordinates
-
-    def noise(self, deviance: np.ndarray) -> np.ndarray:
-        """Size of the noise in the unit of a deviance: where the weights are right, 1."""
-        independent = self.view.independent * float(self.view.data.independent_fraction)
-        return np.maximum(deviance / independent, 1.0)
-
-    @property
-    def has_priors(self) -> bool:
-        """True where priors of parameters or of a scale or an offset that drifts weigh beside the data."""
-        drifts = (self.view.scene.instrument.scale, self.view.scene.instrument.offset)
-        drifting = any(isinstance(x, Drift) and x.degree > 0 for x in drifts)
-        return drifting or bool(np.any(np.asarray(self.problem.box.prior_weight) > 0))
-
-    @property
-    def block(self) -> int:
-        """Spectra that are scanned together."""
-        width = self.lookup.columns.shape[1]
-        return int(np.clip(2 ** int(np.log2(_MOST_PRODUCTS / width)), _FEWEST_PIXELS, _MOST_PIXELS))
-
-
-def prepared(problem: Problem, sample: BatchData) -> BatchSearch:
-    """The search of spectra for a problem of one spectrum; `sample` are a few spectra, as all are."""
-    view: SpectrumView = problem.views[0].unpadded()
-    view = replace(view, data=view.data._replace(frame=None))
-    instrument, level = view.scene.instrument, float(np.median(sample.level))
-    weight = _even_weight(sample, view.channels)
-    if isinstance(instrument.scale, Drift):
-        weight = weight * sample.level[:, None]
-    weight = np.ma.median(np.ma.masked_equal(weight, 0.0), axis=0).filled(0.0)
-    lookup, layout, thickness = table(problem, view, weight, level)
-    common = polish.Common(view.scene, view.data, problem.box)
-    dark = 0.0 if isinstance(instrument.offset, Drift) else float(instrument.offset)
-    return BatchSearch(problem, view, common, lookup, layout, thickness, dark)
-
-
-def _even_weight(data: BatchData, channels: int) -> np.ndarray:
-    """Weights (spectra, points) of N, C, S themselves where they are given in a frame."""
-    if data.frame is None:
-        return data.weight
-    square = data.weight.reshape(len(data.weight), -1, channels) ** 2
-    return np.repeat(np.sqrt(square.mean(axis=2)), channels, axis=1)
 
 
 def minima(search: BatchSearch, data: BatchData) -> BatchMinima:
@@ -181,22 +115,10 @@ class _Points:
         return best
 
 
-class _Candidates(NamedTuple):
-    """Candidates of the scan: `units` (spectra, candidates, parameters), their `predicted` deviance (spectra,
-    candidates), the `profile` along the thickness (spectra, nodes), the `rounding` error (spectra,) of the
-    predictions, and whether the predictions are of the spectra' own weights (`alike`)."""
-
-    units: np.ndarray
-    predicted: np.ndarray
-    profile: np.ndarray
-    rounding: np.ndarray
-    alike: bool
-
-
 def _minima(search: BatchSearch, data: BatchData) -> BatchMinima:
     """Minima of spectra that all have data."""
-    candidates = _candidates(search, data)
-    points, tried = _polished(search, data, candidates)
+    found = candidates(search, data)
+    points, tried = _polished(search, data, found)
     factor = np.ones(len(data.values))
     if search.has_priors:
         points, tried, factor = _reweighted(points, tried, data)
@@ -207,16 +129,16 @@ def _minima(search: BatchSearch, data: BatchData) -> BatchMinima:
     points.polish(first & (points.promise > near), _MORE_ROUNDS, best, coarse=False)
     at_best = points.end(lowest)
     settled = points.promise <= np.maximum(near, polish.COARSE * (points.deviance - best[:, None]) * ~first)
-    return _ordered(points, lowest, settled, factor, candidates.profile, at_best)
+    return _ordered(points, lowest, settled, factor, found.profile, at_best)
 
 
-def _polished(search: BatchSearch, data: BatchData, candidates: _Candidates) -> tuple[_Points, np.ndarray]:
+def _polished(search: BatchSearch, data: BatchData, found: Candidates) -> tuple[_Points, np.ndarray]:
     """The candidates, polished where they could be the best of their spectrum or its rival, and which
     were."""
-    units, predicted = candidates.units, candidates.predicted
+    units, predicted = found.units, found.predicted
     several = len(search.problem.parameters) > 1
     optimistic = exact = predicted
-    if not candidates.alike:
+    if not found.alike:
         exact = _deviance(search, data, units)
         if not several:
             # the determinant of the nuisances, which predictions leave out, is much the same everywhere
@@ -228,7 +150,7 @@ def _polished(search: BatchSearch, data: BatchData, candidates: _Candidates) -> 
         # along a valley of several parameters a linear step says little
         points.polish(np.isfinite(optimistic), 1, exact.min(axis=1))
         optimistic = np.where(np.isfinite(points.deviance), points.deviance, optimistic)
-    return points, _polish_all_near(points, optimistic, exact, candidates.rounding)
+    return points, _polish_all_near(points, optimistic, exact, found.rounding)
 
 
 def _reweighted(
@@ -341,49 +263,6 @@ def _polish_all_near(
         near = _root(optimistic) - _REACH * fall[:, None] < _root(level)[:, None]
         now = near & ~tried & np.isfinite(optimistic)
     return tried
-
-
-def _candidates(search: BatchSearch, data: BatchData) -> _Candidates:
-    """The candidates of spectra by the lookup."""
-    lookup, channels, count = search.lookup, search.view.channels, len(data.values)
-    values, weight = data.values, _even_weight(data, channels)
-    values = _filled(values, data.weight, lookup.weight, channels)
-    if data.frame is not None:
-        columns = values.reshape(count, -1, channels)
-        values = np.einsum("...ij,...i->...j", data.frame, columns).reshape(count, -1)
-    if search.dark:
-        values = values - search.dark
-    seen = np.sqrt(float(search.view.data.independent_fraction)) * weight
-    if search.layout.relative:
-        values, seen = values / data.level[:, None], seen * data.level[:, None]
-    common = lookup.weight * (weight > 0)
-    scale = np.sqrt(
-        np.sum((seen * (common > 0)) ** 2, axis=1) / np.maximum(np.sum(common**2, axis=1), 1e-300)
-    )
-    scanned = in_chunks(lambda own: scan(search.layout, lookup, *own), (values, scale), search.block)
-    square = np.sum((values * lookup.weight - lookup.known) ** 2, axis=1)
-    alike = (
-        len(search.problem.parameters) == 1
-        and not (search.layout.relative or lookup.rotation.shape[1] or data.frame is not None)
-        and np.allclose(seen, scale[:, None] * lookup.weight, rtol=1e-3, atol=0.0)
-    )
-    rounding = _ROUNDING * square * scale**2
-    return _Candidates(scanned.units, scanned.deviance.astype(float), scanned.profile, rounding, bool(alike))
-
-
-def _filled(values: np.ndarray, weight: np.ndarray, common: np.ndarray, channels: int) -> np.ndarray:
-    """Values with those that a spectrum lacks, of those that spectra have in common, by linear interpolation
-    along each channel."""
-    lacking = np.flatnonzero(((weight == 0) & (common > 0)).any(axis=1))
-    if not len(lacking):
-        return values
-    values, at = np.array(values), np.arange(values.shape[1] // channels)
-    for i in lacking:
-        for channel in range(channels):
-            own = slice(channel, None, channels)
-            known = weight[i, own] > 0
-            values[i, own] = np.interp(at, at[known], values[i, own][known])
-    return values
 
 
 def _root(deviance: np.ndarray) -> np.ndarray:
