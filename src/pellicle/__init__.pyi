@@ -51,6 +51,7 @@ from pellicle.scene.layers import Uncertainty as Uncertainty
 from pellicle.scene.layers import medium as medium
 from pellicle.scene.surface import Surface as Surface
 from pellicle.scene.surface import SurfaceUncertainty as SurfaceUncertainty
+from pellicle.scene.ties import Tied as Tied
 from pellicle.simulation.brdf import Directions as Directions
 from pellicle.simulation.depth import absorptance as absorptance
 from pellicle.simulation.depth import field as field

@@ -42,7 +42,7 @@ def test_parameters_of_models():
     "wrong",
     [
         "[scene]\nsubstrat = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
-        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 'thick'",
+        "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = ['thick']",
         "[data]\nsignal = 'X'\n[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 1.46\nthickness = 100",
         FILM.replace("'constant'", "'constand'"),
         FILM.replace("n = 1.8", "m = 1.8"),

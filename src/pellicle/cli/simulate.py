@@ -201,9 +201,13 @@ def _write_colours(
 
 def _truth(scene: Scene) -> str:
     """The true values of the parameters, as a comment."""
-    from pellicle.fitting.film.parameters import fixed_numbers, parameters
+    from pellicle.fitting.film.parameters import fixed_numbers, parameters, tied_numbers
+    from pellicle.scene.expressions import value
 
-    numbers = [(p.name, p.start, p.unit) for p in parameters(scene)] + fixed_numbers(scene)
+    numbers = [(p.name, p.start, p.unit) for p in parameters(scene)]
+    start = {name: x for name, x, _ in numbers}
+    numbers += [(x.name, value(x.expression, start.__getitem__), x.unit) for x in tied_numbers(scene)]
+    numbers += fixed_numbers(scene)
     return "truth: " + ", ".join(f"{name} = {value:.10g} {unit}".rstrip() for name, value, unit in numbers)
 
 

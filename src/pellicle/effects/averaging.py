@@ -70,7 +70,8 @@ def _unresolved(scene: Scene) -> str | None:
         return None
     nm, (layer,) = np.unique(np.asarray(scene.light.wavelength, dtype=float)), coherent_layers(scene)
     step = float(np.min(np.diff(nm), initial=np.inf))
-    thickness = float(layer.thickness.lower if isinstance(layer.thickness, Free) else layer.thickness)
+    own: Any = layer.thickness
+    thickness = float(own.lower if isinstance(own, Free) else own)
     if nm.size < 2 or 10 * thickness * step < nm[-1] ** 2:  # resolved at any index below 10
         return None
     steepest = min(np.deg2rad(scene.light.largest_angle), np.pi / 2)

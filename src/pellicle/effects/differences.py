@@ -18,7 +18,7 @@ from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import Number, abs2, imag, real
 from pellicle.scene.film import Scene, groups
-from pellicle.scene.free import Free, free_leaves, insert, is_free, start_values
+from pellicle.scene.free import Free, free_leaves, insert, start_values, without_bounds
 
 
 def normal_incidence(scene: Scene) -> bool:
@@ -168,9 +168,9 @@ class Evaluation(NamedTuple):
 
         The plans take turns, so that other processes affect all of them.
         """
-        structure, free, *numbers = _split(self.scene, self.points)
+        structure, *numbers = _split(self.scene, self.points)
         numbers = jax.device_put(numbers)
-        known = False, structure, free, *numbers
+        known = False, structure, *numbers
         runs = [partial(_signals, self.build, plan.static_key, *known) for plan in plans]
         times: list[list[float]] = [[] for _ in runs]
         jax.block_until_ready([run() for run in runs])  # compiles
@@ -216,25 +216,20 @@ def largest_difference(one: np.ndarray, other: np.ndarray, degrees: bool) -> flo
     return float(np.max(np.where(np.isfinite(apart), apart, np.inf), initial=0.0))
 
 
-def _split(scene: Any, points: np.ndarray) -> tuple[Any, tuple[bool, ...], list[Any], np.ndarray]:
-    """The static arguments of a program (structure, and which leaves are free) and its numbers."""
-    fixed, structure = jax.tree_util.tree_flatten(insert(scene, points[0]))
-    free = tuple(map(is_free, jax.tree_util.tree_leaves(scene, is_leaf=is_free)))
-    return structure, free, [x for x, f in zip(fixed, free, strict=True) if not f], points
+def _split(scene: Any, points: np.ndarray) -> tuple[Any, list[Any], np.ndarray]:
+    """The static argument of a program, the structure of a scene without bounds, and its numbers."""
+    fixed, structure = jax.tree_util.tree_flatten(without_bounds(scene))
+    return structure, fixed, points
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
-def _signals(
-    build: Build, plan: Plan, derive: bool, structure: Any, free: tuple[bool, ...], fixed: list, points: Any
-) -> Any:
+@partial(jax.jit, static_argnums=(0, 1, 2, 3))
+def _signals(build: Build, plan: Plan, derive: bool, structure: Any, fixed: list, points: Any) -> Any:
     """Signals, or their derivatives in the free numbers, a few points at a time: a cone of light over a long
     spectrum would not fit into memory at once."""
-    simulate = build(plan)
+    simulate, scene = build(plan), jax.tree_util.tree_unflatten(structure, fixed)
 
     def signal(values: Any) -> Any:
-        numbers, others = iter(values), iter(fixed)
-        leaves = [next(numbers if is_free else others) for is_free in free]
-        return jnp.ravel(simulate(jax.tree_util.tree_unflatten(structure, leaves)))
+        return jnp.ravel(simulate(insert(scene, list(values))))
 
     function = jax.jacfwd(signal) if derive else signal
     return jax.lax.map(function, points, batch_size=min(_BATCH, len(points)))

@@ -15,8 +15,9 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.errors import UsageError
 from pellicle.fitting.film.parameters import parameters
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free, is_free
+from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.layers import Interface, Layer, Plate
+from pellicle.scene.ties import bound
 from pellicle.simulation.colours import varied_layer
 
 STEPS = 1000
@@ -93,13 +94,14 @@ def film_controls(scene: Scene) -> tuple[Control, ...]:
     for path, leaf in leaves:
         key, number = getattr(path[-1], "name", ""), isinstance(leaf, int | float)
         slides = path[0].name != "ambient" and key in ("thickness", *_OPTIONAL) and key != "k"
-        if is_free(leaf) or (number and (path in shown or slides)):
+        if (is_free(leaf) and leaf.tie is None) or (number and (path in shown or slides)):
             present[path] = leaf
     for path in _addable(scene):
         present.setdefault(path, 0.0)
     scaffold = scene
     for path, value in present.items():
         scaffold = with_value(scaffold, path, _bounds(path, value))
+    scaffold = bound(scaffold, again=True)
     named = dict(zip(free_paths(scaffold), parameters(scaffold), strict=True))
     controls = []
     for path, number in named.items():
@@ -124,7 +126,7 @@ def template(scene: Scene, controls: Collection[Control], active: Collection[str
         absent = 0.0 if control.path[-1] == GetAttrKey("angle") else None
         number = Free(control.lower, control.upper, start=control.value) if there else absent
         scene = with_value(scene, control.path, number)
-    return scene
+    return bound(scene, again=True)
 
 
 def with_value(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
@@ -156,13 +158,12 @@ def scene_with(
         elif control.optional and value == 0 and control.path[-1].name != "angle":
             value = None
         scene = with_value(scene, control.path, value)
-    return scene
+    return bound(scene, again=True)
 
 
 def free_paths(tree: Any) -> list[tuple[Any, ...]]:
     """Return the place of each free number of a pytree, in their order."""
-    leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
-    return [path for path, leaf in leaves if is_free(leaf)]
+    return [path for path, _ in free_leaves(tree)]
 
 
 def _constants(scene: Scene) -> list[tuple[Any, ...]]:

@@ -13,6 +13,7 @@ from pellicle.fitting.marginal import Ranking, by_remaining, gains, ranking
 from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Estimate, Fit, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, linearised
+from pellicle.fitting.tied_numbers import TiedNumber, estimate
 
 
 @runtime_checkable
@@ -38,6 +39,10 @@ class Measurements(Protocol):
         """Numbers of the scene or the surface that are not free."""
         ...
 
+    def tied(self) -> list[TiedNumber]:
+        """Numbers of the scene that follow free ones."""
+        ...
+
     def amended(self, parts: tuple[Part, ...], limits: Limits, /) -> Limits:
         """Limits of the parameters by what this kind of data cannot tell."""
         ...
@@ -53,6 +58,7 @@ class Assembly(NamedTuple):
     scans: Mapping[int, Profile]
     conclusion: Conclusion
     began: float
+    tied: Sequence[TiedNumber] = ()
 
     @property
     def worst(self) -> Part:
@@ -62,16 +68,19 @@ class Assembly(NamedTuple):
     def fit(self, **about: Any) -> Fit:
         """The result. `about` are its fields that depend on the kind of data: `verdict`, `warnings`, `rms`,
         `scene`, and others where they are not those of the conclusion."""
+        names, correlation = self.covariance.names, self.best.discrepancy.errors.correlation
+        found = about.pop("parameters", self.conclusion.parameters)
+        follow = {x.name: estimate(x, found, names, correlation) for x in self.tied}
         common = {
             "parts": self.parts,
             "status": self.conclusion.status,
-            "parameters": self.conclusion.parameters,
+            "parameters": found | follow,
             "rivals": self.conclusion.rivals,
             "probability": self.conclusion.probability,
             "chi2_reduced": self.best.ranked.chi2_reduced,
             "effective_points": sum(part.effective_points for part in self.parts),
-            "correlation_names": self.covariance.names,
-            "correlation": self.best.discrepancy.errors.correlation,
+            "correlation_names": names,
+            "correlation": correlation,
             "profile": None,
             "ranking": self.best,
             "seconds": time.perf_counter() - self.began,
@@ -109,4 +118,4 @@ def assemble(
         near=near,
         amend=partial(data.amended, parts),
     )
-    return Assembly(best, covariance, parts, missed, scanned, conclusion, began)
+    return Assembly(best, covariance, parts, missed, scanned, conclusion, began, data.tied())

@@ -59,27 +59,21 @@ def _profile(fit: Fit, scene: Scene, position: int, wavelength: float) -> Fitted
     names = [p.name for p in parameters(scene)]
     values = np.array([fit.parameters[each].value for each in names])
     layer: Any = insert(scene, values.tolist()).layers[position]
-    paths = [path for path, _ in free_leaves(scene)]
-    own = [
-        i
-        for i, path in enumerate(paths)
-        if path[0].name == "layers" and path[1].idx == position and path[2].name == "material"
-    ]
-    free: Any = scene.layers[position]
     z = np.linspace(0.0, 1.0, POINTS)
 
     def curves(numbers: Any) -> Any:
-        material = insert(free.material, list(numbers))
+        changed: Any = insert(scene, list(numbers)).layers[position]
+        material = changed.material
         index = material.at(z, np.array([wavelength]))
         n, k = real(index), imag(index) + jnp.zeros_like(real(index))
         rows = material.profile.fraction(z), n[..., 0], k[..., 0]
         return jnp.stack([jnp.broadcast_to(row, z.shape) for row in rows])
 
-    indices = np.asarray(curves(jnp.asarray(values[own])))
+    indices = np.asarray(curves(jnp.asarray(values)))
     stderr = np.zeros_like(indices)
-    if own:
-        slope = np.asarray(jax.jacfwd(curves)(jnp.asarray(values[own])))
-        variance = np.einsum("cip,pq,ciq->ci", slope, _covariance(fit, [names[i] for i in own]), slope)
+    if free_leaves(scene.layers[position].material):  # pyright: ignore[reportAttributeAccessIssue]
+        slope = np.asarray(jax.jacfwd(curves)(jnp.asarray(values)))
+        variance = np.einsum("cip,pq,ciq->ci", slope, _covariance(fit, names), slope)
         stderr = np.sqrt(np.maximum(variance, 0.0))
     depth = z * float(np.asarray(layer.thickness))
     return FittedProfile(name(scene, position), wavelength, depth, *indices, *stderr)

@@ -39,6 +39,7 @@ from pellicle.fitting.result import Estimate, Fit, Part
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.robust_losses import LEAST_SQUARES
 from pellicle.fitting.status import verdict
+from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
@@ -210,6 +211,10 @@ class JointMeasurements(NamedTuple):
     def fixed(self) -> list[Estimate]:
         """Fixed numbers of the scenes and of the surface."""
         return [*self.films.fixed(), *self.samples.fixed()]
+
+    def tied(self) -> list[TiedNumber]:
+        """Numbers of the scenes that follow free ones."""
+        return self.films.tied()
 
     def amended(self, parts: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits by what either kind cannot tell."""

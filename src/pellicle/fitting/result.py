@@ -89,7 +89,8 @@ class Estimate:
     model misses. `stderr_noise` is that of the noise alone, with its `degrees_of_freedom` (infinite where σ
     is given). `lower_limit` and `upper_limit` are one-sided 95 % limits, where only one side is bounded. With
     `default_bounds` nobody chose `lower` and `upper` for this sample. A value that is `at_bound` is `binding`
-    unless physics sets the bound or the answer stands beside it.
+    unless physics sets the bound or the answer stands beside it. `tied` is the expression of a number that
+    follows free ones, whose errors are theirs, propagated; its bounds are the range of the expression.
     """
 
     name: str
@@ -106,6 +107,7 @@ class Estimate:
     stderr_noise: float = math.nan  # not given: that of `stderr`
     degrees_of_freedom: float = math.inf
     binding: bool = False
+    tied: str = ""
 
     def __post_init__(self):
         if math.isnan(self.stderr_noise):

@@ -4,8 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple, TypeAlias
 
-import equinox as eqx
-
 from pellicle.dispersion import critical_points, oscillators
 from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
@@ -16,8 +14,9 @@ from pellicle.dispersion.psemi import Psemi
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.scene.free import Free, is_free
+from pellicle.scene.ties import Tied
 
-Parameter: TypeAlias = float | Free
+Parameter: TypeAlias = float | Free | Tied
 Values: TypeAlias = Mapping[str, "Parameter | Sequence[Parameter]"]
 """Parameters of a model by name; of a spline one or one per knot, and its `knots` (nm)."""
 
@@ -326,7 +325,7 @@ def free_by_default(location: ParameterLocation, number: Parameter) -> Free | No
     spec = _spec(location)
     if spec is None:
         return Free(number.lower, number.upper, limits=number.limits) if is_free(number) else None
-    if isinstance(number, Free) or not spec.lower <= number <= spec.upper:
+    if not isinstance(number, int | float) or not spec.lower <= number <= spec.upper:
         return spec.parameter(None)
     return spec.parameter(number)
 
@@ -370,16 +369,3 @@ KINDS: dict[str, type[Any]] = {
     "gervais": Gervais,
 }
 """The class of each model, and of each oscillator in `TERMS`."""
-
-
-def check_parts(tree: object) -> None:
-    """Run the checks of every module of a dispersion, itself included, but of free parameters."""
-    if isinstance(tree, tuple):
-        parts = [*tree]
-    elif isinstance(tree, eqx.Module) and not is_free(tree):
-        getattr(tree, "__check_init__", lambda: None)()
-        parts = [*vars(tree).values()]
-    else:
-        parts = []
-    for part in parts:
-        check_parts(part)

@@ -24,8 +24,9 @@ from pellicle.materials import UnknownMaterial, material
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import dispersion_models as models
 from pellicle.recipes import schema
-from pellicle.scene.free import Free, is_free
+from pellicle.scene.free import Free, check_parts, is_free
 from pellicle.scene.graded import Graded
+from pellicle.scene.ties import Tied
 
 _MEDIUM: TypeAdapter[Any] = TypeAdapter(schema.Medium)
 _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
@@ -276,7 +277,9 @@ def _parameters(key: str, value: Any) -> models.Parameter | list[models.Paramete
 def _parameter(key: str, value: Any) -> models.Parameter:
     """A model's parameter; without bounds it is fixed."""
     try:
-        table = schema.FreeTable.model_validate(value) if isinstance(value, dict) else float(value)
+        table = schema.FreeTable.model_validate(value) if isinstance(value, dict) else value
+        if not isinstance(table, str | schema.FreeTable):
+            table = float(table)
     except (ValidationError, TypeError, ValueError):
         raise UsageError(
             f"{key} must be a number or a table of value, lower and upper, got {value!r}"
@@ -284,11 +287,17 @@ def _parameter(key: str, value: Any) -> models.Parameter:
     return number(table, key)
 
 
-def number(value: schema.Number, name: str, minimum: float | None = None) -> float | Free:
-    """Return a fixed number or a `Free` from what a recipe gives for `name`.
+def number(value: schema.Number, name: str, minimum: float | None = None) -> float | Free | Tied:
+    """Return a fixed number, a `Free` or a `Tied` from what a recipe gives for `name`.
 
     Raises UsageError where it is neither, not finite, or below `minimum`.
     """
+    if isinstance(value, str):
+        try:
+            value = float(value)
+        except ValueError:
+            with models.usage_errors(f"{name}: "):
+                return Tied(value)
     if isinstance(value, float | int):
         lowest, result = float(value), float(value)
     elif value.lower is None and value.upper is None and value.value is not None:
@@ -351,7 +360,7 @@ def _free_parameter(
         raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
     changed = jax.tree_util.tree_unflatten(structure, replaced)
     with models.usage_errors(f"cannot free {name!r}: "):
-        models.check_parts(changed)
+        check_parts(changed)
     return changed
 
 
@@ -378,7 +387,7 @@ def _free_index(
     return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
 
 
-def _start(number: models.Parameter) -> float:
+def _start(number: Any) -> float:
     return number.start if isinstance(number, Free) else float(number)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import equinox as eqx
 import jax
@@ -37,12 +37,18 @@ from pellicle.scene.groups import Group, unlisted
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
 from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, StandardUncertainties, Substrate
 from pellicle.scene.priors import HalfNormal, Normal
+from pellicle.scene.ties import Tied
 
 _NAME: dict[type, str] = {kind: name for table in (MIXTURES, PROFILES, KINDS) for name, kind in table.items()}
 
 
-def written_number(thing: Any, name: str) -> float | dict[str, Any]:
-    """Return a number as a float, a `Free` as a table of its bounds. Raises UsageError for anything else."""
+def written_number(thing: Any, name: str) -> float | str | dict[str, Any]:
+    """Return a number as a float, a `Free` as a table of its bounds, a tied one as its text.
+
+    Raises UsageError for anything else.
+    """
+    if isinstance(thing, Free) and thing.tie is not None:
+        return str(thing.tie.text)
     if isinstance(thing, Free):
         limits = {} if thing.limits is None else {"limits": [*thing.limits]}
         start = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"value": thing.start}
@@ -205,7 +211,7 @@ _SIGNED = ("wavelength_shift", "angle_shift", "drift")
 """Numbers that may be negative."""
 
 
-def optional(value: schema.Number | None, name: str) -> float | Free | None:
+def optional(value: schema.Number | None, name: str) -> float | Free | Tied | None:
     """Return a number that may be absent. Raises UsageError as `number` does."""
     return None if value is None else number(value, name, minimum=None if name in _SIGNED else 0.0)
 
@@ -213,8 +219,10 @@ def optional(value: schema.Number | None, name: str) -> float | Free | None:
 def _part(kind: type, table: BaseModel, **given: Any) -> Any:
     """A part whose fields are the keys of a table, but for those that are `given`."""
     values = {field.name: getattr(table, field.name, None) for field in fields(kind)}
+    annotations = {name: field.annotation for name, field in type(table).model_fields.items()}
+    numeric = {name for name, kinds in annotations.items() if schema.FreeTable in get_args(kinds)}
     read = {
-        name: optional(x, name) if isinstance(x, float | schema.FreeTable) else x
+        name: optional(x, name) if name in numeric else x
         for name, x in values.items()
         if x is not None and name not in given
     }
@@ -298,7 +306,7 @@ def substrate(value: schema.Medium | schema.PlateTable, folder: Path, signal: st
         return Substrate(medium(value, name="substrate", folder=folder))
     given: dict[str, Any] = {"material": medium(value.material, name="material", folder=folder)}
     if isinstance(value.back, str) and value.back in SCATTERING_BACKS:
-        part = optional(value.back_collected, "back_collected"), value.back_reflections
+        part: Any = optional(value.back_collected, "back_collected"), value.back_reflections
         given["back"], given["back_collected"] = scattering_back(value.back, signal, part)
     elif value.back is not None:
         given["back"] = medium(value.back, name="back", folder=folder)

@@ -60,6 +60,8 @@ def python_text(thing: Any) -> str:
     The wavelengths of a light are left out. **Raises:** UsageError for what has no expression, such as the
     sensor of a camera.
     """
+    if isinstance(thing, Free) and thing.tie is not None:
+        return _call("pl.Tied", [thing.tie.text], {})
     if isinstance(thing, Free):
         about = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"start": thing.start}
         about |= {key: x for key in ("prior", "limits") if (x := getattr(thing, key)) is not None}

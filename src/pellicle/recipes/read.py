@@ -219,7 +219,7 @@ def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
     return Light(None, angle, signal, given.polarisation or "unpolarised", azimuth, through)
 
 
-_NUMBERS: TypeAdapter[Any] = TypeAdapter(schema.Number | list[float])
+_NUMBERS: TypeAdapter[Any] = TypeAdapter(float | schema.FreeTable | list[float])
 
 
 def _of_file(tables: schema.RecipeTable, file: schema.FileTable) -> schema.RecipeTable:

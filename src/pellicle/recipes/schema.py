@@ -20,7 +20,7 @@ from pellicle.scene.priors import HalfNormal, LogUniform, Normal, Prior
 from pellicle.scene.surface import SurfaceUncertainty
 
 UNIAXIAL, BIAXIAL = ("ordinary", "extraordinary"), ("x", "y", "z")
-_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}]}
+_NUMBER = {"anyOf": [{"type": "number"}, {"$ref": "#/$defs/FreeTable"}, {"type": "string"}]}
 _NUMBER_PER_KNOT = {"anyOf": [*_NUMBER["anyOf"], {"type": "array", "items": _NUMBER}]}
 
 
@@ -131,7 +131,8 @@ class FreeTable(BaseModel):
     prior: PriorTable | None = None
 
 
-Number = float | FreeTable
+Number = float | FreeTable | str
+"""A number; a text is an expression of other parameters, to which it is tied."""
 
 
 def _model_schema(schema: dict[str, Any]) -> None:

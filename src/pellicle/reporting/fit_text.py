@@ -195,7 +195,7 @@ NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|came
 def _parameters(fit: Fit) -> list[str]:
     """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
     width = max((len(name) for name in fit.parameters), default=0) + 1
-    every = sorted(fit.parameters.values(), key=lambda p: not p.free)
+    every = sorted(fit.parameters.values(), key=lambda p: (not p.free, not p.tied))
     rows = [(f"{p.name + ':':<{width}}", value_in_words(p), bounds_in_words(p)) for p in every]
     middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
     return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
@@ -205,7 +205,7 @@ def value_in_words(p: Estimate) -> str:
     """`751.66 ± 0.12 nm (0.016 %)`, with its standard error, or the best value and its limits where that is
     infinite; a fixed value as such."""
     best = with_unit(f"{p.value:.6g}", p.unit)
-    if not p.free:
+    if not p.free and not p.tied:
         return f"{best} (fixed)"
     sides = {"at least": p.lower_limit, "at most": p.upper_limit}
     known = {side: limit for side, limit in sides.items() if limit is not None}
@@ -219,7 +219,9 @@ def value_in_words(p: Estimate) -> str:
 
 
 def bounds_in_words(p: Estimate) -> str:
-    """`[10, 3000]`, and the bound on which the value rests."""
+    """`[10, 3000]`, and the bound on which the value rests; of a tied number its expression."""
+    if p.tied:
+        return f"= {p.tied}"
     if not p.free or not (math.isfinite(p.lower) and math.isfinite(p.upper)):
         return ""
     bounds = f"[{p.lower:g}, {p.upper:g}]"

@@ -139,6 +139,7 @@ def _parameter(p: Estimate) -> dict[str, Any]:
         **taken(p, "value", "stderr", "stderr_noise", "expanded", "coverage_factor"),
         "degrees_of_freedom": p.effective_degrees_of_freedom,
         **taken(p, "unit", "lower", "upper", "free"),
+        **({"tied": p.tied} if p.tied else {}),
         **_known(p, "lower_limit", "upper_limit"),
     }
 

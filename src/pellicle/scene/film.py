@@ -31,6 +31,7 @@ from pellicle.scene.layers import (
     ambient_medium,
     divided,
 )
+from pellicle.scene.ties import bound
 from pellicle.signals.base import Signal
 from pellicle.signals.contrast import FORMS
 from pellicle.signals.registry import SIMULATED, of_light
@@ -161,6 +162,8 @@ class Scene(eqx.Module):
     reference: Reference | None = None
 
     def __check_init__(self):
+        for name, part in vars(bound(self)).items():
+            object.__setattr__(self, name, part)
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
         if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):

@@ -4,7 +4,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from functools import lru_cache, wraps
-from typing import Any, TypeGuard, TypeVar, final
+from typing import Any, NamedTuple, TypeGuard, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -12,10 +12,23 @@ import numpy as np
 from jaxtyping import Float
 
 from pellicle.errors import UsageError
+from pellicle.scene import expressions
 from pellicle.scene.priors import Prior
 
 MOST_FREE = 64
 """Most parameters a fit may have free: 21 took 30 s and 121 did not end within 5 minutes (two cores)."""
+
+
+class Tie(NamedTuple):
+    """What a tied number is: the expression of labels of free numbers, and its text, None where anonymous."""
+
+    tree: expressions.Expression
+    text: str | None = None
+
+    @property
+    def labels(self) -> set[Any]:
+        """Labels of the free numbers that it takes."""
+        return set(expressions.names(self.tree))
 
 
 @final
@@ -39,6 +52,10 @@ class Free(eqx.Module):
     start: float = eqx.field(static=True)
     limits: tuple[float, float] | None = eqx.field(static=True)
     prior: Prior | None
+    label: Any = eqx.field(static=True)
+    """By which ties know it; None where none does."""
+    tie: Tie | None = eqx.field(static=True)
+    """Of a tied number, which has the bounds of its expression and is no parameter; None else."""
 
     def __init__(
         self,
@@ -65,7 +82,25 @@ class Free(eqx.Module):
         if limits is not None and not limits[0] <= lower < upper <= limits[1]:
             raise ValueError(f"the bounds {lower:g} to {upper:g} are outside {limits[0]:g} to {limits[1]:g}")
         self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
-        self.limits = limits
+        self.limits, self.label, self.tie = limits, None, None
+
+
+def labelled(free: Free, label: Any) -> Free:
+    """Return a free number with a label."""
+    other = object.__new__(Free)
+    for name, own in (vars(free) | {"label": label}).items():
+        object.__setattr__(other, name, own)
+    return other
+
+
+def tied(lower: float, upper: float, start: float, tie: Tie) -> Free:
+    """Return a tied number, whose bounds may be one. Raises UsageError for bounds that are not finite."""
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        raise UsageError("is not finite within its bounds")
+    other, given = object.__new__(Free), {"prior": None, "limits": None, "label": None, "tie": tie}
+    for name, own in {"lower": lower, "upper": upper, "start": start, **given}.items():
+        object.__setattr__(other, name, own)
+    return other
 
 
 def check_free_count(count: int, least: int = 1) -> None:
@@ -85,16 +120,82 @@ def is_free(leaf: Any) -> TypeGuard[Free]:
 
 
 def free_leaves(tree: Any) -> list[tuple[Any, Free]]:
-    """Return (path, Free) of every free parameter in a pytree, in the pytree's order."""
+    """Return (path, Free) of every free parameter in a pytree, in the pytree's order.
+
+    A tied number counts only in a part of a scene that lacks a number to which it is tied.
+    """
     leaves = jax.tree_util.tree_leaves_with_path(tree, is_leaf=is_free)
-    return [(path, leaf) for path, leaf in leaves if is_free(leaf)]
+    labels = {leaf.label for _, leaf in leaves if is_free(leaf)}
+    return [(path, leaf) for path, leaf in leaves if is_free(leaf) and not _follows(leaf, labels)]
+
+
+def _follows(leaf: Any, labels: set[Any]) -> bool:
+    """True for a number tied to free ones of these labels."""
+    return is_free(leaf) and leaf.tie is not None and leaf.tie.labels <= labels
 
 
 def insert(tree: Any, values: Iterable[Any]) -> Any:
-    """Replace the free parameters of a pytree by `values`, in the order of `free_leaves`."""
+    """Replace the free parameters of a pytree by `values`, in the order of `free_leaves`, and what is tied
+    to them by the values of their expressions.
+
+    Where the values are `Free`, these get the labels of those that they replace, and ties their bounds.
+    """
     leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
-    numbers = iter(values)
-    return jax.tree_util.tree_unflatten(structure, [next(numbers) if is_free(x) else x for x in leaves])
+    numbers, known = iter(values), dict[Any, Any]()
+    labels = {leaf.label for leaf in leaves if is_free(leaf)}
+    for i, leaf in enumerate(leaves):
+        if not is_free(leaf) or _follows(leaf, labels):
+            continue
+        new = next(numbers)
+        if leaf.label is not None:
+            new = known[leaf.label] = labelled(new, leaf.label) if is_free(new) else new
+        leaves[i] = new
+    for i, leaf in enumerate(leaves):
+        if is_free(leaf) and leaf.tie is not None and leaf.tie.labels <= known.keys():
+            leaves[i] = _followed(leaf, leaf.tie, known)
+    return jax.tree_util.tree_unflatten(structure, leaves)
+
+
+def _followed(leaf: Free, tie: Tie, known: dict[Any, Any]) -> Any:
+    """The value of a tie where its labels have values, or a tied number with the bounds of theirs."""
+    if not any(is_free(known[label]) for label in tie.labels):
+        return expressions.value(tie.tree, known.__getitem__)
+    if tie.text is None:
+        return leaf
+    own = {label: x if is_free(x) else tied(x, x, x, tie) for label, x in known.items()}
+    ends = expressions.interval(tie.tree, lambda label: (own[label].lower, own[label].upper))
+    return tied(*ends, expressions.value(tie.tree, lambda label: own[label].start), tie)
+
+
+def without_bounds(tree: Any) -> Any:
+    """Return the pytree with free numbers, and tied ones, that know neither bounds nor names."""
+    free = [leaf for _, leaf in free_leaves(tree)]
+    labels = {x.label: i for i, x in enumerate(free) if x.label is not None}
+    leaves, structure = jax.tree_util.tree_flatten(tree, is_leaf=is_free)
+
+    def bare(x: Any) -> Any:
+        if not is_free(x):
+            return x
+        if x.tie is not None and x.tie.labels <= labels.keys():
+            tree = expressions.replaced(x.tie.tree, lambda label: ("name", labels[label]))
+            return tied(0.0, 1.0, 0.5, Tie(tree))
+        own = Free(0.0, 1.0, start=0.5)
+        return own if x.label is None else labelled(own, labels[x.label])
+
+    return jax.tree_util.tree_unflatten(structure, [bare(x) for x in leaves])
+
+
+def check_parts(tree: object) -> None:
+    """Run the checks of every module of a part of a scene, itself included, but of free parameters."""
+    if isinstance(tree, tuple):
+        parts = [*tree]
+    elif isinstance(tree, eqx.Module) and not is_free(tree):
+        getattr(tree, "__check_init__", lambda: None)()
+        parts = [*vars(tree).values()]
+    else:
+        parts = []
+    for part in parts:
+        check_parts(part)
 
 
 def start_values(tree: Any) -> Float[np.ndarray, " parameters"]:

@@ -22,6 +22,7 @@ from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
 from pellicle.scene.free import Free, insert, is_free, start_values
+from pellicle.scene.ties import Tied
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,8 @@ MOST_REFLECTIONS = 100
 METRE = 1e9
 """Largest length in nm that a layer can have."""
 
-Quantity = float | Free | jax.Array
-"""A number, a parameter to be fitted, or a traced number."""
+Quantity = float | Free | Tied | jax.Array
+"""A number, a parameter to be fitted, one tied to others, or a traced number."""
 
 MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
 """A dispersion, a name of the catalogue or path of a file of n and k, an index n + ik, or a `Free` index."""
@@ -134,7 +135,7 @@ def medium(value: MediumLike) -> AbstractDispersion:
         return value
     if isinstance(value, str | os.PathLike):
         return _named(os.fspath(value))
-    if is_free(value):
+    if is_free(value) or type(value) is Tied:
         return Constant(value)
     if isinstance(value, int | float | complex | np.number):
         if not np.isfinite(value):
@@ -185,7 +186,10 @@ def absorbs(dispersion: AbstractDispersion) -> bool:
         return any(map(absorbs, principal_media(dispersion)))
     if isinstance(dispersion, Constant) and isinstance(dispersion.k, int | float) and dispersion.k == 0:
         return False
-    numbers = insert(dispersion, start_values(dispersion))
+    known = jax.tree_util.tree_map(
+        lambda x: 0.0 if type(x) is Tied else x, dispersion, is_leaf=lambda x: is_free(x) or type(x) is Tied
+    )
+    numbers = insert(known, start_values(known))
     # the type does not depend on the numbers, which may be tracers
     zeros = jax.tree_util.tree_map(lambda x: np.zeros(np.shape(x), jnp.result_type(x)), numbers)
     return not is_real(known_index(zeros, np.ones(1)))
@@ -323,6 +327,7 @@ def divided(thickness: Quantity, parts: float) -> Quantity:
     """Return one of several equal parts of a thickness; a free one keeps its bounds, divided."""
     if isinstance(thickness, Free):
         return Free(thickness.lower / parts, thickness.upper / parts, start=thickness.start / parts)
+    assert not isinstance(thickness, Tied), "a scene resolves ties"
     return thickness / parts
 
 

@@ -23,6 +23,7 @@ from pellicle.fitting.profile_likelihood import Limits
 from pellicle.fitting.result import Baseline, Estimate, Part, Rival
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, expanded, limits_in_words
+from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.materials import materials_in
 from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
@@ -103,6 +104,10 @@ class BrdfMeasurements(NamedTuple):
                 for name, x in zip(names, np.ravel(value).tolist(), strict=True)
             ]
         return result
+
+    def tied(self) -> list[TiedNumber]:
+        """None: numbers of a surface are not tied."""
+        return []
 
     def amended(self, _: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits without an azimuth where there is no tilt: an azimuth has no bounds to lie beside."""

@@ -20,6 +20,7 @@ from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
+from pellicle.scene.expressions import value
 from pellicle.scene.film import Scene, thickness_spread
 from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.graded import each_medium
@@ -171,12 +172,14 @@ class ExtendedScene:
         # as the scene, with its parameters still free: another best fit is no other program
         starts = [_ANY] * self.parameters if values is None else values
         opened = insert(scene, [self._number(value)[1] for value in starts])
+        self._free = [free for _, free in free_leaves(opened)]  # with their labels
         nm = np.asarray(scene.light.wavelength)
         instrument = opened.instrument
         self.wavelength = self.angle = self.roughness = self.overlayer = None
         self.oxide = self.mixture = None
         self.substrate_index: Number | None = None
         self.thickness: dict[int, Number] = {}
+        self._tied: dict[int, Any] = {}
         self.index: dict[int, Number] = {}
         self.shape: dict[int, Number] = {}
         if instrument.wavelength_shift is None:
@@ -253,7 +256,11 @@ class ExtendedScene:
             shape = 1.0 if given else 2 * position**2 - 1
             material = each_medium(lambda medium: _scaled(medium, change, shape), material)
         thickness: Any = layer.thickness
-        if is_free(thickness):
+        if is_free(thickness) and thickness.tie is not None:
+            # the thickness of this layer alone, from where the tie has it
+            self.thickness[i], own = self._number(_ANY)
+            self._tied[self.thickness[i].position], thickness = thickness.tie.tree, own
+        elif is_free(thickness):
             self.thickness[i] = Number(next(j for j, own in enumerate(self._free) if own is thickness))
         else:
             self.thickness[i], thickness = self._number(float(np.asarray(thickness)))
@@ -262,7 +269,10 @@ class ExtendedScene:
     def start(self, values: np.ndarray) -> np.ndarray:
         """All numbers (numbers,) of the scene that is fitted at `values` (its parameters,)."""
         further = [own.start for own in self._free[self.parameters :]]
-        return np.concatenate([np.asarray(values, dtype=float), further])
+        numbers = np.concatenate([np.asarray(values, dtype=float), further])
+        for position, expression in self._tied.items():
+            numbers[position] = value(expression, values.__getitem__)
+        return numbers
 
     def signals(self, data: Any, values: np.ndarray, changes: Sequence[tuple[Number, float]]) -> np.ndarray:
         """Signals (changes, data values) at `values` (parameters,) of the fitted scene with one number

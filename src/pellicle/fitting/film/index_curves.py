@@ -34,6 +34,7 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, WELL_KNOWN, apart_from, distinct_rivals, expanded
 from pellicle.optics.pair import imag, real
 from pellicle.scene.free import Free, free_leaves, insert
+from pellicle.scene.ties import touches_ties
 
 _KNOTS, _BEYOND = (9, 16), (1.15, 1.05)
 """Knots of the splines, evenly spaced in photon energy, and factors by which they go beyond the blue and the
@@ -219,6 +220,7 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     if (
         not formula
         or not free_leaves(medium)
+        or touches_ties(scene, medium)
         or getattr(medium, "k", ()) is None
         or len(known) < len(targets)
     ):

@@ -2,13 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import jax
 import numpy as np
 
-from pellicle.dispersion.anisotropic import ParameterLocation, locate_parameter
-from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.oscillators import (
     AbstractOscillator,
     Drude,
@@ -21,19 +18,14 @@ from pellicle.dispersion.profiles import Spline as FreeProfile
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
 from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
+from pellicle.fitting.tied_numbers import TiedNumber
+from pellicle.scene.expressions import replaced
 from pellicle.scene.film import Scene
-from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
+from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered, without_bounds
 from pellicle.scene.layers import Layer, Uncertainty
+from pellicle.scene.names import WIDTHS, full_name, layer_prefix, location_of, unit_of
+from pellicle.scene.ties import tied_leaves
 
-WIDTHS = {"bandwidth": "nm", "thickness_spread": "nm", "roughness": "nm", "angle_spread": "deg"}
-_UNITS = {
-    "thickness": "nm",
-    "wavelength_shift": "nm",
-    "plate_mm": "mm",
-    "angle": "deg",
-    "angle_shift": "deg",
-    **WIDTHS,
-}
 _NATURAL_ONE = ("back_collected",)
 _NATURAL_ZERO = (
     *("k", "k0", "A_uv", "A_ir", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
@@ -103,19 +95,10 @@ def _own(path: tuple, name: str) -> str:
     return name if path[0].name in ("light", "instrument") else ""
 
 
-def _full_name(scene: Scene, path: tuple, last: str, name: str) -> str:
-    """Owner, last part and own scene; the owner is not named for the light and the only layer."""
-    owner = path[0].name
-    owners = _layer(scene, path[1].idx) if owner == "layers" else [owner] if owner != "light" else []
-    if owner == "substrate" and path[1].name == "back":
-        owners = ["back"]
-    return ".".join(part for part in (*owners, last, _own(path, name)) if part)
-
-
 def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
-    location = _place(scene, path)
+    location = location_of(scene, path)
     owner, key, field = type(location.owner), location.key, location.field
-    full = _full_name(scene, path, location.name, name)
+    full = full_name(scene, path, location.name, _own(path, name))
     if key in _NATURAL_ONE and free.upper > 1:
         raise UsageError(f"`{key}` must be at most 1: its upper bound is {free.upper:g}")
     # the A of an oscillator is a strength, which cannot be negative; that of Cauchy is an index
@@ -132,7 +115,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     return Parameter(
         name=full,
         key=key,
-        unit=location.unit or _UNITS.get(key, ""),
+        unit=unit_of(location),
         start=free.start,
         lower=free.lower,
         upper=free.upper,
@@ -150,25 +133,9 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     )
 
 
-def _place(scene: Scene, path: tuple) -> ParameterLocation:
-    """Location of the number at `path` inside its medium, or inside the scene outside of media."""
-    node: Any = scene
-    for depth, step in enumerate(path):
-        node = getattr(node, step.name) if hasattr(step, "name") else node[step.idx]
-        if isinstance(node, AbstractDispersion):
-            return locate_parameter(node, path[depth + 1 :])
-    key = path[-1].name
-    return ParameterLocation(key, key, key, None)
-
-
-def _layer(scene: Scene, position: int) -> list[str]:
-    """Prefix of the names of a layer's parameters: nothing if it is the only one."""
-    return [] if len(scene.layers) == 1 else [scene.layers[position].name or f"layer{position + 1}"]
-
-
 def thickness_name(scene: Scene, position: int) -> str:
     """The full name of a layer's thickness."""
-    return ".".join([*_layer(scene, position), "thickness"])
+    return ".".join([*layer_prefix(scene, position), "thickness"])
 
 
 def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -188,13 +155,34 @@ def with_bounds(scene: Scene, parameters: Sequence[Parameter]) -> Scene:
 
 def anonymous(scene: Scene) -> Scene:
     """The scene without bounds, names and uncertainties: none of them may make a new program."""
-    scene = insert(scene, [Free(0.0, 1.0, start=0.5)] * len(free_leaves(scene)))
+    scene = without_bounds(scene)
     layers = tuple(
         replace(layer, name=None, **({"index_uncertainty": None} if isinstance(layer, Layer) else {}))
         for layer in scene.layers
     )
     substrate = replace(scene.substrate, index_uncertainty=None)
     return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty())
+
+
+@remembered
+def tied_numbers(scene: Scene, name: str = "") -> list[TiedNumber]:
+    """The numbers of a scene that follow free ones; `name` is the scene's where it is one of several."""
+
+    def called(path: tuple) -> str:
+        return full_name(scene, path, location_of(scene, path).name, _own(path, name))
+
+    names = {free.label: called(path) for path, free in free_leaves(scene)}
+    return [
+        TiedNumber(
+            called(path),
+            unit_of(location_of(scene, path)),
+            x.lower,
+            x.upper,
+            x.tie.text or "",
+            replaced(x.tie.tree, lambda label: ("name", names[label])),
+        )
+        for path, x in tied_leaves(scene)
+    ]
 
 
 @remembered
@@ -207,7 +195,7 @@ def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
     for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=is_free):
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
-        location = _place(scene, path)
-        unit = location.unit or _UNITS.get(location.key, "")
-        rows.append((_full_name(scene, path, location.name, name), float(leaf), unit))
+        location = location_of(scene, path)
+        full = full_name(scene, path, location.name, _own(path, name))
+        rows.append((full, float(leaf), unit_of(location)))
     return rows

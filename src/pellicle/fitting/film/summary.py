@@ -18,7 +18,7 @@ from pellicle.fitting.film import fringes, parts, residual_structure
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.evidence import evidence
 from pellicle.fitting.film.indices import indices
-from pellicle.fitting.film.parameters import fixed_numbers, thickness_name
+from pellicle.fitting.film.parameters import fixed_numbers, thickness_name, tied_numbers
 from pellicle.fitting.film.problem import Target, drifts, shortest_wavelength
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.linear_system import Evidence
@@ -28,6 +28,7 @@ from pellicle.fitting.result import Estimate, Part, Profile
 from pellicle.fitting.reweighting import RankedMinima, ViewFit
 from pellicle.fitting.robust_losses import spread
 from pellicle.fitting.status import RIVAL
+from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.materials import Material, materials_in
 from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free, remembered
@@ -93,6 +94,11 @@ class FilmMeasurements:
             for target in self.targets
             for name, value, unit in fixed_numbers(target.scene, target.name)
         ]
+
+    def tied(self) -> list[TiedNumber]:
+        """The numbers of the scenes that follow free ones, each once."""
+        rows = [row for target in self.targets for row in tied_numbers(target.scene, target.name)]
+        return list({row.name: row for row in rows}.values())
 
     def amended(self, parts: tuple[Part, ...], limits: Limits) -> Limits:
         """Limits by what a drift of scale and offset could imitate, and of a layer that is not needed."""

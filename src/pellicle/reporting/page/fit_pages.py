@@ -121,11 +121,11 @@ def _rivals(fit: Fit) -> Table:
 
 def _parameters(fit: Fit) -> Table:
     rows = []
-    for p in sorted(fit.parameters.values(), key=lambda p: not p.free):
+    for p in sorted(fit.parameters.values(), key=lambda p: (not p.free, not p.tied)):
         noise = expanded = ""
-        if p.free and math.isfinite(p.stderr_noise):
+        if (p.free or p.tied) and math.isfinite(p.stderr_noise):
             noise = with_unit(f"{p.stderr_noise:.2g}", p.unit)
-        if p.free and math.isfinite(p.stderr):
+        if (p.free or p.tied) and math.isfinite(p.stderr):
             expanded = with_unit(f"± {p.expanded:.2g}", p.unit)
         rows.append((p.name, fit_text.value_in_words(p), expanded, noise, fit_text.bounds_in_words(p)))
     head = ("parameter", "value ± standard error", "95 %", "error by noise alone", "bounds")
