@@ -47,11 +47,11 @@ from pellicle.scene.layers import Interface as Interface
 from pellicle.scene.layers import Layer as Layer
 from pellicle.scene.layers import Plate as Plate
 from pellicle.scene.layers import Substrate as Substrate
-from pellicle.scene.layers import Uncertainty as Uncertainty
 from pellicle.scene.layers import medium as medium
 from pellicle.scene.surface import Surface as Surface
 from pellicle.scene.surface import SurfaceUncertainty as SurfaceUncertainty
 from pellicle.scene.ties import Tied as Tied
+from pellicle.scene.uncertainty import Uncertainty as Uncertainty
 from pellicle.simulation.brdf import Directions as Directions
 from pellicle.simulation.depth import absorptance as absorptance
 from pellicle.simulation.depth import field as field

@@ -8,7 +8,7 @@ import pytest
 from pellicle.dispersion.empirical import Cauchy
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
-from pellicle.scene.layers import Uncertainty
+from pellicle.scene.uncertainty import Uncertainty
 
 AT = np.array([500.0, 700.0])
 LAYER = '[[scene.layer]]\nmaterial = "SiO2"\nthickness = { lower = 10, upper = 3000 }\n'

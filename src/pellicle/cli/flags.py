@@ -163,7 +163,8 @@ class SceneFlags(Flags):
         from pellicle.scene.film import Scene
         from pellicle.scene.free import Free
         from pellicle.scene.instrument import Instrument
-        from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate, Uncertainty
+        from pellicle.scene.layers import SCATTERING_BACKS, Layer, Substrate
+        from pellicle.scene.uncertainty import Uncertainty
 
         layer, substrate = self.layer, self.substrate
         if layer is None or substrate is None:

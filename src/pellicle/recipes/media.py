@@ -7,15 +7,14 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import jax
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from pellicle.data.options import parse_number, parse_range
-from pellicle.dispersion.anisotropic import Anisotropic, locate_parameter
+from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
-from pellicle.dispersion.empirical import Constant, Shifted
+from pellicle.dispersion.empirical import Constant
 from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
@@ -23,16 +22,15 @@ from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import dispersion_models as models
-from pellicle.recipes import schema
-from pellicle.scene.free import Free, check_parts, is_free
+from pellicle.recipes import medium_schema
+from pellicle.recipes.free_numbers import free_numbers
+from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.ties import Tied
 
-_MEDIUM: TypeAdapter[Any] = TypeAdapter(schema.Medium)
+_MEDIUM: TypeAdapter[Any] = TypeAdapter(medium_schema.Medium)
 _ANGLES = ("axis_theta", "axis_phi", "axis_psi")
 _DECIMAL_COMMA = re.compile(r"\s*\d+,\d+\s*")
-_LIKE_AN_INDEX = 0.9
-"""A lower bound of what is added to an index beyond which the index itself is meant."""
 
 _COMPOSED: dict[str, tuple[Any, tuple[str, ...]]] = {
     "oscillators": (Oscillators, ("terms",)),
@@ -72,7 +70,7 @@ def drift(text: str, name: str) -> str | float:
 
 
 def medium(
-    value: schema.Medium, free: Iterable[str] = (), name: str = "`layer`", folder: Path | None = None
+    value: medium_schema.Medium, free: Iterable[str] = (), name: str = "`layer`", folder: Path | None = None
 ) -> AbstractDispersion:
     """Return the dispersion for a word of the command line, or for what a recipe has under the key `name`.
 
@@ -83,13 +81,13 @@ def medium(
 
     Raises UsageError, or DataError for a file that cannot be read.
     """
-    if isinstance(value, schema.AnisotropicTable):
+    if isinstance(value, medium_schema.AnisotropicTable):
         dispersion: AbstractDispersion = _anisotropic(dict(value.model_extra or {}), folder)
-    elif isinstance(value, schema.GradedTable):
+    elif isinstance(value, medium_schema.GradedTable):
         dispersion = _graded(value, dict(value.model_extra or {}), folder)
-    elif isinstance(value, schema.MixTable):
+    elif isinstance(value, medium_schema.MixTable):
         dispersion = _mixture(value.mix, dict(value.model_extra or {}), folder)
-    elif isinstance(value, schema.MediumTable):
+    elif isinstance(value, medium_schema.MediumTable):
         dispersion = _model(value.model, dict(value.model_extra or {}), folder)
     else:
         word = str(value).strip()
@@ -149,7 +147,7 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
 
 def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     axis = values.pop("axis", [0.0, 0.0])
-    keys = schema.BIAXIAL if values.keys() & {*schema.BIAXIAL} else schema.UNIAXIAL
+    keys = medium_schema.BIAXIAL if values.keys() & {*medium_schema.BIAXIAL} else medium_schema.UNIAXIAL
     _check_keys(values, [*keys, "axis"], "a birefringent material has no")
     missing = [key for key in keys if key not in values]
     if missing:
@@ -163,7 +161,7 @@ def _anisotropic(values: dict[str, Any], folder: Path | None) -> Anisotropic:
     return Anisotropic(**media, axis=angles)
 
 
-def _graded(table: schema.GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
+def _graded(table: medium_schema.GradedTable, values: dict[str, Any], folder: Path | None) -> Graded:
     name = table.profile
     _check_word(name, PROFILES, "profile")
     _check_word(table.mix, MIXTURES, "mix")
@@ -277,8 +275,8 @@ def _parameters(key: str, value: Any) -> models.Parameter | list[models.Paramete
 def _parameter(key: str, value: Any) -> models.Parameter:
     """A model's parameter; without bounds it is fixed."""
     try:
-        table = schema.FreeTable.model_validate(value) if isinstance(value, dict) else value
-        if not isinstance(table, str | schema.FreeTable):
+        table = medium_schema.FreeTable.model_validate(value) if isinstance(value, dict) else value
+        if not isinstance(table, str | medium_schema.FreeTable):
             table = float(table)
     except (ValidationError, TypeError, ValueError):
         raise UsageError(
@@ -287,7 +285,7 @@ def _parameter(key: str, value: Any) -> models.Parameter:
     return number(table, key)
 
 
-def number(value: schema.Number, name: str, minimum: float | None = None) -> float | Free | Tied:
+def number(value: medium_schema.Number, name: str, minimum: float | None = None) -> float | Free | Tied:
     """Return a fixed number, a `Free` or a `Tied` from what a recipe gives for `name`.
 
     Raises UsageError where it is neither, not finite, or below `minimum`.
@@ -314,104 +312,3 @@ def number(value: schema.Number, name: str, minimum: float | None = None) -> flo
     if minimum is not None and lowest < minimum:
         raise UsageError(f"{name} must not be below {minimum:g}, got {lowest:g}")
     return result
-
-
-def free_numbers(dispersion: AbstractDispersion, items: Iterable[str]) -> AbstractDispersion:
-    """Free the named numbers of a dispersion: `n`, `k`, or a model's own, each with optional bounds.
-
-    A constant index is replaced: n ± 0.5 but at least 1 (or 0.01, where it absorbs), k from 0 to 1. For any
-    other dispersion a constant is added: to n within ± 0.5 as long as the sum stays at least 1 (or a tenth of
-    its least value, for a metal), to k from 0 to 1. Raises UsageError.
-    """
-    for item in items:
-        if isinstance(dispersion, Graded):
-            raise UsageError("cannot free numbers of a graded material: give bounds to those of its profile")
-        name, _, words = item.partition("=")
-        if isinstance(dispersion, Anisotropic) and (name in ("n", "k") or name.startswith("axis_")):
-            raise UsageError(
-                f"cannot free {name!r} of a birefringent layer: in the recipe, give bounds to its principal"
-                " media, or to the angles of its axis"
-            )
-        bounds = parse_range(words, f"the range of {name}") if words else None
-        free = _free_index if name in ("n", "k") else _free_parameter
-        dispersion = free(dispersion, name, bounds)
-    return dispersion
-
-
-def _free_parameter(
-    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
-) -> AbstractDispersion:
-    """Free the model's own number of that name within `bounds` or the model's default ones."""
-    leaves, structure = jax.tree_util.tree_flatten_with_path(dispersion, is_leaf=is_free)
-    numbers = [i for i, (_, leaf) in enumerate(leaves) if is_free(leaf) or isinstance(leaf, int | float)]
-    located = [locate_parameter(dispersion, leaves[i][0]) for i in numbers]
-    known = {location.name: (location, i) for location, i in zip(located, numbers, strict=True)}
-    if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
-        raise UsageError(f"cannot free {name!r}: the layer has no such number; n and k can always be freed")
-    if name not in known:
-        *first, last = known
-        listed = f"{', '.join(first)} and {last}" if first else last
-        close = did_you_mean(name, known)
-        raise UsageError(f"cannot free {name!r}{close}: the layer has {listed}, and n and k can be added")
-    location, position = known[name]
-    replaced = [leaf for _, leaf in leaves]
-    replaced[position] = Free(*bounds) if bounds else models.free_by_default(location, replaced[position])
-    if replaced[position] is None:
-        raise UsageError(f"cannot free {name!r} without bounds: write {name}=LO:HI")
-    changed = jax.tree_util.tree_unflatten(structure, replaced)
-    with models.usage_errors(f"cannot free {name!r}: "):
-        check_parts(changed)
-    return changed
-
-
-def _free_index(
-    dispersion: AbstractDispersion, name: str, bounds: tuple[float, float] | None
-) -> AbstractDispersion:
-    if isinstance(dispersion, Constant):
-        n, k = _start(dispersion.n), _start(dispersion.k or 0.0)
-        if name == "k":
-            return Constant(dispersion.n, _free_k(k, bounds))
-        least, most = (1.0, 5.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
-        low, high = max(least, n - 0.5), max(least, n) + 0.5
-        default = Free(low, high, start=max(n, low), limits=(least, max(most, high)))
-        return Constant(_within(bounds, default), dispersion.k)
-    shifted = dispersion if isinstance(dispersion, Shifted) else Shifted(dispersion)
-    if name == "k":
-        return Shifted(shifted.base, shifted.n, _free_k(0.0, bounds))
-    if bounds and bounds[0] >= _LIKE_AN_INDEX:
-        low, high = bounds
-        raise UsageError(
-            f"cannot free 'n' within {low:g} to {high:g}: it is added to the index of this material; write "
-            "n=-0.1:0.1 for an index near the given one, or take the model cauchy for an unknown one"
-        )
-    return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
-
-
-def _start(number: Any) -> float:
-    return number.start if isinstance(number, Free) else float(number)
-
-
-def _within(bounds: tuple[float, float] | None, default: Free) -> Free:
-    """A number free within the bounds that the user gives, else the default."""
-    if bounds is None:
-        return default
-    low, high = bounds
-    return Free(low, high, start=min(max(default.start, low), high))
-
-
-def _free_k(value: float, bounds: tuple[float, float] | None) -> Free:
-    low, high = bounds or (0.0, 1.0)
-    if low < 0:
-        raise UsageError(f"cannot free 'k': an extinction coefficient must not be negative, got {low:g}")
-    start = value if value > low else low + 0.05 * (high - low)
-    return Free(low, high, start=min(start, high), limits=None if bounds else (0.0, 20.0))
-
-
-def _free_shift(dispersion: AbstractDispersion) -> Free:
-    """A constant that is added to n. With more than 2 of it the material is another one."""
-    low, high = getattr(dispersion, "wavelength_range", (380.0, 780.0))
-    wavelength = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
-    rises = wavelength[0] < wavelength[-1]
-    least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
-    lowest = 1.0 - least if least >= 1 else -0.9 * least
-    return Free(max(-0.5, lowest), 0.5, start=0.0, limits=(lowest, 2.0))

@@ -29,15 +29,17 @@ from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.recipes import schema
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SERIES, SPLINES, fixed_model, free_model
-from pellicle.recipes.media import free_numbers, medium, number, scattering_back
+from pellicle.recipes.free_numbers import free_numbers
+from pellicle.recipes.media import medium, number, scattering_back
 from pellicle.scene.film import Reference
 from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import Graded
 from pellicle.scene.groups import Group, unlisted
 from pellicle.scene.instrument import ONE_NUMBER, SLOW_OFFSET, SLOW_SCALE, Drift, Instrument
-from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, StandardUncertainties, Substrate
+from pellicle.scene.layers import SCATTERING_BACKS, Interface, Layer, Plate, Substrate
 from pellicle.scene.priors import HalfNormal, Normal
 from pellicle.scene.ties import Tied
+from pellicle.scene.uncertainty import StandardUncertainties
 
 _NAME: dict[type, str] = {kind: name for table in (MIXTURES, PROFILES, KINDS) for name, kind in table.items()}
 

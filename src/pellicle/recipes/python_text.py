@@ -16,8 +16,9 @@ from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
 from pellicle.scene.groups import Group, unlisted
 from pellicle.scene.instrument import ONE_NUMBER, Drift, Instrument
-from pellicle.scene.layers import Interface, Layer, Plate, StandardUncertainties, Substrate
+from pellicle.scene.layers import Interface, Layer, Plate, Substrate
 from pellicle.scene.surface import Surface
+from pellicle.scene.uncertainty import StandardUncertainties
 
 _PLACES = {
     "pellicle.dispersion.effective_medium": "mixing",

@@ -24,8 +24,8 @@ from pellicle.recipes import parts, schema
 from pellicle.recipes.media import medium, number
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
-from pellicle.scene.layers import Uncertainty
 from pellicle.scene.surface import Surface, SurfaceUncertainty
+from pellicle.scene.uncertainty import Uncertainty
 
 
 def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:

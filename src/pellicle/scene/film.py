@@ -26,12 +26,12 @@ from pellicle.scene.layers import (
     Plate,
     Quantity,
     Substrate,
-    Uncertainty,
     absorbs,
     ambient_medium,
     divided,
 )
 from pellicle.scene.ties import bound
+from pellicle.scene.uncertainty import Uncertainty
 from pellicle.signals.base import Signal
 from pellicle.signals.contrast import FORMS
 from pellicle.signals.registry import SIMULATED, of_light

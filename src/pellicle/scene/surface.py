@@ -25,7 +25,8 @@ from pellicle.materials import materials_in
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves
-from pellicle.scene.layers import Interface, Layer, MediumLike, Plate, StandardUncertainties, medium
+from pellicle.scene.layers import Interface, Layer, MediumLike, Plate, medium
+from pellicle.scene.uncertainty import StandardUncertainties
 
 KEYS = {"film": ("n", "k"), "base": ("base_n", "base_k")}
 """Keys of the index of each part of a surface."""

@@ -5,7 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from pellicle.scene.layers import Uncertainty
+from pellicle.scene.uncertainty import Uncertainty
 
 
 def channel_errors(

@@ -22,9 +22,10 @@ from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.scene.expressions import replaced
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered, without_bounds
-from pellicle.scene.layers import Layer, Uncertainty
+from pellicle.scene.layers import Layer
 from pellicle.scene.names import WIDTHS, full_name, layer_prefix, location_of, unit_of
 from pellicle.scene.ties import tied_leaves
+from pellicle.scene.uncertainty import Uncertainty
 
 _NATURAL_ONE = ("back_collected",)
 _NATURAL_ZERO = (
