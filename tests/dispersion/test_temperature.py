@@ -9,7 +9,7 @@ import pellicle.dispersion as d
 from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.optics.pair import real
-from pellicle.recipes import media, schema
+from pellicle.recipes import media, medium_schema
 from pellicle.recipes.parts import same, written_medium
 
 BK7 = {"D0": 1.86e-6, "D1": 1.31e-8, "D2": -1.37e-11, "E0": 4.34e-7, "E1": 6.27e-10, "lambda_TK": 0.170}
@@ -67,7 +67,7 @@ def test_between_tables():
     ],
 )
 def test_recipes_that_cannot_be(table, said, refuses):
-    refuses(UsageError, said, media.medium, schema.MediumTable(**table))
+    refuses(UsageError, said, media.medium, medium_schema.MediumTable(**table))
 
 
 @pytest.mark.parametrize(
@@ -89,6 +89,6 @@ def test_recipes_that_cannot_be(table, said, refuses):
     ],
 )
 def test_recipes_written_and_read(table, tmp_path):
-    medium = media.medium(schema.MediumTable(**table))
-    again = media.medium(schema.MediumTable(**written_medium(medium, "material", tmp_path)))
+    medium = media.medium(medium_schema.MediumTable(**table))
+    again = media.medium(medium_schema.MediumTable(**written_medium(medium, "material", tmp_path)))
     assert same(medium, again)

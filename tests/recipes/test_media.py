@@ -12,7 +12,7 @@ from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.parameters import parameters
 from pellicle.recipes import media
 from pellicle.recipes.dispersion_models import MODELS, TERMS, build_model
-from pellicle.recipes.schema import MediumTable
+from pellicle.recipes.medium_schema import MediumTable
 from pellicle.scene.free import Free, free_leaves
 
 AT = np.array([450.0, 633.0, 850.0])
