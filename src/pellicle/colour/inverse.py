@@ -222,8 +222,9 @@ def _screened(
     return chi2, gain
 
 
-def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.ndarray, ...]:
-    """The columns of `ColourThickness` of colours (colours, channels)."""
+def _posterior(colours: np.ndarray, model: ColourInverse) -> tuple[np.ndarray, ...]:
+    """Nodes of the grid that may have made colours (colours, channels): the colour and the node of each,
+    its gain, χ², and ln of the posterior density up to a constant of the colour."""
     each = np.arange(len(colours))
     precision = model.precision(colours)
     chi2, gain = _screened(colours, model, precision)
@@ -251,8 +252,14 @@ def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.nd
     log_p = log_volume - 0.5 * chi2
     peak = np.maximum.reduceat(log_p, np.searchsorted(row, each))
     kept = log_p > (peak - _PRUNED)[row]
-    row, node, chi2, gain, log_p = (x[kept] for x in (row, node, chi2, gain, log_p))
-    mass = np.exp(log_p - peak[row]) * model.width[node]
+    return tuple(x[kept] for x in (row, node, gain, chi2, log_p - peak[row]))
+
+
+def _orders(colours: np.ndarray, model: ColourInverse, most: int) -> tuple[np.ndarray, ...]:
+    """The columns of `ColourThickness` of colours (colours, channels)."""
+    each = np.arange(len(colours))
+    row, node, gain, chi2, log_p = _posterior(colours, model)
+    mass = np.exp(log_p) * model.width[node]
 
     def summed(first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Mass, mean and standard deviation of the thicknesses from each of these to the next."""

@@ -24,7 +24,7 @@ are dense; the second where the edge has values that no film has. Fringes of two
 0.75, noise 0.28 to 0.43, and 0.6 where it is smoothed over a few points."""
 _LEAST_SHARE = 0.5
 _LEAST_RANGE = 50.0
-"""What remains has half of the points, or so many nm."""
+"""Share of the points, or range in nm, at least one of which must remain."""
 _LEAST_LIGHT = 5.0
 """Light of the reference over its own scatter."""
 _MOST_POINTS = 200_000
@@ -76,14 +76,10 @@ def noisy_edges(
     if kept < _LEAST_SHARE * values.size and remains < _LEAST_RANGE:
         return None
     width = 2 * FEWEST
-    for edge, window in (
-        (slice(0, start), slice(0, max(start, width))),
-        (slice(stop, None), slice(min(stop, values.size - width), None)),
-    ):
-        if not rough[edge].size or np.mean(dark[edge]) > _LEAST_SHARE:
-            continue
-        most = _COHERENT_IF_IMPOSSIBLE if impossible[edge].any() else _COHERENT
-        if np.mean(rough[edge] | dark[edge]) < _LEAST_SHARE or np.median(coherence(values[window])) > most:
+    edges = slice(0, start), slice(stop, None)
+    windows = slice(0, max(start, width)), slice(min(stop, values.size - width), None)
+    for edge, window in zip(edges, windows, strict=True):
+        if not _is_noise(values[window], rough[edge], dark[edge], impossible[edge]):
             return None
     reason = "the reference has no light there" if dark.any() else "noise of an edge"
     out = np.r_[0:start, stop : values.size]
@@ -93,6 +89,17 @@ def noisy_edges(
         f"`range=({wavelength.min():g}, {wavelength.max():g})` keeps all"
     )
     return GoodRange(slice(start, stop), LeftOut(wavelength[out], measured[out], reason), note)
+
+
+def _is_noise(values: np.ndarray, rough: np.ndarray, dark: np.ndarray, impossible: np.ndarray) -> bool:
+    """True for an edge that has no light, or scatters without the coherence of fringes; for an empty one.
+
+    `values` are of the edge, or of a window as wide as coherence needs; the others are of its points.
+    """
+    if not rough.size or np.mean(dark) > _LEAST_SHARE:
+        return True
+    most = _COHERENT_IF_IMPOSSIBLE if impossible.any() else _COHERENT
+    return bool(np.mean(rough | dark) >= _LEAST_SHARE and np.median(coherence(values)) <= most)
 
 
 def readable_range(

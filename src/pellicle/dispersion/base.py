@@ -64,6 +64,14 @@ def require_nonnegative(model: str, **parameters: Any) -> None:
             raise ValueError(f"{model}: {name} must not be negative, got {bounds[0]:g}")
 
 
+def require_positive(model: str, *, unit: str = "", **parameters: Any) -> None:
+    """Raise ValueError naming the first parameter whose value or lower bound is not above zero."""
+    for name, number in parameters.items():
+        bounds = bounds_of(number)
+        if bounds is not None and not bounds[0] > 0:
+            raise ValueError(f"{model}: {name} must be positive, got {bounds[0]:g}{unit}")
+
+
 def cast_like(values: Any, wavelength: Any):
     """A table's column in the precision of the wavelengths, so that float32 stays float32."""
     return namespace(values, wavelength).asarray(values, dtype=jnp.result_type(float, wavelength))

@@ -6,18 +6,11 @@ Energies are in eV. All are terms of `Oscillators`, Kramers-Kronig consistent un
 import math
 from typing import Any, ClassVar, final
 
-from pellicle.dispersion.base import bounds_of
+from pellicle.dispersion.base import require_positive
 from pellicle.dispersion.oscillators import AbstractOscillator, check
 from pellicle.optics import pair
 from pellicle.optics.complex_functions import digamma, exp, faddeeva, log, power
 from pellicle.optics.pair import Number, Pair, conj, imag, namespace, real
-
-
-def _check_positive(model: str, **parameters: Any) -> None:
-    for name, number in parameters.items():
-        bounds = bounds_of(number)
-        if bounds is not None and not bounds[0] > 0:
-            raise ValueError(f"{model}: {name} must be positive, got {bounds[0]:g}")
 
 
 @final
@@ -39,7 +32,7 @@ class CriticalPoint(AbstractOscillator):
 
     def __check_init__(self):
         check("critical-point", A=self.A)
-        _check_positive("critical-point", E0=self.E0, gamma=self.gamma, mu=self.mu)
+        require_positive("critical-point", E0=self.E0, gamma=self.gamma, mu=self.mu)
 
     def epsilon(self, energy):
         xp = namespace(energy, self.phase)
@@ -70,7 +63,7 @@ class ParabolicBand(AbstractOscillator):
 
     def __check_init__(self):
         check("cppb", A=self.A, E0=self.E0)
-        _check_positive("cppb", gamma=self.gamma)
+        require_positive("cppb", gamma=self.gamma)
 
     def epsilon(self, energy):
         xp = namespace(energy, self.phase)
@@ -95,7 +88,7 @@ class AdachiM0(AbstractOscillator):
 
     def __check_init__(self):
         check("adachi-m0", A=self.A, gamma=self.gamma)
-        _check_positive("adachi-m0", E0=self.E0)
+        require_positive("adachi-m0", E0=self.E0)
 
     def epsilon(self, energy):
         z = Pair(energy / self.E0, self.gamma / self.E0 + 0.0 * energy)
@@ -119,7 +112,7 @@ class AdachiM1(AbstractOscillator):
 
     def __check_init__(self):
         check("adachi-m1", A=self.A)
-        _check_positive("adachi-m1", E0=self.E0, gamma=self.gamma)
+        require_positive("adachi-m1", E0=self.E0, gamma=self.gamma)
 
     def epsilon(self, energy):
         z = Pair(energy / self.E0, self.gamma / self.E0 + 0.0 * energy)
@@ -143,7 +136,7 @@ class Tanguy(AbstractOscillator):
 
     def __check_init__(self):
         check("tanguy", A=self.A)
-        _check_positive("tanguy", Eg=self.Eg, R=self.R, gamma=self.gamma)
+        require_positive("tanguy", Eg=self.Eg, R=self.R, gamma=self.gamma)
 
     def epsilon(self, energy):
         z = Pair(energy, self.gamma + 0.0 * energy)
@@ -179,7 +172,7 @@ class BrendelBormann(AbstractOscillator):
 
     def __check_init__(self):
         check("brendel-bormann", A=self.A, E0=self.E0, gamma=self.gamma)
-        _check_positive("brendel-bormann", sigma=self.sigma)
+        require_positive("brendel-bormann", sigma=self.sigma)
 
     def epsilon(self, energy):
         a = pair.sqrt(Pair(energy * energy, self.gamma * energy))

@@ -3,7 +3,7 @@
 import math
 from typing import Any, ClassVar, final
 
-from pellicle.dispersion.base import bounds_of
+from pellicle.dispersion.base import bounds_of, require_positive
 from pellicle.dispersion.oscillators import AbstractOscillator, check
 from pellicle.optics.pair import Pair, namespace
 from pellicle.optics.special import dawson, dawson_integral, erfc
@@ -40,10 +40,7 @@ class Psemi(AbstractOscillator):
 
     def __check_init__(self):
         check("psemi", A=self.A, E0=self.E0, AL=self.AL, AR=self.AR)
-        for name in ("fwhm", "WL", "WR", "PL", "PR"):
-            bounds = bounds_of(getattr(self, name))
-            if bounds is not None and not bounds[0] > 0:
-                raise ValueError(f"psemi: {name} must be positive, got {bounds[0]:g}")
+        require_positive("psemi", fwhm=self.fwhm, WL=self.WL, WR=self.WR, PL=self.PL, PR=self.PR)
         for name in ("PL", "PR"):
             bounds = bounds_of(getattr(self, name))
             if bounds is not None and not bounds[1] < 1:

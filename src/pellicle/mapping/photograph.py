@@ -1,6 +1,7 @@
 """Thickness of a film at every pixel of a photograph, or along a strip, from its colours."""
 
 import os
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,20 +98,14 @@ def map_photograph(
     if space == "rgb":  # a camera's channels are linear, with the σ of their median
         middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)
         spread = sigma * gamma * middle ** (1 - 1 / gamma)
-    balance = white_balance_error(white, flat_field)
-
-    def errors(linear: np.ndarray) -> list[np.ndarray]:
-        """Changes of linear channels (..., 3) by one standard uncertainty of each error of the camera."""
-        every = channel_errors(
-            *(linear, scene.uncertainty, space),
-            balance=balance,
-            coded=space == "srgb" or gamma != 1,
-            scaled=not isinstance(scene.instrument.scale, Drift),
-            # all pixels have one camera: what mixes its channels hardly tells neighbours apart
-            mixed=not neighbours and (space == "srgb" or sensitivities is None),
-        )
-        return [size * change for _, size, change in every if size]
-
+    errors = partial(
+        _camera_errors,
+        *(scene, space),
+        balance=white_balance_error(white, flat_field),
+        coded=space == "srgb" or gamma != 1,
+        # all pixels have one camera: what mixes its channels hardly tells neighbours apart
+        mixed=not neighbours and (space == "srgb" or sensitivities is None),
+    )
     inverse = _inverse(scene, seen.sensor, space, bounds, layer, spread, errors)
     films = inverse(coded if space == "srgb" else exposed, ORDERS[neighbours])
     if neighbours:
@@ -118,6 +113,14 @@ def map_photograph(
         told.append(decided)
     about = where, space, tuple(told), photograph.path, photograph.sha256
     return ThicknessMap(coded, _fitted(films, inverse, seen), films, position, *about)
+
+
+def _camera_errors(scene: Scene, space: str, linear: np.ndarray, **camera: Any) -> list[np.ndarray]:
+    """Changes of linear channels (..., 3) by one standard uncertainty of each error of a camera, which is
+    described as for `channel_errors`."""
+    scaled = not isinstance(scene.instrument.scale, Drift)
+    every = channel_errors(linear, scene.uncertainty, space, scaled=scaled, **camera)
+    return [size * change for _, size, change in every if size]
 
 
 def _chosen(

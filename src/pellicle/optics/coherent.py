@@ -58,8 +58,7 @@ def stack(
     a, q0 = transverse(ambient, angle)
     rows = _rows((ambient, substrate, a), layers, phases, roughness)
     if repeats is not None and repeats.count > 1:
-        counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
-        rows = _repeated(rows, repeats, counts)
+        rows = _repeated(rows, repeats, layers)
     shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
 
     bottom, top, q_top = (_full(number, shape, dtype) for number in (substrate, ambient, q0))
@@ -68,9 +67,8 @@ def stack(
     empty = equal_media(ambient, substrate, *uniform)
     if is_graded(layers):
         empty = empty & jnp.all(jnp.stack(rows.points) == top, axis=(0, 1))
-    upside_down = _Rows(
-        jax.tree.map(lambda x: x[::-1], rows.points[::-1]), rows.depth[::-1], None, rows.runs[::-1]
-    )
+    points = jax.tree.map(lambda x: x[::-1], rows.points[::-1])
+    upside_down = _Rows(points, rows.depth[::-1], None, rows.runs[::-1])
     responses = []
     for polarisation in polarisations[:1] if angle is None else polarisations:
         e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
@@ -152,11 +150,12 @@ def _rows(
     return _Rows(points, depth, jnp.real(joined(rough)))
 
 
-def _repeated(rows: _Rows, repeats: Repeats, counts: Sequence[int]) -> _Rows:
-    """Return rows with their runs, or written out where they drift or a face is rough.
+def _repeated(rows: _Rows, repeats: Repeats, layers: Sequence[Index | Gradient]) -> _Rows:
+    """Return rows of layers with their runs, or written out where they drift or a face is rough.
 
-    `counts` are the rows of each layer. The size of a program does not depend on the number of repeats.
+    The size of a program does not depend on the number of repeats.
     """
+    counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
     ends = np.cumsum([0, *counts])[np.cumsum([0, *(n for _, n in repeats.runs)])]
     runs = [(count, range(*pair)) for (count, _), pair in zip(repeats.runs, pairwise(ends), strict=True)]
     if rows.rough is None and all(x is None for x in repeats.drift):

@@ -109,6 +109,30 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
         return dispersion.name if dispersion.page == "exactly 1" or dispersion.clear else dispersion.page
     if isinstance(dispersion, Constant):
         return _constant(dispersion, name)
+    if (composite := _composite(dispersion, name, folder)) is not None:
+        return composite
+    kind = type(dispersion)
+    if (model := _NAME.get(kind)) in SERIES:
+        fields_of = SERIES[model]
+        keys = _numbers(dispersion, name, fields_of)
+        for i, numbers in enumerate(zip(*(getattr(dispersion, x) for x in fields_of), strict=True), 1):
+            numbered = zip(fields_of, numbers, strict=True)
+            keys |= {f"{key}{i}": written_number(x, f"{name}: {key}{i}") for key, x in numbered}
+        if keys.keys() <= MODELS[model].keys():
+            return {"model": model, **keys}
+    if isinstance(dispersion, Oscillators):
+        eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
+        terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
+        if len(terms) != 1:
+            return {"model": "oscillators", **eps_inf, "terms": terms}
+        return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
+    if kind in KINDS.values() and model not in SERIES and getattr(dispersion, "k", 0.0) is not None:
+        return {"model": _NAME[kind], **_numbers(dispersion, name)}
+    raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
+
+
+def _composite(dispersion: Any, name: str, folder: Path) -> dict[str, Any] | None:
+    """The table of a medium of other media; None for any other one."""
     if isinstance(dispersion, Anisotropic):
         media = dispersion.arguments
         axis = [written_number(angle, f"{name}: axis") for angle in media.pop("axis")]
@@ -128,23 +152,7 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
     if isinstance(dispersion, AtTemperature):
         media = {"media": [written_medium(x, name, folder) for x in dispersion.media]}
         return {"model": "at-temperature", **media, **_numbers(dispersion, name, ("media",))}
-    if (model := _NAME.get(kind)) in SERIES:
-        fields_of = SERIES[model]
-        keys = _numbers(dispersion, name, fields_of)
-        for i, numbers in enumerate(zip(*(getattr(dispersion, x) for x in fields_of), strict=True), 1):
-            numbered = zip(fields_of, numbers, strict=True)
-            keys |= {f"{key}{i}": written_number(x, f"{name}: {key}{i}") for key, x in numbered}
-        if keys.keys() <= MODELS[model].keys():
-            return {"model": model, **keys}
-    if isinstance(dispersion, Oscillators):
-        eps_inf = {"eps_inf": written_number(dispersion.eps_inf, f"{name}: eps_inf")}
-        terms = [{"kind": _NAME[type(term)], **_numbers(term, name)} for term in dispersion.terms]
-        if len(terms) != 1:
-            return {"model": "oscillators", **eps_inf, "terms": terms}
-        return {"model": terms[0].pop("kind"), **eps_inf, **terms[0]}
-    if kind in KINDS.values() and model not in SERIES and getattr(dispersion, "k", 0.0) is not None:
-        return {"model": _NAME[kind], **_numbers(dispersion, name)}
-    raise UsageError(f"{name}: a recipe cannot express a medium of the kind {kind.__name__}")
+    return None
 
 
 def same(one: Any, other: Any) -> bool:

@@ -20,7 +20,7 @@ MOST_FREE = 64
 
 
 class Tie(NamedTuple):
-    """What a tied number is: the expression of labels of free numbers, and its text, None where anonymous."""
+    """Expression of labels of free numbers that a tied number follows; its text is None where anonymous."""
 
     tree: expressions.Expression
     text: str | None = None

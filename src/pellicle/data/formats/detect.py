@@ -107,11 +107,8 @@ def _workbook(content: bytes, path: str, sha256: str) -> list[Table]:
             for one in found
         ]
     if not tables:
-        raise (
-            refusals[0]
-            if refusals
-            else DataError("is a workbook without cells that can be read; save its sheet as CSV")
-        )
+        empty = DataError("is a workbook without cells that can be read; save its sheet as CSV")
+        raise next(iter(refusals), empty)
     return tables if len(tables) > 1 else [replace(tables[0], name="")]
 
 

@@ -184,10 +184,8 @@ def _ellipsometry(group: Any, name: str) -> tuple[dict[str, np.ndarray], list[st
     observables = _OBSERVABLES.get(kind.lower())
     if observables is None:
         raise DataError(f"{name} measures {kind!r}; export psi and delta in degrees, or N, C and S, as CSV")
-    holder, axis = (
-        group,
-        next((child for child in group if recognise(_named(child, "")).role == "wavelength"), ""),
-    )
+    holder = group
+    axis = next((child for child in group if recognise(_named(child, "")).role == "wavelength"), "")
     if not axis and member(group.parent, f"{_SPECTROMETER}/wavelength") is not None:
         holder, axis = member(group.parent, _SPECTROMETER), "wavelength"
     values, units = _with_units(holder, axis) if axis else (None, "")
