@@ -107,6 +107,7 @@ ELSEWHERE = (
     # take minutes, for which a test has a few films or pixels: reference, colour, mapping, rendering, brdf
     *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
     *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
+    "python benchmarks/dispersion_models.py",  # fits for minutes; dispersion: the values of each model
     "python scripts/render_blade.py",  # rendering/test_mitsuba.py: its materials
     "python scripts/make_measurements.py",  # test_measurements.py
     "python scripts/index_materials.py",  # materials/test_catalogue.py: the kept index
