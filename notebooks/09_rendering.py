@@ -29,7 +29,7 @@ import numpy as np
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor, srgb
 from pellicle.rendering import gltf as gltf_formula
-from pellicle.rendering.formula import ANGLES, appearance
+from pellicle.rendering.appearance import ANGLES, appearance
 
 jax.config.update("jax_enable_x64", True)  # double precision; JAX's default is single
 SHORT = os.environ.get("PELLICLE_SHORT") == "1"  # smaller renderings, for a quick run

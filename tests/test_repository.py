@@ -1,5 +1,6 @@
 """Files of the project agree: citation, CONTRIBUTING, metadata, the conda recipe and the workflows."""
 
+import ast
 import pkgutil
 import re
 import tomllib
@@ -64,6 +65,14 @@ def test_modules_and_identifiers_named_on_a_page_exist(page):
             assert pkgutil.resolve_name(name.replace("pl.", "pellicle.", 1)) is not None
     if page.stem != "from_other_programs":
         assert set(re.findall(r"`([A-Za-z_]\w*)(?:\([^`]*\))?`", text)) <= WORDS
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "notebooks").glob("*.py")), ids=lambda path: path.stem)
+def test_what_a_notebook_imports_exists(path):
+    """Notebooks are executed long after the quick tests; a name that has moved is found here."""
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("pellicle"):
+            exec(ast.unparse(node), {})
 
 
 def test_the_house_is_drawn_in_the_order_of_the_import_contract():
