@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import equinox as eqx
 import numpy as np
 import pytest
 import tmm
@@ -33,14 +34,22 @@ def scene(form: str = "relative", **more) -> pl.Scene:
     return pl.Scene(layers, SILICON, light=pl.Light(signal="contrast", **more), reference=reference)
 
 
-def by_tmm(form: str, angle: float, polarisation: str) -> np.ndarray:
-    def reflectance(*stack):
-        indices, depths = [1.0, *(n for n, _ in stack), SILICON], [np.inf, *(d for _, d in stack), np.inf]
-        each = [tmm.coh_tmm(polarisation, indices, depths, np.deg2rad(angle), nm)["R"] for nm in NM]
-        return np.array(each)
+OXIDISED = (OXIDE, 285.0)
 
-    sample, bare = reflectance((FILM, 3.35), (OXIDE, 285.0)), reflectance((OXIDE, 285.0))
+
+def reflectance(stack, angle: float, polarisation: str) -> np.ndarray:
+    indices, depths = [1.0, *(n for n, _ in stack), SILICON], [np.inf, *(d for _, d in stack), np.inf]
+    each = [tmm.coh_tmm(polarisation, indices, depths, np.deg2rad(angle), nm)["R"] for nm in NM]
+    return np.array(each)
+
+
+def contrast(form: str, sample: np.ndarray, bare: np.ndarray) -> np.ndarray:
     return (sample - bare) / (bare if form == "relative" else sample + bare)
+
+
+def by_tmm(form: str, angle: float, polarisation: str) -> np.ndarray:
+    stacks = [(FILM, 3.35), OXIDISED], [OXIDISED]
+    return contrast(form, *(reflectance(stack, angle, polarisation) for stack in stacks))
 
 
 @pytest.mark.parametrize(
@@ -50,6 +59,25 @@ def by_tmm(form: str, angle: float, polarisation: str) -> np.ndarray:
 def test_values_of_tmm(form, angle, polarisation):
     simulated = pl.simulate(scene(form, angle=angle, polarisation=polarisation), NM)
     np.testing.assert_allclose(simulated.values, by_tmm(form, angle, polarisation), atol=1e-12)
+
+
+def through_lens(stack, aperture: float, weight=np.ones_like) -> np.ndarray:
+    """Reflectance of unpolarised light by 8 rays, whose sines fill the pupil, each of a `weight`(cos θ)."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    sines = aperture * np.sqrt(0.5 * (nodes + 1))
+    rays = [
+        [reflectance(stack, float(np.rad2deg(np.arcsin(sine))), polarisation) for polarisation in "sp"]
+        for sine in sines
+    ]
+    return np.average(np.mean(rays, axis=1), axis=0, weights=weights * weight(np.sqrt(1 - sines**2)))
+
+
+def test_a_wide_cone():
+    instrument = pl.Instrument(numerical_aperture=0.8)
+    seen = eqx.tree_at(lambda s: s.instrument, scene("normalised"), instrument)
+    bare, flake = (through_lens(stack, 0.8) for stack in ([OXIDISED], [(FILM, 3.35), OXIDISED]))
+    # the error of the rays, 1e-6 of a fringe, divided by a reflectance of some percent
+    np.testing.assert_allclose(pl.simulate(seen, NM).values, contrast("normalised", flake, bare), atol=2e-5)
 
 
 def test_a_bare_reference_and_a_plan_within_a_tolerance():

@@ -30,13 +30,14 @@ Its name is that of the effect, with hyphens.
 def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     """The effects that a scene has, judged from its types and bounds; rows that are `given` are not judged.
 
-    An effect is off only where it is provably absent; its error bound is 0. The orders, nodes and rays of
-    an average have a bound above 0 (see `effects.averaging`).
+    A given cone of light is that of a reference too. An effect is off only where it is provably absent; its
+    error bound is 0. The orders, nodes and rays of an average have a bound above 0 (see `effects.averaging`).
     """
     known = {row.effect: row for row in given}
     rows = tuple(known.get(judge.__name__.replace("_", "-")) or judge(scene) for judge in EFFECTS)
     light = scene.light
-    reference = exact(of_reference(scene)) if light.kind.has_reference else None
+    cone = [row for row in given if row.effect == "angle-spread"]
+    reference = exact(of_reference(scene), cone) if light.kind.has_reference else None
     return Plan(rows, light.signal, light.polarisation, transmission=light.transmission, reference=reference)
 
 

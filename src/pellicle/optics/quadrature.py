@@ -72,19 +72,20 @@ def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
 
     **Source:** Richards and Wolf 1959, Proc. R. Soc. A 253, 358.
     """
+    xp = namespace(angle, sine)
     if around == 1:
         # means over all azimuths
         radius, _, weight = disc_rule(count, np.zeros(1))
-        return ConeRays(jnp.arcsin(_leading_axis(radius, sine) * sine), weight, 0.0, 0.5)
+        return ConeRays(xp.arcsin(_leading_axis(radius, sine) * sine), weight, 0.0, 0.5)
     r, phi, weight = disc_rule(count, np.pi * (np.arange(around) + 0.5) / around)
-    shape = jnp.broadcast_shapes(np.shape(angle), np.shape(sine))
+    shape = np.broadcast_shapes(np.shape(angle), np.shape(sine))
     cos_phi, sin_phi = (_leading_axis(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
     rho = _leading_axis(r, np.empty(shape)) * sine
-    along, c0, s0 = jnp.sqrt(1 - rho**2), jnp.cos(angle), jnp.sin(angle)
+    along, c0, s0 = xp.sqrt(1 - rho**2), xp.cos(angle), xp.sin(angle)
     across = (rho * sin_phi) ** 2 + (along * s0 - rho * cos_phi * c0) ** 2
-    across = across + jnp.finfo(across.dtype).tiny  # so that no root has an infinite slope
+    across = across + np.finfo(across.dtype).tiny  # so that no root has an infinite slope
     s = s0 * (along * cos_phi**2 + sin_phi**2) - rho * cos_phi * c0
-    theta = jnp.arctan2(jnp.sqrt(across), along * c0 + rho * cos_phi * s0)
+    theta = xp.arctan2(xp.sqrt(across), along * c0 + rho * cos_phi * s0)
     cosine = 2 * s * s / across - 1
     return ConeRays(theta, weight, cosine, cosine * cosine)
 
@@ -114,7 +115,9 @@ def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: in
         return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))
 
     finer = (12 * count, 1 if around == 1 else 4 * around)
-    return max(abs(fringe(s, count, around) - fringe(s, *finer)) for s in (0.5 * sine, sine))
+    # numbers of NumPy: JAX would compile each operation for each number of rays
+    sines = np.array([0.5 * sine, sine])
+    return max(abs(fringe(s, count, around) - fringe(s, *finer)) for s in sines)
 
 
 class Turn(NamedTuple):

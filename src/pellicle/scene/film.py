@@ -194,7 +194,7 @@ class Scene(eqx.Module):
                 )
             if not any(isinstance(x, Layer) and x.thickness_spread is None for x in self.layers):
                 raise ValueError("`thickness_spread` is given twice, or without a coherent layer")
-        if self.instrument.has_cone:
+        if self.instrument.has_cone and not isinstance(self.light.angle, jax.core.Tracer):
             half_angle = math.degrees(self.instrument.largest_half_angle(1.0))
             if self.light.largest_angle + half_angle > 90:
                 raise ValueError(

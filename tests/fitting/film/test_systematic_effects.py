@@ -207,3 +207,28 @@ def test_a_shift_of_wavelengths_at_the_ends_of_a_table_beside_a_free_index():
 
     np.testing.assert_allclose(as_is, reflectance(0.0), atol=1e-9)
     np.testing.assert_allclose(longer - shorter, reflectance(0.5) - reflectance(-0.5), atol=3e-5)
+
+
+def test_a_wide_cone_takes_few_rays():
+    """Beneath half of the index of mica lies an aperture of 0.8, but its index is never there."""
+    nm, depth = np.linspace(450, 750, 20), np.array([60.0])
+    of_lens = pl.Instrument(numerical_aperture=0.8)
+    light, wafer = pl.Light(signal="contrast"), pl.Reference("Si", pl.Layer("SiO2", 285.0))
+
+    def flake(thickness, index=1.58, angle=0.0):
+        shifted = pl.Instrument(numerical_aperture=0.8, angle_shift=angle) if angle else of_lens
+        layers = [pl.Layer(index, thickness), pl.Layer("SiO2", 285.0)]
+        return pl.Scene(layers, "Si", light=light, instrument=shifted, reference=wafer)
+
+    data = pl.simulate(flake(60.0), nm, noise=0.004)
+    (view,) = make(*measurements(data, flake(pl.Free(0.5, 200.0)))).views
+    scene = extended(view, depth)
+    for program in scene.programs().values():
+        for plan in (program.form.plan, program.form.plan.reference):
+            rays = plan.row("angle-spread")
+            assert rays.on
+            assert rays.count * rays.around <= 3 * view.form.plan.row("angle-spread").count
+    signals = scene.signals(view.data, depth, [(scene.index[0], 0.02), (scene.angle, 1.0)])[:, :20]
+    truth = [pl.simulate(flake(60.0, **x), nm).values for x in ({"index": 1.58 * 1.02}, {"angle": 1.0})]
+    # the error of the rays of both, 1e-6 of a fringe, divided by a reference of some percent
+    np.testing.assert_allclose(signals, truth, atol=1e-4)

@@ -18,6 +18,7 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
+from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.expressions import value
@@ -39,6 +40,8 @@ _ROUND = 16
 """Numbers of candidates are multiples of this."""
 _WIDEST = 10.0
 """Upper bound of the further numbers, in their own units."""
+_AZIMUTHS = 3
+"""Fewest azimuths of the rays of a cone, half of those of the pupil: enough for a turn by less than 1°."""
 _PLAIN, _WITH_FACES = 0, 1
 """Positions of the stack without faces of its own, and of that with all but an overlayer."""
 _ANY = 1.0
@@ -312,9 +315,21 @@ class ExtendedScene:
         scene = replace(self._plain, layers=layers)
         # the order of a pytree is that of its fields
         order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(scene)]
-        # the further numbers have wide bounds, but change little: the slices of the fit are enough
-        form = self._form.with_plan(exact(scene, [self._form.plan.row("gradient")]).static_key)
+        form = self._form.with_plan(exact(scene, _rows_of_fit(self._form.plan)).static_key)
         return Program(form, jax.tree_util.tree_map(np.asarray, anonymous(scene)), order)
+
+
+def _rows_of_fit(plan: Plan) -> list[Row]:
+    """Slices of graded layers and rays of a cone, which the fit has too.
+
+    The further numbers have wide bounds, but change little. Judged by these bounds, a cone of aperture 0.8
+    through layers of glass, half of whose index is below the aperture, takes 576 rays in place of 6.
+    """
+    rows, cone = [plan.row("gradient")], plan.row("angle-spread")
+    if cone.on:
+        counts = [own.row("angle-spread").count for own in (plan, plan.reference) if own is not None]
+        rows.append(replace(cone, count=max(counts), around=max(cone.around, _AZIMUTHS)))
+    return rows
 
 
 def _scaled(medium: Any, change: Any, shape: Any = 1.0) -> Any:
