@@ -16,6 +16,7 @@ BOOKS_OF_SEVERAL_WORDS = (
     "poly_methyl_methacrylate",
     "polyethylene_terephthalate",
     "polyvinyl_alcohol",
+    "polyvinyl_chloride",
     "stainless_steel",
 )
 SOPRA = {

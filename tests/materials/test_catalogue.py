@@ -2,12 +2,14 @@
 
 import csv
 from pathlib import Path
+from typing import get_args
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from pellicle.data.options import Family
 from pellicle.errors import DataError
 from pellicle.materials import Material, UnknownMaterial, material, names, pages
 from pellicle.materials import catalogue as catalogue_module
@@ -46,6 +48,11 @@ def test_every_name_has_a_reason_and_its_aliases_lead_to_it(name):
     assert len(entry.reason.split()) > 3
     for word in (name, name.upper(), name.lower(), *entry.aliases):
         assert material(word) is material(name)
+
+
+def test_families_of_names_are_those_that_are_declared():
+    assert {family for entry in names() for family in entry.families} == {*get_args(Family)}
+    assert all(entry.families for entry in names())
 
 
 def test_no_two_names_differ_by_case_only():

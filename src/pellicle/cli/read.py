@@ -13,7 +13,7 @@ from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
 from pellicle.cli.reading import read as read_file
 from pellicle.cli.session import BAD_DATA, GOOD, error_message, reported, start
-from pellicle.data.options import FileOptions
+from pellicle.data.options import Family, FileOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -161,13 +161,17 @@ def _write(folder: Path, measurements: list[Any], formats: list[str]) -> None:
 def materials(
     name: Annotated[str | None, Parameter(help="Name of a material, or a file of n and k.")] = None,
     *,
+    family: Annotated[Family | None, Parameter(help="List the materials of one family.")] = None,
     out: Annotated[str | None, Parameter(help="File for the figure of n and k (PNG, PDF, SVG).")] = None,
+    json: Annotated[bool, switch(OUTPUT, "Print the list as one JSON object.")] = False,
 ) -> int:
     """List the catalogue, or describe one material or its file, and draw its n and k.
 
     Of a file it says what is understood: format, columns, unit and range.
 
     Example: pellicle materials Au --out gold.png
+
+    Example: pellicle materials --family sulfide
     """
     from pellicle.materials import UnknownMaterial
     from pellicle.reporting import materials as catalogue
@@ -175,8 +179,13 @@ def materials(
     if name is None:
         if out is not None:
             raise UsageError("--out draws one material: name it, as in pellicle materials Au --out gold.png")
-        print(catalogue.table(), end="")
+        if json:
+            show(catalogue.to_json(family))
+        else:
+            print(catalogue.table(family), end="")
         return 0
+    if family is not None or json:
+        raise UsageError("--family and --json are of the list: leave the name out")
     try:
         print(catalogue.describe(name), end="")
     except UnknownMaterial as error:

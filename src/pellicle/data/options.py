@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from inspect import get_annotations
-from typing import Annotated, Any, TypeVar, dataclass_transform, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, dataclass_transform, get_type_hints
 
 from pellicle.errors import UsageError
 
@@ -20,6 +20,13 @@ SPACES = ("srgb", "rgb", "xyz", "lab")
 SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
 
+# fmt: off
+Family = Literal[
+    "metal", "semiconductor", "oxide", "fluoride", "halide", "sulfide", "selenide", "telluride", "nitride",
+    "carbide", "carbonate", "carbon", "glass", "polymer", "liquid", "gas", "pigment",
+]
+# fmt: on
+"""Family of materials; `materials/data/catalogue.toml` gives each of its names one or more of them."""
 
 _ILLUMINANTS = ("E", "A", "D50", "D55", "D65", "D75")
 

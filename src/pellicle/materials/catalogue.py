@@ -212,13 +212,16 @@ def _several(name: str, paths: list[str]) -> UnknownMaterial:
 def _unknown(name: str, hint: str, book: list[str] | None = None) -> UnknownMaterial:
     """The error for a name, with the nearest names, or those of its book where the book exists."""
     words = {index.key(word): word for word in reversed(index.known_words())}
-    cutoff = 0.7 if len(name) > 3 else 0.5
+    cutoff = 0.6 if len(name) > 3 else 0.5
     if book:
         words = {index.key(path.split("/", 1)[1]): path.split("/", 1)[1] for path in book}
         some = ", ".join(book[:6]) + (f" and {len(book) - 6} more" if len(book) > 6 else "")
         hint = f"the pages of that book are {some}"
     near = [words[match] for match in difflib.get_close_matches(index.key(name), words, 3, cutoff)]
     advice = [hint] if hint and not (book and near) else []
-    advice.append("`pellicle materials` lists the names that ship")
+    advice.append(
+        "`pellicle materials` lists the names that ship; of another material give a file of n and k, "
+        "an index such as 1.5 or 2.9+0.1j, or a model such as cauchy"
+    )
     question = f"did you mean {' or '.join(near)}? " if near else ""
     return UnknownMaterial(f"unknown material {name!r}: {question}{'; '.join(advice)}")

@@ -36,13 +36,14 @@ class Page:
 
 @dataclass(frozen=True)
 class Name:
-    """A short name, the page it stands for (None for vacuum), and why that page."""
+    """A short name, the page it stands for (None for vacuum), why that page, and families of the material."""
 
     name: str
     page: Page | None
     reason: str
     aliases: tuple[str, ...] = ()
     caution: str = ""
+    families: tuple[str, ...] = ()
 
 
 def key(name: str) -> str:
@@ -70,6 +71,7 @@ def names() -> tuple[Name, ...]:
             entry["reason"],
             tuple(entry.get("aliases", ())),
             entry.get("caution", ""),
+            tuple(entry["families"]),
         )
         for name, entry in catalogue.items()
     )
@@ -122,7 +124,7 @@ def _form(path: str) -> tuple[str, str, bool]:
     """
     book, page = path.split("/")[-2:] if path.count("/") == 2 else ("", path)
     form = next((entry.name for entry in names() if entry.page and entry.page.path == path), book)
-    return book, form if find_name(book) else book, page.endswith("-e")
+    return book, form, page.endswith("-e")
 
 
 def known_words() -> list[str]:

@@ -3,11 +3,13 @@
 import os
 import textwrap
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pellicle.materials import Material, contents, material
 from pellicle.materials.formats.detect import read_material_file
+from pellicle.reporting.json_record import strict, versions
 from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
 from pellicle.reporting.plain_text import aligned
 
@@ -27,21 +29,52 @@ def _row(name: str, page: contents.Page | None) -> tuple[str, ...]:
     return name, page.path, _range(page.low, page.high), "yes" if page.has_extinction else "no", page.short
 
 
-def table(pattern: str | None = None) -> str:
-    """List the catalogue as aligned text, one line for each short name and each other page.
+class Listed(NamedTuple):
+    """A line of the catalogue: a short name, or a page that has none; with its families and aliases."""
 
-    `pattern` keeps the lines that contain it in name, alias, page or source, in whatever case.
+    name: str
+    page: contents.Page | None
+    families: tuple[str, ...]
+    aliases: tuple[str, ...] = ()
+    caution: str = ""
+
+
+def listed(family: str | None = None) -> list[Listed]:
+    """Return short names and other pages of the catalogue by name, or those of a family.
+
+    A page has the families of the first short name of its book.
     """
-    default = {entry.page for entry in contents.names()}
-    entries = [(_row(e.name, e.page), e.aliases) for e in contents.names()]
-    entries += [(_row(f"{p.book}/{p.page}", p), ()) for p in contents.pages() if p not in default]
-    entries.sort(key=lambda entry: entry[0][0].lower())
-    if pattern:
-        wanted = pattern.lower()
-        entries = [e for e in entries if any(wanted in text.lower() for text in (*e[0], *e[1]))]
-        if not entries:
-            return f"nothing in the catalogue matches {pattern!r}\n"
-    return "\n".join([*aligned([HEADINGS, *(row for row, _ in entries)]), ""])
+    entries = [Listed(e.name, e.page, e.families, e.aliases, e.caution) for e in contents.names()]
+    of_page, of_book = {e.page for e in entries}, {}
+    for entry in reversed(entries):
+        of_book[entry.page.book if entry.page else ""] = entry.families
+    others = (page for page in contents.pages() if page not in of_page)
+    entries += [Listed(f"{page.book}/{page.page}", page, of_book[page.book]) for page in others]
+    entries.sort(key=lambda entry: entry.name.lower())
+    return [entry for entry in entries if family is None or family in entry.families]
+
+
+def table(family: str | None = None) -> str:
+    """List the catalogue, or a family of it, as aligned text: one line for each name."""
+    return "\n".join([*aligned([HEADINGS, *(_row(e.name, e.page) for e in listed(family))]), ""])
+
+
+def to_json(family: str | None = None) -> dict[str, Any]:
+    """List the catalogue, or a family of it, as a JSON object; null for a range without ends."""
+    rows = [
+        {
+            "name": entry.name,
+            "families": entry.families,
+            "aliases": entry.aliases,
+            "page": entry.page.path if entry.page else None,
+            "range_nm": [entry.page.low, entry.page.high] if entry.page else None,
+            "has_k": entry.page is None or entry.page.has_extinction,
+            "citation": entry.page.citation if entry.page else "",
+            "caution": entry.caution,
+        }
+        for entry in listed(family)
+    ]
+    return strict({"schema": "pellicle.materials/1", "materials": rows, "versions": versions()})
 
 
 def describe(name: str) -> str:
@@ -67,6 +100,7 @@ def describe(name: str) -> str:
         ("range", "all wavelengths" if high == np.inf else f"{_range(low, high)} nm"),
         ("k data", "yes" if source.has_extinction else "no: taken as transparent"),
         ("index", index),
+        ("family", ", ".join(entry.families) if entry else ""),
         ("caution", source.caution),
         ("why" if entry else "sample", "" if is_file else source.note),
         ("reference", source.citation),
