@@ -72,12 +72,26 @@ def through_lens(stack, aperture: float, weight=np.ones_like) -> np.ndarray:
     return np.average(np.mean(rays, axis=1), axis=0, weights=weights * weight(np.sqrt(1 - sines**2)))
 
 
-def test_a_wide_cone():
-    instrument = pl.Instrument(numerical_aperture=0.8)
+@pytest.mark.parametrize(("factor", "stray"), [(None, None), (0.7, 0.03)])
+def test_a_wide_cone_with_apodisation_and_stray_light(factor, stray):
+    """A lens whose pupil is lit by exp(−2Gρ²), as Zemax calls it, and 3 % of the light on both samples."""
+    instrument = pl.Instrument(numerical_aperture=0.8, apodisation=factor, stray_light=stray)
     seen = eqx.tree_at(lambda s: s.instrument, scene("normalised"), instrument)
-    bare, flake = (through_lens(stack, 0.8) for stack in ([OXIDISED], [(FILM, 3.35), OXIDISED]))
+
+    def lit(cosine):
+        return np.exp(-2 * (factor or 0.0) * (1 - cosine**2) / 0.8**2)
+
+    both = (through_lens(stack, 0.8, lit) for stack in ([(FILM, 3.35), OXIDISED], [OXIDISED]))
+    truth = contrast("normalised", *(power + (stray or 0.0) for power in both))
     # the error of the rays, 1e-6 of a fringe, divided by a reflectance of some percent
-    np.testing.assert_allclose(pl.simulate(seen, NM).values, contrast("normalised", flake, bare), atol=2e-5)
+    np.testing.assert_allclose(pl.simulate(seen, NM).values, truth, atol=2e-5)
+
+
+def test_apodisation_and_stray_light_are_checked(refuses):
+    refuses(ValueError, "`apodisation` is that of a cone", pl.Instrument, apodisation=0.5)
+    refuses(ValueError, "`stray_light` is a fraction", pl.Instrument, stray_light=1.0)
+    of_power = pl.Scene(pl.Layer(1.46, 100.0), "Si", instrument=pl.Instrument(stray_light=0.01))
+    refuses(UsageError, "for R give `offset`", pl.simulate, of_power, NM)
 
 
 def test_a_bare_reference_and_a_plan_within_a_tolerance():

@@ -199,7 +199,8 @@ def _rays(scene: Scene) -> tuple[int, int, float]:
 
     def rays(count: int) -> tuple[int, int, float]:
         around = 1 if normal_incidence(scene) else count
-        return count, around, quadrature.cone_error(phase, float(axis), float(sine), count, around)
+        pupil = count, around, upper(scene.instrument.apodisation)
+        return count, around, quadrature.cone_error(phase, float(axis), float(sine), *pupil)
 
     tried = map(rays, RAYS)
     return next((result for result in tried if result[2] < CONE_ERROR), rays(RAYS[-1]))
@@ -233,7 +234,8 @@ def _lens_rays(scene: Scene) -> tuple[int, int, float]:
     columns = (
         4 if light.ellipsometric else 1 if (light.signal, light.polarisation) == ("R", "unpolarised") else 2
     )
-    return chosen_rays(films, np.deg2rad(sorted(degrees)), sine, columns, CONE_ERROR)
+    pupil = sine, columns, CONE_ERROR, upper(scene.instrument.apodisation)
+    return chosen_rays(films, np.deg2rad(sorted(degrees)), *pupil)
 
 
 def _extreme_indices(medium: Anisotropic, nm: np.ndarray) -> set[tuple[float, float]]:

@@ -8,6 +8,7 @@ import jax
 
 from pellicle.effects import averaging, gradient, presence, removal
 from pellicle.effects.differences import Evaluation, Savings, design, measured
+from pellicle.errors import UsageError
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.scene.film import Scene, of_reference
@@ -36,6 +37,11 @@ def exact(scene: Scene, given: Sequence[Row] = ()) -> Plan:
     known = {row.effect: row for row in given}
     rows = tuple(known.get(judge.__name__.replace("_", "-")) or judge(scene) for judge in EFFECTS)
     light = scene.light
+    if scene.instrument.stray_light is not None and not light.kind.has_reference:
+        raise UsageError(
+            "`stray_light` is that of sample and reference alike, for the signal contrast; for"
+            f" {light.signal} give `offset`"
+        )
     cone = [row for row in given if row.effect == "angle-spread"]
     reference = exact(of_reference(scene), cone) if light.kind.has_reference else None
     return Plan(rows, light.signal, light.polarisation, transmission=light.transmission, reference=reference)

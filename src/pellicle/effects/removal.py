@@ -257,11 +257,10 @@ def in_single_precision(scene: Any) -> Any:
     return jax.tree_util.tree_map(single, scene, is_leaf=is_free)
 
 
+_CONE = "angle_spread", "numerical_aperture", "apodisation"
 _REMOVALS: dict[str, Callable[[Scene, FilmRemoval], Scene]] = {
     # the axis of the light's cone for all its rays
-    "angle-spread": lambda scene, _: _with(
-        scene, instrument=_with(scene.instrument, angle_spread=None, numerical_aperture=None)
-    ),
+    "angle-spread": lambda scene, _: _with(scene, instrument=_with(scene.instrument, **dict.fromkeys(_CONE))),
     "coherence": _coherence,
     "back-face": _back_face,
     "opaque": _opaque,

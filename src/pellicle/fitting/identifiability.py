@@ -33,6 +33,7 @@ STEPS = {
     "fraction": 0.01,
     "scale": 0.01,  # of a signal that is 1
     "offset": 0.001,
+    "stray_light": 0.001,
 }
 """Meaningful step of a parameter, by the last part of its name; for others 1 % of their range."""
 _RELATIVE = ("exponent", "exponent_reflection", "exponent_transmission", "specular", "diffuse")

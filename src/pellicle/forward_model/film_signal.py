@@ -88,7 +88,8 @@ def over_cone(
 
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
-        rays = cone_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+        pupil = cone_sine(scene), count, around, scene.instrument.apodisation
+        rays = cone_rays(jnp.deg2rad(scene.light.angle), *pupil)
 
         def at(angle, cosine, square):
             inclined = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
@@ -112,7 +113,8 @@ def over_lens(of_ray: Callable[[Turn], Intensities], count: int, around: int) ->
 
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
-        rays = lens_rays(jnp.deg2rad(scene.light.angle), cone_sine(scene), count, around)
+        pupil = cone_sine(scene), count, around, scene.instrument.apodisation
+        rays = lens_rays(jnp.deg2rad(scene.light.angle), *pupil)
 
         def of_ring(ring: Any):
             angle, azimuth, *turn = ring
@@ -243,10 +245,12 @@ def build(plan: Plan) -> Simulate:
 
 
 def _against(simulate: Simulate, reference: Simulate) -> Simulate:
-    """The contrast of a scene against its reference."""
+    """The contrast of a scene against its reference, with the stray light of both."""
 
     def contrast(scene: Scene) -> Any:
-        return scene.light.kind.seen_in(scene, False).against(simulate(scene), reference(of_reference(scene)))
+        powers, stray = (simulate(scene), reference(of_reference(scene))), scene.instrument.stray_light
+        seen = powers if stray is None else (power + stray for power in powers)
+        return scene.light.kind.seen_in(scene, False).against(*seen)
 
     return contrast
 

@@ -53,31 +53,42 @@ def _legendre_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def disc_rule(count: int, azimuths: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return radius, azimuth and weight of points that fill the unit disc, on `count` rings."""
+def disc_rule(
+    count: int, azimuths: np.ndarray, apodisation: Any = None
+) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Return radius, azimuth and weight of points that fill the unit disc, on `count` rings.
+
+    With an `apodisation` G the weights fall as exp(−2Gρ²) with the radius ρ; their sum stays 1.
+    """
     nodes, weights = _legendre_rule(count)
+    if apodisation is not None:
+        # relative to the centre, not to divide by zero at any G
+        weights = weights * namespace(apodisation).exp(-apodisation * (nodes - nodes[0]))
+        weights = 2 * weights / weights.sum()
     radius, azimuth = np.meshgrid(np.sqrt(0.5 * (nodes + 1)), azimuths, indexing="ij")
-    return radius.ravel(), azimuth.ravel(), np.repeat(0.5 * weights, len(azimuths)) / len(azimuths)
+    xp = namespace(weights)
+    return radius.ravel(), azimuth.ravel(), xp.repeat(0.5 * weights, len(azimuths)) / len(azimuths)
 
 
-def cone_rays(angle: Any, sine: Any, count: int, around: int) -> ConeRays:
-    """Return rays that fill a pupil evenly, as an aplanatic lens does, over half the azimuths.
+def cone_rays(angle: Any, sine: Any, count: int, around: int, apodisation: Any = None) -> ConeRays:
+    """Return rays that fill a pupil as an aplanatic lens does, over half the azimuths.
 
     The other half is the mirror image. The lens turns each ray about the axis perpendicular to its
     meridional plane, and turns the polarisation with it.
 
     **Arguments:** `angle` of the axis (radians) and `sine` of the half angle broadcast; rays come first.
     `count` is the number of rings, `around` the number of azimuths: 1 where the axis is the surface's
-    normal, for then all azimuths are equal.
+    normal, for then all azimuths are equal. Without `apodisation` the pupil is filled
+    evenly: see `disc_rule`.
 
     **Source:** Richards and Wolf 1959, Proc. R. Soc. A 253, 358.
     """
     xp = namespace(angle, sine)
     if around == 1:
         # means over all azimuths
-        radius, _, weight = disc_rule(count, np.zeros(1))
+        radius, _, weight = disc_rule(count, np.zeros(1), apodisation)
         return ConeRays(xp.arcsin(_leading_axis(radius, sine) * sine), weight, 0.0, 0.5)
-    r, phi, weight = disc_rule(count, np.pi * (np.arange(around) + 0.5) / around)
+    r, phi, weight = disc_rule(count, np.pi * (np.arange(around) + 0.5) / around, apodisation)
     shape = np.broadcast_shapes(np.shape(angle), np.shape(sine))
     cos_phi, sin_phi = (_leading_axis(x, np.empty(shape)) for x in (np.cos(phi), np.sin(phi)))
     rho = _leading_axis(r, np.empty(shape)) * sine
@@ -103,7 +114,9 @@ def normal_error(deviation: float, count: int) -> float:
     return float(np.max(np.abs(average - np.exp(-0.5 * sigma**2))))
 
 
-def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int) -> float:
+def cone_error(
+    phase: Callable[[Any], Any], angle: float, sine: float, count: int, around: int, apodisation: float = 0.0
+) -> float:
     """Return the error of a fringe averaged over a cone, against twelve times as many rays.
 
     **Arguments:** `phase` of the fringe as a function of the angle of incidence (radians), otherwise as
@@ -111,7 +124,7 @@ def cone_error(phase: Callable[[Any], Any], angle: float, sine: float, count: in
     """
 
     def fringe(sine: float, count: int, around: int) -> complex:
-        rays = cone_rays(angle, sine, count, around)
+        rays = cone_rays(angle, sine, count, around, np.float64(apodisation))
         return complex(np.sum(rays.weight * np.exp(1j * np.asarray(phase(np.asarray(rays.angle))))))
 
     finer = (12 * count, 1 if around == 1 else 4 * around)
@@ -136,8 +149,8 @@ class LensRays(NamedTuple):
     weight: np.ndarray
 
 
-def lens_rays(angle: Any, sine: Any, count: int, around: int) -> LensRays:
-    """Return rays that fill a pupil evenly, over all azimuths.
+def lens_rays(angle: Any, sine: Any, count: int, around: int, apodisation: Any = None) -> LensRays:
+    """Return rays that fill a pupil, evenly without `apodisation`, over all azimuths.
 
     `around` is best odd: of rays at opposite azimuths, which may be equal by symmetry or reciprocity, only
     one is then computed. Likewise no ray has its mirror image in the plane of incidence.
@@ -146,7 +159,8 @@ def lens_rays(angle: Any, sine: Any, count: int, around: int) -> LensRays:
     of rings, `around` the number of azimuths.
     """
     xp = namespace(angle, sine)
-    radius, phi, weight = disc_rule(count, 2 * np.pi * (np.arange(around) + 0.25) / around)
+    azimuths = 2 * np.pi * (np.arange(around) + 0.25) / around
+    radius, phi, weight = disc_rule(count, azimuths, apodisation)
     new_axis = (-1, *[1] * np.ndim(angle + sine))
     cos_phi, sin_phi, r = (x.reshape(new_axis) for x in (np.cos(phi), np.sin(phi), radius))
     rho = r * sine
@@ -252,18 +266,23 @@ _TO_STOKES = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0
 
 
 def chosen_rays(
-    films: Sequence[Film], angles: Iterable[float], sine: float, columns: int, tolerance: float
+    films: Sequence[Film],
+    angles: Iterable[float],
+    sine: float,
+    columns: int,
+    tolerance: float,
+    apodisation: float = 0.0,
 ) -> tuple[int, int, float]:
     """Return the fewest rings and azimuths for these films, and their largest error.
 
     **Arguments:** `angles` of the axis of the light (radians), `sine` of the largest half angle; `columns` of
     the Mueller matrix that matter: 1 or 2 of its first row, for unpolarised or polarised light, or all 4,
-    divided by the intensity; `tolerance` of one element.
+    divided by the intensity; `tolerance` of one element; the largest `apodisation`.
     """
     cones = list(itertools.product(angles, (0.5 * sine, sine)))
 
     def means(count: int, around: int) -> np.ndarray:
-        rays = [lens_rays(*cone, count, around) for cone in cones]
+        rays = [lens_rays(*cone, count, around, np.float64(apodisation)) for cone in cones]
         every = np.stack([mean_mueller(f, r, lower) for f in films for r in rays for lower in (1.0, 1j)])
         return every / every[:, :1, :1] if columns == 4 else every[:, 0, :columns]
 

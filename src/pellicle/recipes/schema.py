@@ -112,6 +112,8 @@ class InstrumentTable(_uncertainties(name for name in _EVERY if name not in _OF_
     thickness_spread: Number | None = None
     angle_spread: Number | None = None
     numerical_aperture: Number | None = None
+    apodisation: Number | None = None
+    stray_light: Number | None = None
     wavelength_shift: Number | None = None
     angle_shift: Number | None = None
 

@@ -265,7 +265,7 @@ def of_reference(scene: Scene) -> Scene:
             f"the signal {light.signal} needs a reference: give the scene `reference=pl.Reference(...)`, or a"
             " recipe [reference] with its substrate"
         )
-    instrument = {"scale": 1.0, "offset": 0.0, "thickness_spread": None}
+    instrument = {"scale": 1.0, "offset": 0.0, "thickness_spread": None, "stray_light": None}
     return Scene(
         reference.layers or Layer(1.0, 0.0),
         reference.substrate,

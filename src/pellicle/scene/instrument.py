@@ -50,6 +50,10 @@ class Instrument(eqx.Module):
     - `bandwidth`: full width at half maximum in nm.
     - `thickness_spread`: standard deviation of the only layer's thickness over the spot in nm.
     - `angle_spread`: half angle of the cone of light in degrees; or `numerical_aperture`, n₀ times its sine.
+    - `apodisation`: factor G of a Gaussian apodisation of the cone: the light in the pupil falls as
+      exp(−2Gρ²) towards its edge, ρ = 1. Without it the pupil is evenly filled.
+    - `stray_light`: light that reaches the detector beside that of the sample and as much beside that of the
+      reference of a contrast, as a fraction of the incident light.
     - `wavelength_shift`: true wavelength minus the instrument's, in nm.
     - `angle_shift`: true angle of incidence minus the instrument's, in degrees.
 
@@ -67,17 +71,26 @@ class Instrument(eqx.Module):
     thickness_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     angle_spread: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     numerical_aperture: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    apodisation: Quantity | None = eqx.field(converter=none_if_zero, default=None)
+    stray_light: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     wavelength_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
     angle_shift: Quantity | None = eqx.field(converter=none_if_zero, default=None)
 
     def __check_init__(self):
         units = {"bandwidth": "nm", "thickness_spread": "nm", "angle_spread": "degrees"}
-        for name, unit in (units | {"numerical_aperture": ""}).items():
+        units |= dict.fromkeys(("numerical_aperture", "apodisation", "stray_light"), "")
+        for name, unit in units.items():
             check_not_negative(name, getattr(self, name), unit)
         if self.angle_spread is not None and self.numerical_aperture is not None:
             raise ValueError("give `angle_spread` or `numerical_aperture`, not both: each describes the cone")
         if _upper(self.angle_spread) >= 90:
             raise ValueError("`angle_spread` is a half angle: it must be below 90 degrees")
+        if self.apodisation is not None and not self.has_cone:
+            raise ValueError(
+                "`apodisation` is that of a cone of light: give `numerical_aperture` or `angle_spread` too"
+            )
+        if isinstance(self.stray_light, int | float) and self.stray_light >= 1:
+            raise ValueError("`stray_light` is a fraction of the incident light: it must be below 1")
 
     @property
     def has_cone(self) -> bool:

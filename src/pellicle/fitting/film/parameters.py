@@ -27,9 +27,10 @@ from pellicle.scene.names import WIDTHS, full_name, layer_prefix, location_of, u
 from pellicle.scene.ties import tied_leaves
 from pellicle.scene.uncertainty import Uncertainty
 
-_NATURAL_ONE = ("back_collected",)
+_NATURAL_ONE = ("back_collected", "stray_light")
 _NATURAL_ZERO = (
-    *("k", "k0", "A_uv", "A_ir", "fraction", "top", "bottom", "values", "offset", "numerical_aperture"),
+    *("k", "k0", "A_uv", "A_ir", "fraction", "top", "bottom", "values", "offset"),
+    *("numerical_aperture", "apodisation"),
     *_NATURAL_ONE,
     *WIDTHS,
 )
