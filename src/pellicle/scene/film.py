@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, final
 import equinox as eqx
 import jax
 import numpy as np
+from jax.core import Tracer
 
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
@@ -194,7 +195,7 @@ class Scene(eqx.Module):
                 )
             if not any(isinstance(x, Layer) and x.thickness_spread is None for x in self.layers):
                 raise ValueError("`thickness_spread` is given twice, or without a coherent layer")
-        if self.instrument.has_cone and not isinstance(self.light.angle, jax.core.Tracer):
+        if self.instrument.has_cone and not isinstance(self.light.angle, Tracer):
             half_angle = math.degrees(self.instrument.largest_half_angle(1.0))
             if self.light.largest_angle + half_angle > 90:
                 raise ValueError(
