@@ -6,7 +6,8 @@ the minimum for any film formula: one exponential, and one sine and cosine by th
 every point, written to one array as large as pellicle's. Competitors take turns in each round; the
 table gives medians, and the median of each round's ratio to the floor of the same precision.
 Compilation is timed separately. A second table, the only one with `--device gpu`, has points per second
-of pellicle by wall time, beside the limit by the bandwidth of the device's memory. Packages take part if
+of pellicle by wall time, beside the limit by the bandwidth of the device's memory. A third compares a Bragg
+mirror of 200 layers at 401 wavelengths with a film times 200, and with tmm, in turns. Packages take part if
 they are installed (`pip install tmm_fast tmmax tmm-faster`); slow ones compute fewer points.
 """
 
@@ -30,6 +31,7 @@ import device as on_device
 import jax
 import jax.numpy as jnp
 import numpy as np
+import tmm
 from film_packages import (
     ABSORBING,
     ANGLE,
@@ -42,7 +44,10 @@ from film_packages import (
 )
 
 import pellicle as pl
+from pellicle.effects.film_plan import exact
+from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.optics.special import sincos
+from pellicle.scene.film import with_wavelength
 
 jax.config.update("jax_enable_x64", True)
 
@@ -199,6 +204,44 @@ def _table(times: dict[str, list[float]], first: dict[str, float], floors: dict[
         print(f"{name:<30}{each * 1e9:>14.1f}{1 / each:>16.3g}{ratio:>10.2f}{first[name]:>14.2f}")
 
 
+def mirror_table(rounds: int) -> None:
+    """Processor time of R of a mirror of 100 pairs, with and without a drift, beside a film times 200."""
+    pair, size = ((2.3, 60.0), (1.46, 94.0)), WAVELENGTH.size
+
+    def simulated(*layers: Any) -> Callable[[], Any]:
+        scene = tabulated(with_wavelength(pl.Scene(list(layers), SUBSTRATE), WAVELENGTH))
+        program = jax.jit(build(exact(scene).static_key))
+        return lambda: program(scene).block_until_ready()
+
+    def by_tmm_stack() -> np.ndarray:
+        indices, depths = zip((1.0, np.inf), *100 * pair, (SUBSTRATE, np.inf), strict=True)
+        return np.array([tmm.coh_tmm("s", indices, depths, 0.0, nm)["R"] for nm in WAVELENGTH[::20]])
+
+    plain, drifting = (
+        pl.Group([pl.Layer(n, d, drift=drift) for n, d in pair], 100) for drift in (None, 1e-9)
+    )
+    runs = {
+        "film": (simulated(pl.Layer(*pair[0])), 200.0),
+        "mirror of 200 layers": (simulated(plain), 1.0),
+        "mirror of 200 layers, drifting": (simulated(drifting), 1.0),
+        "tmm": (by_tmm_stack, size / WAVELENGTH[::20].size),
+    }
+    truth = by_tmm_stack()
+    for name in (*runs,)[1:3]:
+        assert np.max(np.abs(np.asarray(runs[name][0]())[::20] - truth)) < 1e-6, name
+    times: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(rounds):
+        for name, (run, times_as_much) in runs.items():
+            run()
+            began = time.process_time()
+            run()
+            times[name].append((time.process_time() - began) * times_as_much)
+    print(f"{'R of 200 layers':<32}{'ms':>10}{'× film × 200':>14}")
+    for name, each in times.items():
+        ratio = statistics.median(a / b for a, b in zip(each, times["film"], strict=True))
+        print(f"{name + ' × 200' * (name == 'film'):<32}{statistics.median(each) * 1e3:>10.3g}{ratio:>14.3g}")
+
+
 def device_table(device: Any, thicknesses: int) -> None:
     """Points per second of pellicle on a device, beside the limit by the bandwidth of its memory.
 
@@ -251,5 +294,7 @@ if __name__ == "__main__":
     where = on_device.chosen(given.device)
     if given.device == "cpu":
         main(given.rounds, given.thicknesses or 1000)
+        print()
+        mirror_table(given.rounds)
         print()
     device_table(where, given.thicknesses or (1000 if given.device == "cpu" else 100_000))

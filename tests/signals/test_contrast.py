@@ -87,6 +87,25 @@ def test_a_wide_cone_with_apodisation_and_stray_light(factor, stray):
     np.testing.assert_allclose(pl.simulate(seen, NM).values, truth, atol=2e-5)
 
 
+def test_a_group_in_the_reference_at_two_angles():
+    """A mirror of ten pairs, bare and beneath a film, at 0 and 45°."""
+    pair = [(2.3, 60.0), (OXIDE, 94.0)]
+    mirror = pl.Group([pl.Layer(n, d) for n, d in pair], 10)
+    nm, angles = np.tile(NM[::4], 2), np.repeat([0.0, 45.0], 16)
+    light = pl.Light(nm, angle=angles, signal="contrast", polarisation="s")
+    bare = pl.Reference(SILICON, mirror, "normalised")
+    film = pl.Scene([pl.Layer(FILM, 20.0), mirror], SILICON, light=light, reference=bare)
+
+    def at(angle):
+        return (reflectance(stack, angle, "s")[::4] for stack in ([(FILM, 20.0), *10 * pair], 10 * pair))
+
+    truth = np.concatenate([contrast("normalised", *at(angle)) for angle in (0.0, 45.0)])
+    simulated = pl.simulate(film, nm)
+    np.testing.assert_allclose(simulated.values, truth, atol=1e-9)
+    noisy = pl.simulate(film, nm, noise=0.01, seed=3)
+    assert 0.005 < np.std(noisy.values - simulated.values) < 0.02
+
+
 def test_apodisation_and_stray_light_are_checked(refuses):
     refuses(ValueError, "`apodisation` is that of a cone", pl.Instrument, apodisation=0.5)
     refuses(ValueError, "`stray_light` is a fraction", pl.Instrument, stray_light=1.0)
