@@ -99,7 +99,8 @@ def test_a_group_in_the_reference_at_two_angles():
     def at(angle):
         return (reflectance(stack, angle, "s")[::4] for stack in ([(FILM, 20.0), *10 * pair], 10 * pair))
 
-    truth = np.concatenate([contrast("normalised", *at(angle)) for angle in (0.0, 45.0)])
+    # a spectrum is in the order of the wavelengths, then of the angles
+    truth = np.stack([contrast("normalised", *at(angle)) for angle in (0.0, 45.0)], axis=1).ravel()
     simulated = pl.simulate(film, nm)
     np.testing.assert_allclose(simulated.values, truth, atol=1e-9)
     noisy = pl.simulate(film, nm, noise=0.01, seed=3)
