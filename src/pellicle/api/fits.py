@@ -25,6 +25,7 @@ def fit(
     data: Measurement,
     scene: Scene | Surface | Sequence[Scene | Surface],
     *,
+    shared: Sequence[str] | None = None,
     tolerance: float = 0.0,
     loss: str = "least-squares",
     residual: str | None = None,
@@ -39,6 +40,10 @@ def fit(
     - `scene`: `Scene`, or a list with one for each spectrum; `Surface` for `BrdfSamples`. Signal, angle and
       polarisation come from the data. For a list of both kinds it is a list too, of scenes and the surface:
       free numbers of one name, such as `thickness`, are then one.
+    - `shared`: names of free numbers that the scenes have in common, as `["film.A", "film.B"]`: each scene is
+      then that of a sample, with layers and a substrate of its own. Numbers of one sample alone have its name
+      in front, `thin.film.thickness`: the scene's `sample`, else the stem of the file. Scenes with the same
+      `sample` are of one sample.
     - `tolerance`: leave out effects that change the signal by less (see `pellicle.plan`); where the best fit
       turns out to be off by more, the fit is done again with every effect.
     - `loss`: "least-squares", or "huber" or "student-t" against outliers.
@@ -49,8 +54,9 @@ def fit(
     **Returns:** `Fit`: parameters with errors, a status with a verdict, every rival minimum. `print(fit)` is
     short; `fit.report()` is the full report, `fit.plot()` the figure, `fit.save(folder)` writes both.
 
-    **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample,
-    where an uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
+    **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample and
+    nothing is `shared`, for a shared name that is free in fewer than two samples or has two bounds, where an
+    uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
     ValueError where a material has no data at a wavelength.
 
     ```python
@@ -65,12 +71,15 @@ def fit(
     check_measurement(data)
     check_scene(scene, several=True)
     both: Any = data, scene
+    if joint.of_both_kinds(scene) or isinstance(scene, Surface):
+        refuse("several scenes", shared=shared)
     if joint.of_both_kinds(scene):
         return joint.fitted(both[0], both[1], tolerance, progress, loss, residual)[0]
     if isinstance(scene, Surface):
         return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)
-    return fit_spectra(measured(OF_A_FILM, data), both[1], tolerance=tolerance, loss=loss, progress=progress)
+    films = measured(OF_A_FILM, data)
+    return fit_spectra(films, both[1], shared=shared, tolerance=tolerance, loss=loss, progress=progress)
 
 
 def sample(
@@ -80,6 +89,7 @@ def sample(
     walkers: int | None = None,
     steps: int = STEPS,
     seed: int = 0,
+    shared: Sequence[str] | None = None,
     chain: str | os.PathLike[str] | None = None,
     tolerance: float = 0.0,
     residual: str | None = None,
@@ -92,7 +102,7 @@ def sample(
 
     **Arguments:**
 
-    - `data`, `scene`, `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
+    - `data`, `scene`, `shared`, `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
     - `walkers`: number of walkers, two for each free parameter at least.
     - `steps`: most steps; the chain ends before that where it is 50 autocorrelation times long and passes
       its checks. 20000 by default.
@@ -109,7 +119,9 @@ def sample(
     check_scene(scene, several=True)
     if not isinstance(scene, Surface):
         refuse("a Scene", residual=residual)
-    subject = subject_of(data, scene, tolerance, residual, progress)
+    if joint.of_both_kinds(scene) or isinstance(scene, Surface):
+        refuse("several scenes", shared=shared)
+    subject = subject_of(data, scene, tolerance, residual, progress, shared)
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
 

@@ -59,7 +59,8 @@ class Inputs:
 
     `repeats` is true where the files are repeated measurements of one spot. `described` is what the scene was
     built from, for the record: the recipe, or the flags. `written` are the options of a recipe that repeats
-    the fits; `base` is its scene and `tables` are those of its `[[data.file]]`, where the recipe has them.
+    the fits; `base` is its scene and `tables` are those of its `[[data.file]]`, where the recipe has them;
+    `samples` returns the text of a recipe of several samples with these options in a folder.
     """
 
     files: list[Input]
@@ -71,6 +72,7 @@ class Inputs:
     written: dict[str, Any] = field(default_factory=dict)
     base: Scene | None = None
     tables: list[dict[str, Any]] = field(default_factory=list)
+    samples: Callable[[dict[str, Any], Path], str] | None = None
 
     @property
     def loss(self) -> str:
@@ -91,6 +93,8 @@ class Inputs:
         """Text of a recipe in `folder` that repeats the fit of a group. Raises UsageError where none can."""
         from pellicle.recipes.write import recipe_text
 
+        if self.samples is not None:
+            return self.samples(self.fitting.given(), folder)
         if not all(file.file for file in files):
             raise UsageError("a recipe cannot name one of several sweeps")
         paths = list(dict.fromkeys(file.file for file in files))
@@ -194,7 +198,8 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
 
     _check_film(reading)
     if recipe.each and files:
-        raise UsageError(f"{recipe.path}: [[data.file]] and files on the command line exclude each other")
+        own = "[[sample]]" if recipe.tables.sample else "[[data.file]]"
+        raise UsageError(f"{recipe.path}: {own} and files on the command line exclude each other")
     files = _files(files, recipe)
     recipes = recipe.each or [recipe] * len(files)
     options = [FileOptions.of(one.reading | reading.given()) for one in recipes]
@@ -203,9 +208,12 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
     for file, how, one in zip(files, options, recipes, strict=True):
         scene = one.scene(fitted=True)
         scene = eqx.tree_at(lambda s: s.light, scene, light(how, scene.light.azimuth))
-        own_scale = any(table.rescales for table in one.tables.data.file)
+        own_scale = any(x.rescales for x in (*one.tables.data.file, one.sample) if x is not None)
         inputs += _film_inputs(file, scene, how, own_scale)
     data = recipe.tables.data
+    if recipe.tables.sample:
+        written = partial(recipe.kept, reading.given())
+        return Inputs(inputs, True, FitOptions.of(data.given()), samples=written)
     result = Inputs(inputs, data.joint, FitOptions.of(data.given()), repeats=data.repeats)
     if not recipe.each:
         return replace(result, written=_without_light(recipe.reading | reading.given()))

@@ -214,7 +214,15 @@ class Problem(NamedTuple):
     @property
     def thickness_axis(self) -> int | None:
         """Position of the thickness that a search scans: the one with the widest bounds; None without any."""
-        spans = {i: p.upper - p.lower for i, p in enumerate(self.parameters) if p.key == "thickness"}
+        return self._deepest(range(len(self.parameters)))
+
+    def depth_of(self, view: View) -> int | None:
+        """Position of the thickness with the widest bounds that a view depends on; None without any."""
+        return self._deepest(view.takes)
+
+    def _deepest(self, positions: Sequence[int]) -> int | None:
+        every = ((i, self.parameters[i]) for i in positions)
+        spans = {i: p.upper - p.lower for i, p in every if p.key == "thickness"}
         return max(spans, key=lambda i: spans[i]) if spans else None
 
     @property

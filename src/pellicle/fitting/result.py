@@ -23,9 +23,10 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.curves import NORMAL, BrdfCurve, ColourCurve, Curve, Index, at_each_wavelength
 from pellicle.fitting.noise import student
-from pellicle.fitting.reported_layer import reported_medium
+from pellicle.fitting.reported_layer import reported_layer, reported_medium
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
+from pellicle.scene.names import layer_name
 from pellicle.scene.surface import Surface
 
 if TYPE_CHECKING:
@@ -339,6 +340,16 @@ class Fit(PlotMixin):
         return self._only.plan
 
     @property
+    def one_layer(self) -> bool:
+        """True where all data are of one reported medium: False for samples with layers of several."""
+        scenes = [x for x in self.scene if isinstance(x, Scene)] if isinstance(self.scene, tuple) else []
+        shown = [(scene.sample, reported_layer(scene), scene) for scene in scenes if scene.sample]
+        owners = {"substrate" if i is None else layer_name(s, i) for _, i, s in shown}
+        return not shown or (
+            len(owners) == 1 and not any(sample.of(owner) for sample, *_ in shown for owner in owners)
+        )
+
+    @property
     def index(self) -> Index:
         """The layer's n and k at every wavelength of any spectrum or sensor, each once."""
         return at_each_wavelength(self._film_curves)
@@ -348,7 +359,7 @@ class Fit(PlotMixin):
         """The layer's n and k at the knots of a spline, else at ends, quarters and middle of the wavelengths;
         None where they are known, and of a birefringent layer."""
         scene = self.scene[0] if isinstance(self.scene, tuple) else self.scene
-        if not isinstance(scene, Scene) or self.principal_indices:
+        if not isinstance(scene, Scene) or self.principal_indices or not self.one_layer:
             return None
         index = self.index
         if not np.any(index.n_stderr > 0) and not np.any(index.k_stderr > 0):

@@ -22,6 +22,7 @@ from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError, did_you_mean
 from pellicle.recipes import parts, schema
 from pellicle.recipes.media import medium, number
+from pellicle.recipes.samples import of_sample, scene_table
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
 from pellicle.scene.surface import Surface, SurfaceUncertainty
@@ -137,17 +138,29 @@ class FilmRecipe:
 
     path: str
     tables: schema.RecipeTable
+    sample: schema.SampleTable | None = None
+    """Of which of several samples it is."""
 
     @property
     def files(self) -> list[str]:
         """Data files, relative to the recipe."""
         data = self.tables.data
+        if self.tables.sample and self.sample is None:
+            return [file for one in self.each for file in one.files]
         names = [*data.files, *(file.path for file in data.file)]
         return [os.path.normpath(Path(self.path).parent / name) for name in names]
 
     @property
     def each(self) -> list[FilmRecipe]:
-        """One recipe for each `[[data.file]]`, with the keys of that table; empty without such tables."""
+        """One recipe for each `[[data.file]]`, with the keys of that table, or for each file of each sample;
+        empty without such tables."""
+        if self.tables.sample:
+            return [
+                FilmRecipe(self.path, _of_file(tables, file), sample)
+                for sample in self.tables.sample
+                for tables in [_of_sample(self.path, self.tables, sample)]
+                for file in [*(schema.FileTable(path=x) for x in sample.files), *sample.file]
+            ]
         return [FilmRecipe(self.path, _of_file(self.tables, file)) for file in self.tables.data.file]
 
     @property
@@ -179,6 +192,20 @@ class FilmRecipe:
             for name, x in table.given().items()
         }
 
+    def kept(self, reading: Mapping[str, Any], fitting: Mapping[str, Any], folder: Path) -> str:
+        """The text of this recipe of several samples in a folder, with options of the command line.
+
+        **Raises:** UsageError for options that files name, which it cannot express.
+        """
+        from pellicle.recipes.write import moved
+
+        tables = self.tables.model_dump(exclude_unset=True)
+        tables["data"] = tables.get("data", {}) | dict(fitting)
+        for sample in tables["sample"]:
+            for own in (sample, *sample.get("file", ())):
+                own |= reading
+        return moved(tables, Path(self.path).parent, folder)
+
     def sight(self) -> Sight:
         """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""
         names = {field.name for field in fields(Camera)}
@@ -189,6 +216,12 @@ class FilmRecipe:
     def scene(self, fitted: bool = False) -> Scene:
         """Build the scene. Raises DataError, the path in front; if `fitted`, where nothing is free."""
         tables = self.tables
+        if tables.sample and self.sample is None:
+            names = ", ".join(one.name for one in tables.sample)
+            raise DataError(
+                f"{self.path}: has [[sample]] tables ({names}), which fit and sample take together; write a"
+                " recipe of one sample for this"
+            )
         described, data, folder = tables.scene, tables.data, Path(self.path).parent
         azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth
         with _of_recipe(self.path, ValueError):
@@ -202,6 +235,8 @@ class FilmRecipe:
                 uncertainty=parts.uncertainty(Uncertainty, described, tables.instrument),
                 reference=None if tables.reference is None else parts.reference(tables.reference, folder),
             )
+            if self.sample is not None:
+                scene = of_sample(scene, self.sample)
             check_free_count(len(free_leaves(scene)), least=int(fitted))
         return scene
 
@@ -222,14 +257,22 @@ def light(given: Any, transmitted: bool | None, azimuth: Any) -> Light:
 _NUMBERS: TypeAdapter[Any] = TypeAdapter(float | schema.FreeTable | list[float])
 
 
-def _of_file(tables: schema.RecipeTable, file: schema.FileTable) -> schema.RecipeTable:
+def _of_sample(path: str, tables: schema.RecipeTable, sample: schema.SampleTable) -> schema.RecipeTable:
+    """The recipe of one sample, with its own layers and keys. Raises DataError, the path in front."""
+    with _of_recipe(path):
+        tables = tables.model_copy(update={"scene": scene_table(tables.scene, sample)})
+    return _of_file(tables, sample)
+
+
+def _of_file(tables: schema.RecipeTable, file: schema.FileTable | schema.SampleTable) -> schema.RecipeTable:
     """The recipe of one file: with its own signal, angle, noise and so on, and no other file."""
     reading = {name: x for name in schema.ReadingTable.model_fields if (x := getattr(file, name)) is not None}
     scene, plate = tables.scene, tables.scene.substrate
     if file.back is False and isinstance(plate, schema.PlateTable):
         bare = plate.model_copy(update=dict.fromkeys(("back", *schema.BACK)))
         scene = scene.model_copy(update={"substrate": bare})
-    parts = {"data": tables.data.model_copy(update={**reading, "file": [file]}), "scene": scene}
+    own = [file] if isinstance(file, schema.FileTable) else []
+    parts = {"data": tables.data.model_copy(update={**reading, "file": own}), "scene": scene}
     for name in ("instrument", "camera"):
         table = getattr(file, name)
         given = {key: getattr(table, key) for key in table.model_fields_set}

@@ -135,12 +135,11 @@ class CameraTable(_Table, CameraOptions):  # pyright: ignore[reportGeneralTypeIs
     """`[camera]`: what sees the colours of a film, and under which light; files are CSV."""
 
 
-class FileTable(ReadingTable):
-    """One `[[data.file]]`: its keys override those of `[data]`, `[instrument]` and `[camera]`."""
+class _OwnTable(ReadingTable):
+    """Keys that override those of `[data]`, `[instrument]` and `[camera]`."""
 
     angle: _Angle = None  # pyright: ignore[reportIncompatibleVariableOverride]
     noise: _Noise = None  # pyright: ignore[reportIncompatibleVariableOverride]
-    path: str
     instrument: InstrumentTable = InstrumentTable()
     camera: CameraTable = CameraTable()
     back: Literal[False] | None = None
@@ -149,6 +148,12 @@ class FileTable(ReadingTable):
     def rescales(self) -> bool:
         """True where this file has a scale or an offset of its own."""
         return self.instrument.scale != 1.0 or self.instrument.offset != 0.0
+
+
+class FileTable(_OwnTable):
+    """One `[[data.file]]`: its keys override those of `[data]`, `[instrument]` and `[camera]`."""
+
+    path: str
 
     @model_validator(mode="before")
     @classmethod
@@ -205,12 +210,57 @@ class ReferenceTable(_Table):
     form: Literal["relative", "normalised"] = "relative"
 
 
+class SampleLayerTable(LayerTable):
+    """One `[[sample.layer]]`: keys of its own of the layer of the scene with that name; else a layer of this
+    sample alone, below the layer or the number of layers that `after` names."""
+
+    name: str  # pyright: ignore[reportGeneralTypeIssues,reportIncompatibleVariableOverride]
+    after: str | int | None = None
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        return self  # checked with the keys of the scene's layer
+
+
+class SampleTable(_OwnTable):
+    """One `[[sample]]` of several in one fit: its files, and what is not as in `[scene]`; `without` names
+    layers that it lacks. Further keys are numbers of its own, by their names in the scene."""
+
+    model_config = ConfigDict(extra="allow", strict=False, allow_inf_nan=False)
+    name: str
+    files: list[str] = []
+    file: list[FileTable] = []
+    substrate: Medium | PlateTable | None = None
+    ambient: Medium | None = None
+    layer: list[SampleLayerTable] = []
+    without: list[str] = []
+
+    @model_validator(mode="after")
+    def _has_files(self):
+        if not self.files and not self.file:
+            raise ValueError(f'sample {self.name} has no files: give it files = ["{self.name}.csv"]')
+        if not self.name or "." in self.name:
+            raise ValueError(f"a sample has a name without dots, not {self.name!r}")
+        return self
+
+
 class RecipeTable(_Table):
     """A whole recipe."""
 
     data: DataTable = DataTable()
     scene: SceneTable
+    sample: list[SampleTable] = []
     reference: ReferenceTable | None = None
+
+    @model_validator(mode="after")
+    def _samples(self):
+        names = [one.name for one in self.sample]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ValueError(f"two samples have the name {twice[0]!r}: give each its own")
+        if names and (self.data.files or self.data.file):
+            raise ValueError("files of [data] and [[sample]] exclude each other: each sample names its files")
+        return self
+
     instrument: InstrumentTable = InstrumentTable()
     camera: CameraTable = CameraTable()
 

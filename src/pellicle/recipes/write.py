@@ -16,6 +16,7 @@ from pellicle.data.cameras import SRGB, band_sensor
 from pellicle.data.options import CameraOptions, FileOptions
 from pellicle.errors import UsageError
 from pellicle.files import write_text
+from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import parts
 from pellicle.recipes.parts import same, written_medium, written_number
 from pellicle.recipes.read import checked
@@ -100,6 +101,25 @@ def recipe_text(
     )
     again: Any = checked(tomllib.loads(text), str(place / "recipe")).scene()
     _check_film(with_wavelength(scene, None), again)
+    return text
+
+
+def moved(tables: Mapping[str, Any], source: Path, folder: Path) -> str:
+    """The text of the tables of a recipe in `source` as one in `folder`: paths in them are adapted."""
+    files = {name for name, (_, option) in FileOptions.declared().items() if option.is_file}
+
+    def adapted(thing: Any, key: str = "") -> Any:
+        if isinstance(thing, Mapping):
+            return {name: adapted(x, name) for name, x in thing.items() if x is not None}
+        if isinstance(thing, list | tuple):
+            return [adapted(x, key) for x in thing]
+        of_medium = isinstance(thing, str) and Path(thing).suffix.lower() in MATERIAL_SUFFIXES
+        if key in (*files, "files", "path") or (of_medium and key != "name"):
+            return _relative(source / thing, folder)
+        return thing
+
+    text = _document(adapted(tables))
+    checked(tomllib.loads(text), str(folder / "recipe"))
     return text
 
 

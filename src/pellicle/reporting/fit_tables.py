@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,9 @@ def nk_csvs(fit: Fit) -> dict[str, str]:
     pellicle reads the tables as materials. Infinite errors are empty cells. A birefringent layer has a table
     for each principal index; the one of the extraordinary index also contains the birefringence.
     """
+    if not fit.one_layer:  # a table for each of the samples
+        each = ((part.name, nk_csvs(replace(fit.alone(part), scene=None))) for part in fit.parts)
+        return {file.replace("nk", f"nk_{name}", 1): text for name, own in each for file, text in own.items()}
     principal = dict(fit.principal_indices)
     difference = principal.pop(BIREFRINGENCE, None)
     texts = {}

@@ -224,6 +224,7 @@ def subject_of(
     tolerance: float,
     residual: str | None,
     progress: Progress,
+    shared: Sequence[str] | None = None,
 ) -> Subject:
     """Fit as `pellicle.fit` does, and return the posterior between the bounds, in float64.
 
@@ -248,7 +249,7 @@ def subject_of(
     if isinstance(scene, Surface):
         return _of_surface(data, scene, tolerance, residual, progress)
     if not joint.of_both_kinds(scene):
-        return _of_film(data, scene, tolerance, progress)
+        return _of_film(data, scene, tolerance, progress, shared)
     fit, ranked = joint.fitted(rows, scenes, tolerance, progress, residual=residual)
     with jax.enable_x64(True):
         kinds = joint.apart(rows, scenes)
@@ -272,11 +273,11 @@ def _of_surface(
         return _subject(fit, ranked, partial(BrdfMeasurements, rows, scene), identity, assumption)
 
 
-def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress) -> Subject:
+def _of_film(data: Any, scene: Any, tolerance: float, progress: Progress, shared: Any) -> Subject:
     measurements = measured(OF_A_FILM, data)
-    fit, ranked = spectra.fitted(measurements, scene, tolerance, progress)
+    fit, ranked = spectra.fitted(measurements, scene, tolerance, progress, shared=shared)
     with jax.enable_x64(True):
-        targets = spectra.measurements(measurements, scene)
+        targets = spectra.measurements(measurements, scene, shared)
         identity = density.fingerprint([arrays(target) for target in targets], tolerance)
         known = partial(FilmMeasurements, spectra.listed(measurements), targets)
         return _subject(fit, ranked, known, identity)

@@ -31,6 +31,7 @@ from pellicle.scene.layers import (
     ambient_medium,
     divided,
 )
+from pellicle.scene.samples import Sample, as_sample
 from pellicle.scene.ties import bound
 from pellicle.scene.uncertainty import Uncertainty
 from pellicle.signals.base import Signal
@@ -146,6 +147,7 @@ class Scene(eqx.Module):
     - `instrument`: an `Instrument`.
     - `reference`: a `Reference`, with which a contrast or raw counts are measured.
     - `uncertainty`: an `Uncertainty` of what the scene states or leaves out; it enters the errors of a fit.
+    - `sample`: the name of the sample in a fit of several (`shared` of `pellicle.fit`).
 
     **Raises:** ValueError where the ambient absorbs, without layers, and where the parts contradict.
 
@@ -161,6 +163,7 @@ class Scene(eqx.Module):
     instrument: Instrument = Instrument()
     uncertainty: Uncertainty = eqx.field(static=True, default=Uncertainty())
     reference: Reference | None = None
+    sample: Sample | None = eqx.field(static=True, converter=as_sample, default=None)
 
     def __check_init__(self):
         for name, part in vars(bound(self)).items():

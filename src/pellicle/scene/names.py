@@ -42,6 +42,16 @@ def full_name(scene: Any, path: tuple, last: str, own: str = "") -> str:
     return ".".join(part for part in (*owners, last, own) if part)
 
 
+def name_in_fit(scene: Any, path: tuple, last: str, own: str = "") -> str:
+    """Return the full name of a number in a fit, where the scene may be that of one of several samples."""
+    if scene.sample is None:
+        return full_name(scene, path, last, own)
+    aliases = [full_name(scene, path, last)]
+    if path[0].name == "layers":
+        aliases.append(f"{layer_name(scene, path[1].idx)}.{last}")
+    return scene.sample.called(aliases, full_name(scene, path, last, own) if own else "")
+
+
 def layer_prefix(scene: Any, position: int) -> list[str]:
     """Prefix of the names of a layer's parameters: nothing if it is the only one."""
     return [] if len(scene.layers) == 1 else [layer_name(scene, position)]

@@ -162,7 +162,7 @@ def test_what_tells_spectra_apart():
         ([], OXIDE, "no spectrum"),
         ([oxide(), oxide()], [OXIDE], "2 spectra need as many scenes"),
         ([oxide(), oxide()], [OXIDE, pl.Scene(pl.Layer("SiO2", 1.0), "Si")], "same layers"),
-        ([oxide(), oxide()], [OXIDE, pl.Scene(OXIDE.layers, "BK7")], "same layers, ambient and substrate"),
+        ([oxide(), oxide()], [OXIDE, pl.Scene(OXIDE.layers, "BK7")], "of several samples `shared` names"),
     ],
 )
 def test_what_is_no_joint_fit(spectra, scenes, said, refuses):

@@ -262,7 +262,7 @@ class BatchErrors:
         if len(self.scene.layers) != 1 or self.problem.thickness_axis is None:
             return limits
         if drifts(self.scene):
-            limits = bounded_by_drift(limits, ranked, models.thinnest())
+            limits = bounded_by_drift(limits, ranked, models.thinnest()[..., None])
         count = limits.stderr.shape[-1]
         return unlimited(limits, ranked, models.unneeded(covariance[:, :count, :count]))
 

@@ -1,4 +1,4 @@
-"""Fit a scene to spectra and colours of one sample: scan, polish, rank minima, estimate uncertainties."""
+"""Fit scenes to spectra and colours of one sample or several: scan, polish, rank minima, estimate errors."""
 
 import time
 from collections.abc import Sequence
@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
-import equinox as eqx
 import jax
 
 from pellicle.data.colours import Colours
@@ -31,6 +30,7 @@ from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.explanations import explanations
 from pellicle.fitting.film.index_curves import IndexCurves, index_curves
 from pellicle.fitting.film.problem import Target, make, measured, without_scale
+from pellicle.fitting.film.samples import joined
 from pellicle.fitting.film.search import search
 from pellicle.fitting.film.summary import FilmMeasurements
 from pellicle.fitting.film.sweeps import with_sweeps
@@ -54,6 +54,7 @@ def fit(
     data: Film,
     scene: Scene | Sequence[Scene],
     *,
+    shared: Sequence[str] | None = None,
     tolerance: float = 0.0,
     loss: str = LEAST_SQUARES,
     progress: Progress = quiet,
@@ -64,7 +65,7 @@ def fit(
     of spectra and colours of one sample is fitted jointly: layers and substrate are shared, what is free of
     the light and the instrument is each one's own (`instrument.scale.R`). `scene` may then be a list
     too, of one scene for each, that differ in light, instrument and back face only; of a single scene,
-    Ψ and Δ leave out scale and offset.
+    Ψ and Δ leave out scale and offset. With names of `shared` numbers each scene is that of a sample.
 
     With a `tolerance`, in the unit of each signal, effects that change less are left out (`pellicle.plan`);
     where the best fit turns out to lie beyond it, all of them are put back and the fit is done again.
@@ -78,7 +79,7 @@ def fit(
     signal is given a fixed scale or the loss is unknown; ValueError where a material has no data at a
     wavelength, naming it.
     """
-    return fitted(data, scene, tolerance, progress, loss)[0]
+    return fitted(data, scene, tolerance, progress, loss, shared)[0]
 
 
 def fitted(
@@ -87,11 +88,12 @@ def fitted(
     tolerance: float,
     progress: Progress,
     loss: str = LEAST_SQUARES,
+    shared: Sequence[str] | None = None,
 ) -> tuple[Fit, RankedMinima]:
     """The result of `fit`, and the ranked minima that it rests on."""
     check_loss(loss)
     with jax.enable_x64(True):
-        targets = measurements(data, scene)
+        targets = measurements(data, scene, shared)
         spectra = listed(data)
         fit, ranked, discrepancy = _fit(spectra, targets, tolerance, loss, progress)
         if loss == LEAST_SQUARES and (spikes := summary.spikes(ranked)):
@@ -102,6 +104,9 @@ def fitted(
             fit = replace(fit, warnings=(remark, *fit.warnings))
         if fit.status not in _REFUSED:
             return fit, ranked
+        if targets[0].scene.sample is not None:  # mistakes are those of one sample
+            causes = likely_cause(discrepancy, ranked.problem.parameters)
+            return replace(fit, warnings=(*causes, *fit.warnings)), ranked
 
         def measure(other: list[Spectrum | Colours]) -> list[Target]:
             return measurements(other[0] if isinstance(data, Spectrum | Colours) else other, scene)
@@ -121,7 +126,9 @@ def listed(data: Film) -> list[Spectrum | Colours]:
     return [data] if isinstance(data, Spectrum | Colours) else list(data)
 
 
-def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
+def measurements(
+    data: Film, scene: Scene | Sequence[Scene], shared: Sequence[str] | None = None
+) -> list[Target]:
     """The numbers and the scene of each spectrum and of colours. Raises UsageError as `fit` does."""
     spectra = listed(data)
     if not spectra:
@@ -133,11 +140,8 @@ def measurements(data: Film, scene: Scene | Sequence[Scene]) -> list[Target]:
         raise UsageError(f"{len(spectra)} spectra need as many scenes, or one for all, not {len(scenes)}")
     if isinstance(scene, Scene) and len(spectra) > 1:
         scenes = [without_scale(scene, s) for s in spectra]
-    about = [(s.layers, s.ambient, s.substrate) for s in scenes] if len(scenes) > 1 else []
-    samples = [(*rest, x.material, x.plate_mm, x.roughness) for *rest, x in about]
-    if not all(eqx.tree_equal(sample, samples[0]) is True for sample in samples):
-        raise UsageError("the scenes of a joint fit must have the same layers, ambient and substrate")
     names = [""] if isinstance(data, Spectrum | Colours) else labels(spectra)
+    scenes = joined(scenes, names, shared)
     targets = [
         measured_colours(own, seen, name) if isinstance(own, Colours) else measured(own, seen, name)
         for own, seen, name in zip(spectra, scenes, names, strict=True)

@@ -185,10 +185,11 @@ def missed(problem: Problem, fits: tuple[ViewFit, ...], values: np.ndarray) -> l
     The fit's index gives the period, so that dispersion is counted. Where the model has the fringes of the
     data, harmonics included, the residuals keep little of their amplitude.
     """
-    depth, result = problem.thickness_axis, []
-    if depth is None:
-        return [None] * len(problem.views)
+    result = []
     for view, fit in zip(problem.views, fits, strict=True):
+        if (depth := problem.depth_of(view)) is None:
+            result.append(None)
+            continue
         x, clear = _phase_and_fringes(problem, view, values, depth)
         if clear is None or abs(clear.thickness - values[depth]) < clear.resolution:
             result.append(None)
@@ -207,7 +208,7 @@ def disagreement(problem: Problem, silent: Sequence[Fringes | None], values: np.
     sentences = []
     for view, clear in zip(problem.views, silent, strict=True):
         if clear is not None:
-            own, best = f"{view.name}: " if view.name else "", values[problem.thickness_axis]
+            own, best = f"{view.name}: " if view.name else "", values[problem.depth_of(view)]
             sentences.append(
                 f"{own}the period of the fringes ({clear.number:.2g} of them) suggests a thickness of"
                 f" {clear.thickness:.4g} nm, the best fit has {best:.4g} nm and misses them"

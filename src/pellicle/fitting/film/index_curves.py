@@ -219,6 +219,7 @@ def index_curves(judged: Assembly, targets: Sequence[Target]) -> IndexCurves | N
     known = [t.wavelength for t in targets if isinstance(t, Measured)]
     if (
         not formula
+        or scene.sample is not None
         or not free_leaves(medium)
         or touches_ties(scene, medium)
         or getattr(medium, "k", ()) is None

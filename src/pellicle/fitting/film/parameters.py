@@ -23,7 +23,7 @@ from pellicle.scene.expressions import replaced
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered, without_bounds
 from pellicle.scene.layers import Layer
-from pellicle.scene.names import WIDTHS, full_name, layer_prefix, location_of, unit_of
+from pellicle.scene.names import WIDTHS, location_of, name_in_fit, unit_of
 from pellicle.scene.ties import tied_leaves
 from pellicle.scene.uncertainty import Uncertainty
 
@@ -76,17 +76,19 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
 
 @remembered
 def shared(names: tuple[str, ...], *scenes: Scene) -> tuple[tuple[Parameter, ...], list[tuple[int, ...]]]:
-    """Free parameters of one sample measured in several ways, and the positions of those in each scene.
+    """Free parameters of data that are fitted together, and the positions of those in each scene.
 
-    Layers, substrate and ambient are shared; light and instrument are each scene's own, and bear its name.
+    Scenes of one sample share layers, substrate and ambient; light and instrument are each scene's own, and
+    bear its name. Several samples share the numbers that they name.
     """
-    parameters: dict[tuple[str, str], Parameter] = {}
-    positions: list[list[tuple[str, str]]] = []
+    parameters: dict[tuple[str, ...], Parameter] = {}
+    positions: list[list[tuple[str, ...]]] = []
     for scene, name in zip(scenes, names, strict=True):
         positions.append([])
         for path, free in free_leaves(scene):
-            key = _own(path, name), jax.tree_util.keystr(path)
-            parameters.setdefault(key, _parameter(scene, path, free, name))
+            p = _parameter(scene, path, free, name)
+            key = (_own(path, name), jax.tree_util.keystr(path)) if scene.sample is None else (p.name,)
+            parameters.setdefault(key, p)
             positions[-1].append(key)
     order = {key: i for i, key in enumerate(parameters)}
     return tuple(parameters.values()), [tuple(order[key] for key in keys) for keys in positions]
@@ -100,7 +102,7 @@ def _own(path: tuple, name: str) -> str:
 def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
     location = location_of(scene, path)
     owner, key, field = type(location.owner), location.key, location.field
-    full = full_name(scene, path, location.name, _own(path, name))
+    full = name_in_fit(scene, path, location.name, _own(path, name))
     if key in _NATURAL_ONE and free.upper > 1:
         raise UsageError(f"`{key}` must be at most 1: its upper bound is {free.upper:g}")
     # the A of an oscillator is a strength, which cannot be negative; that of Cauchy is an index
@@ -137,7 +139,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
 
 def thickness_name(scene: Scene, position: int) -> str:
     """The full name of a layer's thickness."""
-    return ".".join([*layer_prefix(scene, position), "thickness"])
+    path = jax.tree_util.GetAttrKey("layers"), jax.tree_util.SequenceKey(position)
+    return name_in_fit(scene, path, "thickness")
 
 
 def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -163,7 +166,7 @@ def anonymous(scene: Scene) -> Scene:
         for layer in scene.layers
     )
     substrate = replace(scene.substrate, index_uncertainty=None)
-    return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty())
+    return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty(), sample=None)
 
 
 @remembered
@@ -171,7 +174,7 @@ def tied_numbers(scene: Scene, name: str = "") -> list[TiedNumber]:
     """The numbers of a scene that follow free ones; `name` is the scene's where it is one of several."""
 
     def called(path: tuple) -> str:
-        return full_name(scene, path, location_of(scene, path).name, _own(path, name))
+        return name_in_fit(scene, path, location_of(scene, path).name, _own(path, name))
 
     names = {free.label: called(path) for path, free in free_leaves(scene)}
     return [
@@ -198,6 +201,6 @@ def fixed_numbers(scene: Scene, name: str = "") -> list[tuple[str, float, str]]:
         if path[0].name not in ("layers", "instrument") or not isinstance(leaf, int | float):
             continue
         location = location_of(scene, path)
-        full = full_name(scene, path, location.name, _own(path, name))
+        full = name_in_fit(scene, path, location.name, _own(path, name))
         rows.append((full, float(leaf), unit_of(location)))
     return rows

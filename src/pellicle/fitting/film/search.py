@@ -18,6 +18,7 @@ import numpy as np
 from pellicle.fitting.evaluation import scanned
 from pellicle.fitting.film.fringes import proposed
 from pellicle.fitting.film.problem import shortest_wavelength
+from pellicle.fitting.film.sample_search import sample_parts, search_samples
 from pellicle.fitting.minima import MOST, SLOTS, Minima, Scan, settled, solve
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
@@ -56,6 +57,8 @@ _MOST_POLISHED = 2048
 def search(problem: Problem, progress: Progress, quick: bool = False) -> Minima:
     """Scan the box, polish the best distinct local minima, sort them; `quick` with few values of parameters
     other than the thickness, and the lowest orders alone."""
+    if len(samples := sample_parts(problem)) > 1:
+        return search_samples(problem, samples, search, progress)
     thinned, depth = problem.thinned(), problem.thickness_axis
     design = design_points(problem, _FEW_DESIGNS if quick else _MOST_DESIGNS)
     grid = thickness_grid(problem, len(design))

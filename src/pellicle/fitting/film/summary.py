@@ -107,7 +107,10 @@ class FilmMeasurements:
         if not all(drifts(m.scene) and len(m.scene.layers) == 1 for m in self.targets):
             return limits
         views = zip(self.ranked.problem.views, self.ranked.fits, strict=True)
-        least = min(thinnest(view, fit.at.layer) for view, fit in views)
+        least = np.full(len(limits.stderr), np.inf)
+        for view, fit in views:
+            own = list(view.takes)
+            least[own] = np.minimum(least[own], thinnest(view, fit.at.layer))
         return bounded_by_drift(limits, self.ranked, least)
 
     def unneeded(self, parts: tuple[Part, ...]) -> str:
@@ -115,6 +118,8 @@ class FilmMeasurements:
         thickness then means nothing, as any or none would do; or where nobody calibrated the camera."""
         if all(isinstance(each, Colours) and not each.calibrated for each in self.data):
             return " The camera is not calibrated: give its `sensitivities` or a photographed `chart`."
+        if self.targets[0].scene.sample is not None:
+            return ""
         view, curve = self.ranked.problem.views[0], parts[0].curve
         if self.ranked.problem.thickness_axis is None or len(view.scene.layers) != 1:
             return ""
@@ -161,8 +166,9 @@ def scans(ranked: RankedMinima, raised: Sequence[Any]) -> dict[int, Profile]:
 
 
 def bounded_by_drift(limits: Limits, ranked: RankedMinima, least: Any) -> Limits:
-    """Limits with thicknesses below the `least` (...) that spans fringes enough bounded from above only."""
-    least, depth = np.asarray(least)[..., None], [p.key == "thickness" for p in ranked.problem.parameters]
+    """Limits with thicknesses below the `least` (..., parameters) that span fringes enough bounded from above
+    only."""
+    depth = [p.key == "thickness" for p in ranked.problem.parameters]
     thin = np.array(depth) & np.isfinite(limits.stderr) & (ranked.values < least)
     return Limits(np.where(thin, np.inf, limits.stderr), limits.lower, np.where(thin, least, limits.upper))
 
@@ -177,11 +183,10 @@ def thinnest(view: SpectrumView, layer: Any) -> Any:
 
 def opaque(spectra: Sequence[Target], ranked: RankedMinima) -> frozenset[str]:
     """Names of the thicknesses of layers that absorb at the best fit."""
-    view = ranked.problem.views[0]
-    index = indices(view.scene, ranked.problem.seen_by(view, ranked.values))
     return frozenset(
-        thickness_name(spectra[0].scene, i)
-        for i, k in enumerate(index.k)
+        thickness_name(spectrum.scene, i)
+        for spectrum, view in zip(spectra, ranked.problem.views, strict=True)
+        for i, k in enumerate(indices(view.scene, ranked.problem.seen_by(view, ranked.values)).k)
         if k is not None and np.median(k) > _ABSORBS
     )
 

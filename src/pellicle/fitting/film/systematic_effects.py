@@ -17,6 +17,7 @@ from pellicle.scene.film import Scene
 from pellicle.scene.free import is_free
 from pellicle.scene.instrument import Drift
 from pellicle.scene.layers import Layer
+from pellicle.scene.names import layer_name
 
 _STEP = 1e-2
 """Finite step of a linear effect, in standard uncertainties: on a thick film a whole one is not linear."""
@@ -43,6 +44,7 @@ class SimulatedEffect(NamedTuple):
     positive: bool = False
     shared: bool = True
     material: bool = False
+    owner: str = ""  # of a medium, which samples may have in common
     relative: float = 0.0  # size by the number itself, at most `_WIDEST_SPREAD`; 0 for a size of its own
     thickness: Number | None = None  # of a mixture, from `_THIN_MIXTURE` of which the effect has no size
 
@@ -120,8 +122,15 @@ def simulations_of(
     """The extended scene, and every effect that it simulates; None where there are none."""
     extension = extended(view, values)
     every = [*_of_light(view, scene, extension), *_of_media(scene, extension, extension.start(values))]
-    rows = [row for row in every if row.number is not None and row.size > 0]
+    rows = [_of_sample(scene, row) for row in every if row.number is not None and row.size > 0]
     return (extension, rows) if rows else None
+
+
+def _of_sample(scene: Scene, row: SimulatedEffect) -> SimulatedEffect:
+    """The effect by the name that tells it from those of other samples."""
+    if not row.shared or scene.sample is None:
+        return row
+    return row._replace(name=row.name + scene.sample.of(row.owner))
 
 
 def _linear(name: str, size: float, unit: str, number: Number | None, **kind: Any) -> SimulatedEffect:
@@ -163,21 +172,24 @@ def _of_media(scene: Scene, extension: ExtendedScene, start: np.ndarray) -> Iter
     for i, layer in enumerate(scene.layers):
         if not isinstance(layer, Layer):
             continue
-        of = f" of {layer.name or f'layer{i + 1}'}" if len(scene.layers) > 1 else ""
+        name = layer_name(scene, i)
+        of = f" of {name}" if len(scene.layers) > 1 or scene.sample is not None else ""
         if i in extension.index:
             size = allowed.index if layer.index_uncertainty is None else layer.index_uncertainty
-            yield _linear(f"index{of or ' of the layer'}", size, "", extension.index[i], material=True)
+            words, about = f"index{of or ' of the layer'}", ("", extension.index[i])
+            yield _linear(words, size, *about, material=True, owner=name)
             if isinstance(layer.material, AbstractMixture) and layer.index_uncertainty is None and size:
-                about = "", extension.index[i]
-                yield _linear(f"mixing rule{of}", _MIXING_RULE, *about, thickness=extension.thickness[i])
+                deep = extension.thickness[i]
+                yield _linear(f"mixing rule{of}", _MIXING_RULE, *about, thickness=deep, owner=name)
         if i in extension.shape:
-            yield _linear(f"dispersion{of}", allowed.dispersion, "", extension.shape[i])
+            yield _linear(f"dispersion{of}", allowed.dispersion, "", extension.shape[i], owner=name)
         if instrument.thickness_spread is None and layer.thickness_spread is None:
             relative, number = allowed.thickness_spread, extension.thickness[i]
             size = min(relative * start[number.position], _WIDEST_SPREAD)
             yield _width(f"thickness spread{of}", size, "nm", number, size, relative=relative)
     size = allowed.index if substrate.index_uncertainty is None else substrate.index_uncertainty
-    yield _linear("index of the substrate", size, "", extension.substrate_index, material=True)
+    about = "", extension.substrate_index
+    yield _linear("index of the substrate", size, *about, material=True, owner="substrate")
     reach = allowed.roughness
     both = (reach, HALF_NORMAL), (0.0, -HALF_NORMAL)
     yield SimulatedEffect("roughness", reach, "nm", extension.roughness, both, power=2)
