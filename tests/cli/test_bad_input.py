@@ -5,6 +5,8 @@ import shlex
 import pytest
 
 ROWS = "".join(f"{400 + 10 * i},0.{20 + i}\n" for i in range(10))
+FAR_ROWS = "".join(f"{nm},0.2\n" for nm in range(200, 240, 2))
+"""More points than the others, beyond the data of HfO2."""
 BASE = {"--layer": "1.46", "--substrate": "3.9", "--thickness": "10:800"}
 
 
@@ -28,7 +30,7 @@ def check_refused(pellicle, tmp_path):
     ("text", "flags", "words"),
     [
         (f"wavelength,R\n{ROWS}500,31.5\n", "", ("line 12", "--signal-unit percent")),
-        (f"wavelength,R\n200,0.2\n{ROWS}", "--layer HfO2", ("HfO2", "250 to 900 nm", "--range")),
+        (f"wavelength,R\n{FAR_ROWS}{ROWS}", "--layer HfO2", ("HfO2", "250 to 900 nm", "--range")),
         (f"wavelength,intensity\n{ROWS}", "--signal R", ("--scale slow",)),
         ("wavelength,psi,delta\n400,20,90\n500,21,90\n", "", ("angle of incidence", "--angle 70")),
     ],

@@ -115,7 +115,13 @@ def test_materials_keep_their_names_and_ranges(refuses):
     porous = Bruggeman(material("SiO2"), material("TiO2"), 0.3)
     assert {m.name for m in materials_in(porous)} == {"SiO2", "TiO2"}
     scene = pl.Scene(pl.Layer(porous, 100.0), "Si")
-    refuses(ValueError, r"SiO2 .* is known from", simulate_signal, scene, np.array([100.0, 5000.0]))
+    refuses(
+        ValueError,
+        r"all media are known from 250 to 1450 nm \(Si .*SiO2 210",
+        simulate_signal,
+        scene,
+        np.array([100.0, 5000.0]),
+    )
 
 
 @EVERY_RULE

@@ -34,8 +34,21 @@ def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Sp
     """Read the spectra of a file that are meant; where the scale of the `scene` is free any level is
     acceptable, and its reference is that of counts or of relative reflectances.
 
-    Raises DataError or UsageError.
+    Without a range, points where media of the scene have no data are left out, if half of them remain. Raises
+    DataError or UsageError.
     """
+    spectra = _read(path, options, scene)
+    if scene is None or options.range is not None:
+        return spectra
+    from pellicle.data.spectrum import within
+    from pellicle.materials import ROUNDING, common_range, limits
+
+    low, high = common_range(scene)
+    ends = low - ROUNDING, high + ROUNDING
+    return [within(x, ends, f"{limits(scene, x.wavelength)}") for x in spectra]
+
+
+def _read(path: str, options: FileOptions, scene: Scene | None) -> list[Spectrum]:
     from pellicle.data.read_counts import has_counts
     from pellicle.data.read_spectrum import read_spectra
     from pellicle.scene.instrument import Drift

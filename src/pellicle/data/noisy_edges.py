@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pellicle.data.spectrum import FEWEST_POINTS, LeftOut
+from pellicle.data.spectrum import FEWEST_POINTS, LEAST_SHARE, LeftOut
 from pellicle.signals.limits import HIGHEST, LOWEST, LOWEST_OF_NOISE
 from pellicle.signals.local_scatter import FEWEST, coherence, local_scatter
 
@@ -22,9 +22,8 @@ _COHERENT, _COHERENT_IF_IMPOSSIBLE = 0.45, 0.75
 """Correlation of second differences above which an edge has fringes, not noise, which bend as much where they
 are dense; the second where the edge has values that no film has. Fringes of two or three points reach 0.5 to
 0.75, noise 0.28 to 0.43, and 0.6 where it is smoothed over a few points."""
-_LEAST_SHARE = 0.5
 _LEAST_RANGE = 50.0
-"""Share of the points, or range in nm, at least one of which must remain."""
+"""Range in nm that must remain, or `LEAST_SHARE` of the points."""
 _LEAST_LIGHT = 5.0
 """Light of the reference over its own scatter."""
 _MOST_POINTS = 200_000
@@ -73,7 +72,7 @@ def noisy_edges(
     if kept == values.size or kept < FEWEST_POINTS:
         return None
     remains = abs(wavelength[stop - 1] - wavelength[start])
-    if kept < _LEAST_SHARE * values.size and remains < _LEAST_RANGE:
+    if kept < LEAST_SHARE * values.size and remains < _LEAST_RANGE:
         return None
     width = 2 * FEWEST
     edges = slice(0, start), slice(stop, None)
@@ -96,10 +95,10 @@ def _is_noise(values: np.ndarray, rough: np.ndarray, dark: np.ndarray, impossibl
 
     `values` are of the edge, or of a window as wide as coherence needs; the others are of its points.
     """
-    if not rough.size or np.mean(dark) > _LEAST_SHARE:
+    if not rough.size or np.mean(dark) > LEAST_SHARE:
         return True
     most = _COHERENT_IF_IMPOSSIBLE if impossible.any() else _COHERENT
-    return bool(np.mean(rough | dark) >= _LEAST_SHARE and np.median(coherence(values)) <= most)
+    return bool(np.mean(rough | dark) >= LEAST_SHARE and np.median(coherence(values)) <= most)
 
 
 def readable_range(
@@ -111,7 +110,7 @@ def readable_range(
     if stop - start < FEWEST_POINTS:
         return None
     ends = sorted((float(wavelength[start]), float(wavelength[stop - 1])))
-    if stop - start < _LEAST_SHARE * values.size and ends[1] - ends[0] < _LEAST_RANGE:
+    if stop - start < LEAST_SHARE * values.size and ends[1] - ends[0] < _LEAST_RANGE:
         return None
     low, high = float(np.ceil(ends[0])), float(np.floor(ends[1]))
     return (low, high) if low < high else (ends[0], ends[1])

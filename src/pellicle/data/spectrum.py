@@ -19,6 +19,9 @@ POLARISATIONS = ("s", "p", "unpolarised")
 FEWEST_POINTS = 5
 """A range that keeps fewer points is a mistake in the range."""
 
+LEAST_SHARE = 0.5
+"""Share of the points that must remain where a range is chosen for the user."""
+
 _OF_PARTS = ("values", "sigma", "delta", "delta_sigma")
 """Arrays with a column for each part of a signal."""
 _REMEDY = "correct or delete that point"
@@ -65,7 +68,7 @@ class Spectrum:
     - `ratios`: names of the columns of `values`, `delta` and their errors, some of "ane", "aps" and "asp"
       (`pellicle.signals.generalised`), for "generalised-psi-delta".
     - `transmission`: Ψ and Δ are those of t_p/t_s, for "psi-delta".
-    - `left_out`: points of the file at noisy edges of its range (`data.noisy_edges`), for figures.
+    - `left_out`: points at noisy edges (`data.noisy_edges`) or beyond the data of media (`within`).
 
     **Raises:** DataError for values that no sample has, UsageError for unknown words, ValueError for shapes.
 
@@ -224,6 +227,27 @@ class Spectrum:
 
 
 _ARRAYS = tuple(field.name for field in dataclasses.fields(Spectrum) if "ndarray" in str(field.type))
+
+
+def within(spectrum: Spectrum, limits: tuple[float, float], reason: str) -> Spectrum:
+    """Leave out the points beyond `limits` (nm), for a `reason`; all stay if less than half remain.
+
+    Points left out of Ψ and Δ and of matrices have no value.
+    """
+    low, high = limits
+    nm = spectrum.wavelength
+    out = (nm < low) | (nm > high)
+    kept = len(spectrum) - int(out.sum())
+    if not out.any() or kept < max(FEWEST_POINTS, LEAST_SHARE * len(spectrum)):
+        return spectrum
+    before = spectrum.left_out or LeftOut(np.empty(0), np.empty(0), "")
+    values = spectrum.values[out] if spectrum.kind.has_scale else np.full(int(out.sum()), np.nan)
+    points = np.r_[before.wavelength, nm[out]], np.r_[before.values, values]
+    short = "beyond the data of a medium"
+    left_out = LeftOut(*points, f"{before.reason}; {short}" if before.reason else short)
+    cut = spectrum.cut(nm[~out].min(), nm[~out].max())
+    note = f"{cut.notes[-1]}: {reason}"
+    return dataclasses.replace(cut, notes=(*spectrum.notes, note), left_out=left_out)
 
 
 def inside_range(

@@ -21,7 +21,7 @@ from pellicle.errors import UsageError
 from pellicle.forward_model import mixed_polarisations
 from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of
 from pellicle.forward_model.plan import GENERAL, Plan
-from pellicle.materials import Material, materials_in
+from pellicle.materials import Material, check_common_range
 from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
@@ -170,12 +170,11 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
         known = tabulated(of_reference(scene), slope)
         layers = known.layers if reference.layers else ()
         scene = replace(scene, reference=Reference(known.substrate, layers, reference.form))
+    check_common_range(media(scene), wavelength)
     return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
 
 
 def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bool) -> AbstractDispersion:
-    for material in materials_in(dispersion):
-        material.check_range(wavelength)
     if free_leaves(dispersion):
 
         def known(part: Any) -> bool:

@@ -32,6 +32,9 @@ CLEAR = 1e-5
 R, T and N, C, S by about k itself; what the path through the ambient absorbs is the same with a reference
 in the sample's place, or in both polarisations, so calibration or the ratio has removed it."""
 
+ROUNDING = 0.03
+"""How far (nm) a wavelength may lie beyond the data of a material, which then has the index of their end.
+Programs write nm with one or two digits; 1240/E for 1239.84/E moves 230 nm by 0.03."""
 
 _SAMPLES = 200
 """Wavelengths at which an ambient's k is looked at."""
@@ -66,13 +69,15 @@ class Material(AbstractDispersion):
         # a Python number or whole ones would let a table fall back to float32
         xp = namespace(wavelength)
         wavelength = xp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))
-        value = self.dispersion.index(wavelength)
+        low, high = self.wavelength_range
+        # not `clip`, whose slope at an end is half
+        known = xp.where(wavelength < low, low, xp.where(wavelength > high, high, wavelength))
+        value = self.dispersion.index(known)
         if self.clear:
             value = xp.where(imag(value) <= CLEAR, real(value), np.nan)
-        low, high = self.wavelength_range
         if low <= 0 and high == np.inf:
             return value
-        inside = (wavelength >= low) & (wavelength <= high)
+        inside = (wavelength >= low - ROUNDING) & (wavelength <= high + ROUNDING)
         if is_real(value):
             return xp.where(inside, value, np.nan)
         return Pair(xp.where(inside, real(value), np.nan), xp.where(inside, imag(value), np.nan))
@@ -81,7 +86,7 @@ class Material(AbstractDispersion):
         """Raise DataError (a ValueError) if any of the concrete `wavelengths` (nm) is outside the range."""
         nm = np.atleast_1d(np.asarray(wavelengths, dtype=float))
         low, high = self.wavelength_range
-        outside = nm[~((nm >= low) & (nm <= high))]
+        outside = nm[~((nm >= low - ROUNDING) & (nm <= high + ROUNDING))]
         if not outside.size:
             k = self._extinction(nm) if self.clear else np.zeros(1)
             if k.max() > CLEAR:
@@ -141,6 +146,54 @@ def materials_in(tree: Any) -> list[Material]:
         if isinstance(leaf, Material):
             materials.setdefault((leaf.name, leaf.page, leaf.clear), leaf)
     return list(materials.values())
+
+
+def common_range(tree: Any) -> tuple[float, float]:
+    """Range (nm) in which every Material of a pytree has data; its ends are reversed where there is none.
+
+    >>> common_range([material("Si"), material("SU-8")])
+    (320.0, 1450.0)
+    """
+    ranges = [material.wavelength_range for material in materials_in(tree)]
+    return max([0.0, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
+
+
+def limits(tree: Any, wavelengths: Any) -> str:
+    """State the common range of the materials in a pytree, and those that do not cover the `wavelengths`."""
+    low, high = common_range(tree)
+    nm = np.asarray(wavelengths, dtype=float)
+    short = {
+        f"{each.name} {each.wavelength_range[0]:g} to {each.wavelength_range[1]:g} nm"
+        for each in materials_in(tree)
+        if nm.min() < each.wavelength_range[0] - ROUNDING or nm.max() > each.wavelength_range[1] + ROUNDING
+    }
+    together = "the media share no range"
+    if low < high:
+        together = f"all media are known from {low:g} to {high:g} nm"
+    return f"{together} ({', '.join(sorted(short))})"
+
+
+def check_common_range(tree: Any, wavelengths: Any) -> None:
+    """Raise DataError where materials inside a pytree have no data at concrete `wavelengths` (nm).
+
+    Of several materials the sentence has the common range, of one material that of `Material.check_range`.
+    """
+    refused = []
+    for each in materials_in(tree):
+        try:
+            each.check_range(wavelengths)
+        except DataError as error:
+            refused.append(error)
+    if len(refused) == 1:
+        raise refused[0]
+    if refused:
+        (low, high), nm = common_range(tree), np.asarray(wavelengths, dtype=float)
+        low, high = max(low, nm.min()), min(high, nm.max())
+        cut = f"cut the data with `range=({low:g}, {high:g})` or " if low < high else ""
+        raise DataError(
+            f"{limits(tree, nm)}, not from {nm.min():g} to {nm.max():g} nm: "
+            f"{cut}give files of n and k, or models"
+        )
 
 
 class UnknownMaterial(DataError):

@@ -84,12 +84,13 @@ def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) ->
 
 
 def _left_out(spectrum: Spectrum, q: Quantity) -> list[Line]:
-    """Grey points of noisy edges, those near the range of the others."""
+    """Grey points that are left out, those near the range of the others."""
     if (points := spectrum.left_out) is None:
         return []
     low, high = float(np.min(q.data)), float(np.max(q.data))
     near = np.abs(points.values - (low + high) / 2) < 0.75 * (high - low)
-    return [Line(points.wavelength[near], points.values[near], points.reason, "#BBBBBB", "point")]
+    grey = Line(points.wavelength[near], points.values[near], points.reason, "#BBBBBB", "point")
+    return [grey] if near.any() else []
 
 
 def _values(q: Quantity, lines: list[Line], bands: list[Band], legend: Place) -> Panel:

@@ -117,7 +117,7 @@ def _part(part: Part, fit: Fit) -> dict[str, Any]:
 
 
 def left_out(data: object) -> dict[str, Any]:
-    """The record of points at noisy edges of a spectrum that are not fitted; empty without them."""
+    """The record of points of a spectrum that are left out of its fit; empty without them."""
     if (points := getattr(data, "left_out", None)) is None:
         return {}
     return {"left_out": {"points": len(points.wavelength), "reason": points.reason}}

@@ -15,8 +15,9 @@ from pellicle.effects.film_plan import plan
 from pellicle.errors import UsageError
 from pellicle.forward_model.film_signal import build, depolarises, tabulated
 from pellicle.forward_model.plan import Plan
+from pellicle.materials import common_range
 from pellicle.scene.film import Scene, with_wavelength
-from pellicle.scene.free import insert, is_free, start_values
+from pellicle.scene.free import insert, start_values
 from pellicle.scene.instrument import Drift
 from pellicle.signals.base import Signal
 from pellicle.signals.registry import KINDS, of_parts
@@ -144,11 +145,6 @@ def usual_depolarisation_noise(noise: float) -> float:
 def default_wavelengths(scene: Scene) -> np.ndarray:
     """380 to 780 nm every 2 nm, within the data of every material."""
     start, stop, step = VISIBLE
-    has_range = lambda x: hasattr(x, "wavelength_range")  # noqa: E731
-    leaves = jax.tree_util.tree_leaves(scene, is_leaf=lambda x: has_range(x) or is_free(x))
-    low, high = start, stop
-    for material in filter(has_range, leaves):
-        first, last = material.wavelength_range
-        low, high = max(low, first), min(high, last)
+    low, high = common_range(scene)
     grid = np.arange(start, stop + step / 2, step)
     return grid[(grid >= low) & (grid <= high)]
