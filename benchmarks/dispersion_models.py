@@ -227,6 +227,20 @@ def falling(random: np.random.Generator) -> np.ndarray:
 
 
 Draw = Callable[[np.random.Generator], Index]
+
+
+def passive(draw: Draw) -> Draw:
+    """Draw again where ε₂ of a critical point is negative in the spectrum: such a film amplifies light."""
+
+    def drawn(random: np.random.Generator) -> Index:
+        while True:
+            index = draw(random)
+            if np.all(index(np.linspace(300, 1000, 71)).imag >= 0):
+                return index
+
+    return drawn
+
+
 MODELS: dict[str, Draw] = {
     "constant": lambda r: cauchy(r.uniform(1.3, 2.6), 0.0),
     "cauchy": lambda r: cauchy(r.uniform(1.3, 2.6), r.uniform(1e3, 4e4)),
@@ -257,11 +271,15 @@ MODELS: dict[str, Draw] = {
     ),
     "uv-pole": lambda r: poles(r.uniform(60, 250), r.uniform(8, 13), 0.0, r.uniform(1, 2.5)),
     "ir-pole": lambda r: poles(0.0, 10.0, r.uniform(0.02, 1.0), r.uniform(2.2, 5.0)),
-    "critical-point": lambda r: critical_point(
-        r.uniform(0.3, 2), r.uniform(2, 6), r.uniform(0.1, 0.8), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+    "critical-point": passive(
+        lambda r: critical_point(
+            r.uniform(0.3, 2), r.uniform(2, 6), r.uniform(0.1, 0.8), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+        )
     ),
-    "cppb": lambda r: parabolic_bands(
-        r.uniform(1, 6), r.uniform(2, 6), r.uniform(0.2, 1.2), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+    "cppb": passive(
+        lambda r: parabolic_bands(
+            r.uniform(1, 6), r.uniform(2, 6), r.uniform(0.2, 1.2), r.uniform(-50, 50), r.uniform(1.5, 4.0)
+        )
     ),
     "adachi-m0": lambda r: adachi_m0(
         r.uniform(8, 60), r.uniform(1.8, 5), r.uniform(0.02, 0.3), r.uniform(1.5, 4.0)

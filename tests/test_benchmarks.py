@@ -72,7 +72,10 @@ def test_device_that_is_absent_ends_with_code_2(benchmark, capsys):
 
 
 PEERS = Path(__file__).parents[1] / "benchmarks" / "peers"
-PEER_MODULES = ("cases", "truth", "table", "packages", "birefringent", "graded", "adapters.pellicle_any")
+PEER_MODULES = (
+    *("cases", "truth", "table", "packages", "birefringent", "dispersion", "graded"),
+    *("adapters.pellicle_any", "adapters.dispersion_pellicle"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +99,7 @@ def test_reference_values_agree_with_pellicle(peers):
             assert table.error(ours.slopes(case, np.float64), truth["slopes"], "slopes") < 1e-9, name
 
 
-@pytest.mark.parametrize("name", ["films", "birefringent", "graded"])
+@pytest.mark.parametrize("name", ["films", "birefringent", "dispersion", "graded"])
 def test_tables_are_inserted_into_the_page(peers, name):
     script = runpy.run_path(str(PEERS / "__main__.py"), run_name="peers")
     page, (begin, end) = script["PAGE"].read_text("utf-8"), (script[x].format(name) for x in ("BEGIN", "END"))
@@ -106,10 +109,19 @@ def test_tables_are_inserted_into_the_page(peers, name):
 
 
 def test_every_package_has_an_adapter(peers):
-    packages, others = peers["packages"], peers["birefringent"].PACKAGES
+    packages = peers["packages"]
+    others = (*peers["birefringent"].PACKAGES, *peers["dispersion"].PACKAGES)
     adapters = {path.stem for path in (PEERS / "adapters").glob("*.py")}
     assert {p.adapter for p in (*packages.OURS, *packages.PEERS, *others)} <= adapters
     assert all(p.install for p in packages.PEERS)
+
+
+def test_permittivities_with_50_digits_agree_with_pellicle(peers):
+    cases, truths = peers["dispersion"].cases_and_truths()
+    for name, case in cases.items():
+        found = peers["adapters.dispersion_pellicle"].values(case)
+        assert peers["table"].error(found, truths[name]["values"], "values") < 1e-12, name
+    assert [len(case["packages"]) for case in cases.values()] == [2] * len(cases)
 
 
 def test_errors_and_cells(peers):

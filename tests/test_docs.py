@@ -91,7 +91,7 @@ ELSEWHERE = (
     *("make verdicts", "python benchmarks/verdicts"),  # test_verdicts.py: its model, cases and scores
     # install several GB; test_benchmarks.py needs no other package
     *("make peers", "python benchmarks/peers/agreement.py --stacks 1000"),
-    *each("python benchmarks/peers --group {} --write", "birefringent graded"),
+    *each("python benchmarks/peers --group {} --write", "birefringent dispersion graded"),
     "make schema",  # recipes/test_schema.py: the kept schema
     "make figures",  # reference: the numbers; the figures are kept
     "source .venv/bin/activate",  # a shell builtin; make fit creates the folder

@@ -1,4 +1,4 @@
-"""Hard cases and graded films in pellicle and in other packages: `python benchmarks/peers`.
+"""Hard cases, dispersion models and graded films in pellicle and other packages: `python benchmarks/peers`.
 
 Creates a virtual environment in .venv-peers (several GB: torch), installs each package by name, and
 runs each in a separate process. A package that cannot be installed, crashes or hangs becomes an entry of
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import birefringent
+import dispersion
 import graded
 from cases import CASES, WITHOUT_SLOPE
 from environment import ROOT, install, peers_python
@@ -27,7 +28,7 @@ HERE = Path(__file__).resolve().parent
 PAGE = ROOT / "docs" / "hard_cases.md"
 SECONDS = 300  # for all remaining cases of a process
 BEGIN, END = "<!-- {}: written by make peers -->", "<!-- /{} -->"
-GROUPS = "films", "birefringent", "graded"
+GROUPS = "films", "birefringent", "dispersion", "graded"
 
 
 def run(python: Path, package: Package, cases: dict[str, Any]) -> dict[str, Any]:
@@ -78,7 +79,14 @@ class Group(NamedTuple):
 
 
 def group(name: str) -> Group:
-    """Return the films or the birefringent films."""
+    """Return the films, the birefringent films or the dispersion models."""
+    if name == "dispersion":
+        return Group(
+            dispersion.PACKAGES,
+            *dispersion.cases_and_truths(),
+            values="Largest error of ε₁ and ε₂:",
+            slopes="",
+        )
     if name == "birefringent":
         return Group(
             birefringent.PACKAGES,
@@ -121,7 +129,12 @@ def compared(given: Group, every_case: bool) -> str:
         try:
             if problem:
                 raise ImportError(problem)
-            columns[package.head] = run(python, package, given.cases)
+            own = {
+                k: x
+                for k, x in given.cases.items()
+                if package.adapter in x.get("packages", [package.adapter])
+            }
+            columns[package.head] = run(python, package, own)
             notes.append(f"- {package.head} {version(python, package)}: {package.note}.")
         except ImportError as why:
             notes.append(f"- {package.head}: not installed: {why}")
@@ -142,12 +155,12 @@ def refusals(answers: dict[str, Any]) -> list[str]:
 
 def report(given: Group, columns: dict[str, Any], notes: list[str], every_case: bool) -> str:
     heads, answers = list(columns), list(columns.values())
+    slopes = table(heads, answers, given.truths, "slopes", every_case) if given.slopes else ""
     return "\n\n".join(
         [
             given.values,
-            table(heads, answers, given.truths, "values", every_case),
-            given.slopes,
-            table(heads, answers, given.truths, "slopes", every_case),
+            table(heads, answers, given.truths, "values", every_case or not slopes),
+            *([given.slopes, slopes] if slopes else []),
             "Bold: not a number, refused, or an error of more than 0.0005 (values) or 1 % (derivatives). "
             "†: the package warned.",
             "\n".join(notes),
