@@ -54,6 +54,7 @@ SLOW = (
     "pellicle fit oriented.csv --recipe docs/examples/tilted_microscope.toml",
     "pellicle fit soap_film.csv --recipe docs/examples/soap_film.toml",  # fitting/film/test_ties.py
     "pellicle fit --recipe docs/examples/samples.toml",  # fitting/film/test_samples.py
+    "pellicle fit intensity.csv --layer",  # fitting/film: soap films of relative intensity
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml",  # test_back_collected.py
     "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv",  # test_anisotropic.py
     "pellicle fit film.csv --recipe docs/examples/mueller.toml",  # fitting/film/test_mueller.py

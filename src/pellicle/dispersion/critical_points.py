@@ -47,10 +47,12 @@ class CriticalPoint(AbstractOscillator):
 class ParabolicBand(AbstractOscillator):
     """ε = A e^iφ [γ/(2E0 − 2E − iγ)]^mu: a critical point between parabolic bands (CPPB).
 
-    D. Aspnes, in Handbook on Semiconductors, vol. 2, ed. M. Balkanski (1980), p. 109, scaled as commercial
-    programs do: `A` (no unit) is the height of |ε| at `E0` and `gamma` the full width, in eV; `phase` φ is in
+    The line shape of D. Aspnes, in Handbook on Semiconductors, vol. 2, ed. M. Balkanski (1980), p. 109. No
+    source was found for how commercial programs scale their CPPB: here `A` (no unit) is the height of |ε| at
+    `E0` and `gamma` the full width, in eV; compare one curve before you copy numbers. `phase` φ is in
     degrees and `mu` is 1 for an exciton, ½, 0 or −½ for one, two or three dimensions (the logarithm of two
     dimensions is `AdachiM1`). Not Kramers-Kronig consistent: it has no part at −E0 and no decay for mu ≤ 0.
+    Where the phase makes ε₂ negative, a sum counts it as 0.
     """
 
     units: ClassVar = {"E0": "eV", "gamma": "eV", "phase": "deg"}

@@ -16,9 +16,10 @@ class Psemi(AbstractOscillator):
     Before broadening ε₂ is 0 at both ends, `A` at `E0`, AL·A at the left control point E0 − PL·WL and AR·A
     at the right one E0 + PR·WR; value and slope are continuous at the control points. The outer right piece
     is AR·A·[(1 − OR) u + OR u²], u from 0 at the end to 1 at the control point: a straight line if `OR` is 0.
-    So is the left one with `OL`. C. Herzinger and B. Johs, US patent 5 796 983 (1998), whose broadening σ
-    is fwhm/(4√(2 ln 2)) = 0.2123 `fwhm` and whose second-order terms are normalised otherwise: fit `OL` and
-    `OR` instead of copying them.
+    So is the left one with `OL`. The construction is that of C. Herzinger and B. Johs, US patent 5 796 983
+    (1998), whose broadening σ is fwhm/(4√(2 ln 2)) = 0.2123 `fwhm`. No open source was found for those of
+    other programs: their ends may be energies in place of the widths WL and WR, and their second-order terms
+    are normalised otherwise. Compare one curve before you copy numbers, and fit `OL` and `OR`.
 
     `A` has no unit, energies are in eV, PL, PR, AL, AR lie between 0 and 1. ε₁ is the exact Kramers-Kronig
     integral, by the antiderivative of Dawson's integral (J. Vohánka, D. Nečas and D. Franta,
