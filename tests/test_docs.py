@@ -54,7 +54,7 @@ SLOW = (
     "pellicle fit oriented.csv --recipe docs/examples/tilted_microscope.toml",
     "pellicle fit soap_film.csv --recipe docs/examples/soap_film.toml",  # fitting/film/test_ties.py
     "pellicle fit --recipe docs/examples/samples.toml",  # fitting/film/test_samples.py
-    "pellicle fit intensity.csv --layer",  # fitting/film: soap films of relative intensity
+    "pellicle fit intensity.csv --layer",  # fitting/film/test_fit.py
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml",  # test_back_collected.py
     "pellicle simulate docs/examples/tilted_mueller.toml --out tilted.csv",  # test_anisotropic.py
     "pellicle fit film.csv --recipe docs/examples/mueller.toml",  # fitting/film/test_mueller.py
@@ -111,6 +111,7 @@ ELSEWHERE = (
     # take minutes, for which a test has a few films or pixels: reference, colour, mapping, rendering, brdf
     *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
     *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
+    "python benchmarks/shared_index.py",  # fits for minutes; fitting/film/test_samples.py: two samples
     "python benchmarks/dispersion_models.py",  # fits for minutes; dispersion: the values of each model
     "python scripts/render_blade.py",  # rendering/test_mitsuba.py: its materials
     "python scripts/make_measurements.py",  # test_measurements.py
