@@ -6,6 +6,7 @@ from pellicle.api.fits import compare as compare
 from pellicle.api.fits import fit as fit
 from pellicle.api.fits import sample as sample
 from pellicle.api.maps import map as map
+from pellicle.api.maps import series as series
 from pellicle.api.plans import cost as cost
 from pellicle.api.plans import plan as plan
 from pellicle.api.simulations import depth_profile as depth_profile
@@ -30,6 +31,7 @@ from pellicle.fitting.result import Fit as Fit
 from pellicle.fitting.result import Status as Status
 from pellicle.mapping.map_result import Map as Map
 from pellicle.mapping.photograph import ThicknessMap as ThicknessMap
+from pellicle.mapping.series import Series as Series
 from pellicle.materials import material as material
 from pellicle.recipes.read import read_recipe as read_recipe
 from pellicle.recipes.write import write_recipe as write_recipe

@@ -1,4 +1,4 @@
-"""Verb of maps: a fit at every pixel of a cube or a photograph."""
+"""Verbs of maps and series: fits at every pixel of a cube or a photograph, and of a film against time."""
 
 import os
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from pellicle.data.read_cube import is_photograph, read_cube
 from pellicle.errors import UsageError
 from pellicle.mapping.photograph import map_photograph
 from pellicle.mapping.run import map_cube
+from pellicle.mapping.series import Series, fit_series
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene
 
@@ -63,6 +64,44 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     for a store that is of another map, for pixels outside a photograph, and where nothing is free.
     """
     return _verb_for(data, scene, options)(data, scene, **options)
+
+
+def series(data: Any, scene: Scene, **options: Any) -> Series:
+    """Fit a film that changes: thickness and rate against time from all spectra together.
+
+    Each spectrum is fitted alone first, as a pixel of a map. The path of the thickness then decides the order
+    of interference, and a state-space smoother joins all spectra, linearised around their values.
+
+    **Arguments:**
+
+    - `data`: paths of the spectra of all times, of a table with a column for each time, or of a cube whose
+      only axis beside the wavelength is `time`; or such a cube as an xarray object. `time_from` says where
+      the times of files are from, as in `pellicle.read_cube`, whose other arguments apply too.
+    - `scene`: a film with a free thickness. It varies slowly, and all times share the other free numbers,
+      unless their `varies` states otherwise.
+    - `out`, `workers`, `resume`, `overwrite`, `progress`: of the map, as in `pellicle.map`.
+
+    **Returns:** a `Series`: `dataset` has thickness, rate, errors and status of each time.
+
+    **Raises:** DataError for data that cannot be read; UsageError for fewer than three times, and where
+    nothing varies.
+
+    ```python
+    grown = pl.series(["film_0s.csv", "film_20s.csv", "film_40s.csv"], scene)
+    grown.dataset.rate.plot()
+    ```
+    """
+    check_scene(scene)
+    if isinstance(scene, Surface):
+        raise UsageError("`scene` of a series must be a Scene, a film, not a Surface")
+    known = {*signature(map_cube).parameters, *signature(read_cube).parameters} - {
+        "reading",
+        "neighbours",
+        "preview",
+    }
+    if unknown := sorted(options.keys() - known):
+        raise UsageError(f"`{unknown[0]}` is no argument of a series; leave it out")
+    return fit_series(data, scene, **options)
 
 
 def _verb_for(data: Any, scene: Any, options: dict[str, Any]) -> Callable[..., Any]:

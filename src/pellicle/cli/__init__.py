@@ -15,6 +15,7 @@ from pellicle.cli.fit import compare, fit, sample
 from pellicle.cli.map import map
 from pellicle.cli.messages import abandon_stdout, as_flags, log_to_stderr, say, show
 from pellicle.cli.read import materials, read
+from pellicle.cli.series import series
 from pellicle.cli.session import BAD_DATA, INTERRUPTED, WRONG_USAGE, interruptible
 from pellicle.cli.simulate import demo, simulate
 from pellicle.errors import UsageError
@@ -28,7 +29,22 @@ app = App(
     print_error=True,
     result_action="return_value",
 )
-COMMANDS = (fit, sample, read, simulate, plan, compare, cost, chart, export, explore, map, materials, demo)
+COMMANDS = (
+    fit,
+    sample,
+    read,
+    simulate,
+    plan,
+    compare,
+    cost,
+    chart,
+    export,
+    explore,
+    map,
+    series,
+    materials,
+    demo,
+)
 for function in COMMANDS:
     app.command(function)
 app.register_install_completion_command(help="Install completion of commands and flags for this shell.")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -99,30 +101,41 @@ def film_recipe(path: str, otherwise: str) -> FilmRecipe:
 
 def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any]) -> Map | None:
     """The map of a cube in its folder; None where it was interrupted, which is stated."""
-    import shutil
-
     from pellicle.api import maps
-    from pellicle.files import MARKER, new_folder, write_text
-    from pellicle.reporting.json_record import indented, versions
-    from pellicle.reporting.map_text import SCHEMA
 
-    store, remains = None, set()
-    if folder is not None:
-        remains = {folder, *folder.iterdir()} if folder.exists() else set()
-        store = new_folder(folder) / STORE
-        if not (folder / MARKER).exists():  # it marks the folder as ours: a killed run can go on in it
-            begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
-            write_text(folder / MARKER, indented(begun))
     progress = PixelProgress(path)
     try:
-        with progress:
+        with progress, started(folder, progress):
+            store = None if folder is None else folder / STORE
             return maps.map(path, scene, out=store, progress=progress, **options)
     except KeyboardInterrupt:
         kept = f"; they are kept in {folder}, and the same command goes on from there" if folder else ""
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
         return None
-    except ValueError:  # a cube that cannot be read leaves no folder
-        if folder is not None and not progress.done:
+
+
+@contextmanager
+def started(folder: Path | None, progress: PixelProgress) -> Iterator[None]:
+    """Make the folder of a map, marked as ours, so that a run that is killed can go on in it; a cube that
+    cannot be read leaves none."""
+    import shutil
+
+    from pellicle.files import MARKER, new_folder, write_text
+    from pellicle.reporting.json_record import indented, versions
+    from pellicle.reporting.map_text import SCHEMA
+
+    if folder is None:
+        yield
+        return
+    remains = {folder, *folder.iterdir()} if folder.exists() else set()
+    new_folder(folder)
+    if not (folder / MARKER).exists():
+        begun = {"schema": SCHEMA, "status": "running", "versions": versions()}
+        write_text(folder / MARKER, indented(begun))
+    try:
+        yield
+    except ValueError:
+        if not progress.done:
             if folder / STORE not in remains:
                 shutil.rmtree(folder / STORE, ignore_errors=True)
             if folder / MARKER not in remains:

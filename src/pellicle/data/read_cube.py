@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.cubes import checks, envi, numpy_files, raw_cube, spectra_folder, tiff_stacks, xarray_cubes
+from pellicle.data.cubes import (
+    checks,
+    envi,
+    numpy_files,
+    raw_cube,
+    spectra_folder,
+    tiff_stacks,
+    time_series,
+    xarray_cubes,
+)
 from pellicle.data.cubes.frames import camera_frames, read_mask
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
 from pellicle.data.photographs import image_format
@@ -57,6 +66,7 @@ def read_cube(
     white_reflectance: float | int | str | os.PathLike[str] | Callable[[np.ndarray], Any] | None = None,
     saturation: float | int | None = None,
     calibrated: bool | None = None,
+    time_from: str | None = None,
 ) -> Cube:
     """Read a cube: reflectance, transmittance, or Ψ and Δ against wavelength at every pixel.
 
@@ -65,8 +75,8 @@ def read_cube(
     **Arguments:**
 
     - `source`: a file or folder (zarr, NetCDF, ENVI, TIFF stack, `.npy`, `.npz`, or a folder of spectra
-      with a table of their positions), an xarray DataArray or Dataset, an array, or a `Cube`,
-      which is returned as it is.
+      with a table of their positions), a list of the files of a series, an xarray DataArray or Dataset, an
+      array, or a `Cube`, which is returned as it is.
     - `variable`: the name of the variable to read, where there are several.
     - `wavelengths` of the bands, where the file has none: numbers, "400:900:5", or a file of numbers.
     - `wavelength_unit`: "nm", "um", "A", "eV", "cm-1" or "THz"; overrides what the file states.
@@ -83,6 +93,8 @@ def read_cube(
     - `white_reflectance`: of the white reference: a number, a CSV, or a function of the wavelength in nm (1).
     - `saturation`: counts from which a pixel is saturated (the largest of a whole-number type).
     - `calibrated`: False lifts the limits on the values.
+    - `time_from`: of a series of files "name" (the number in which their names differ, the default), "mtime",
+      "header", or a table of file and time.
 
     **Returns:** a `Cube`, in nm, degrees and fractions, bands by increasing wavelength.
 
@@ -100,7 +112,7 @@ def read_cube(
             "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
         )
     given, unit = (None, "") if wavelengths is None else checks.parse_wavelengths(wavelengths)
-    raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, signal))
+    raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, signal), time_from)
     nm, notes = checks.in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
     bands, told = checks.chosen_bands(nm, range, without_bands, raw.good, raw.path)
     notes = [*raw.notes, *notes, *told]
@@ -151,13 +163,17 @@ def read_cube(
     return cube
 
 
-def _raw(source: Any, asked: raw_cube.Asked) -> raw_cube.RawCube:
-    """The content of a file, an xarray object or an array. Raises DataError or UsageError."""
+def _raw(source: Any, asked: raw_cube.Asked, time_from: str | None = None) -> raw_cube.RawCube:
+    """The content of a file, a series, an xarray object or an array. Raises DataError or UsageError."""
     if xarray_cubes.is_xarray(source):
         path = str(source.encoding.get("source", "")) or f"the {type(source).__name__}"
         raw = xarray_cubes.xarray_to_raw(source, path, asked)
     elif isinstance(source, np.ndarray):
         raw = numpy_files.arrays_to_raw({"": source}, "the array", asked, ())
+    elif isinstance(source, list | tuple):
+        raw = time_series.read_series([Path(path) for path in source], time_from, asked)
+    elif isinstance(source, str | os.PathLike) and time_from is not None and Path(source).is_file():
+        raw = time_series.read_series([Path(source)], time_from, asked)
     elif isinstance(source, str | os.PathLike):
         raw = read_raw(Path(source), asked)
     else:

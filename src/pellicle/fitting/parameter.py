@@ -23,6 +23,8 @@ class Parameter:
     one-sided limit, not a warning. The ends of a `periodic` parameter are one. Minima closer than
     `resolution` (in its unit, at least 0.2 % of the value; 2 % of the range if None) are one.
 
+    `varies`: how it changes in a series, None for the usual way.
+
     `limits` marks default bounds, and is how far they may be widened; None for bounds that the user set.
 
     The rest are hints for a search: whether the parameter is `searched` or starts from `start`, the `group`
@@ -38,6 +40,7 @@ class Parameter:
     upper: float
     prior: Prior | None = None
     limits: tuple[float, float] | None = None
+    varies: str | None = None
     natural: tuple[bool, bool] = (False, False)
     periodic: bool = False
     resolution: float | None = None

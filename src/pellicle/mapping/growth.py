@@ -88,7 +88,7 @@ def growth(
     names = [n for n in names if n.split("_")[-1] == "thickness" and f"{n}_stderr_noise" in dataset]
     if not names:
         raise UsageError("a rate needs a free thickness with its standard error, and this map has none")
-    time, unit = _times(dataset[TIME], unit)
+    time, unit = elapsed(dataset[TIME], unit)
     made = dataset.copy()
     for name in names:
         for key, variable in _rate_variables(dataset, name, time, unit, window).items():
@@ -184,7 +184,7 @@ def _rates(
     return line.rate, enlarged, line.noise, reduced, line.points, status
 
 
-def _times(array: DataArray, unit: str | None) -> tuple[np.ndarray, str]:
+def elapsed(array: DataArray, unit: str | None) -> tuple[np.ndarray, str]:
     """Times since the first one, and their unit."""
     if unit is not None and unit not in _SECONDS:
         raise UsageError(f"`unit` must be one of {', '.join(_SECONDS)}, got {unit!r}")

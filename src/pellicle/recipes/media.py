@@ -305,7 +305,8 @@ def number(value: medium_schema.Number, name: str, minimum: float | None = None)
     else:
         with models.usage_errors(f"{name}: "):
             prior = None if value.prior is None else value.prior.prior()
-            result = Free(value.lower, value.upper, start=value.value, prior=prior, limits=value.limits)
+            about = {"prior": prior, "limits": value.limits, "varies": value.varies}
+            result = Free(value.lower, value.upper, start=value.value, **about)
         lowest = value.lower
     if not math.isfinite(lowest):
         raise UsageError(f"{name} must be a finite number, got {lowest:g}")

@@ -116,7 +116,8 @@ class PriorTable(BaseModel):
 class FreeTable(BaseModel):
     """A free number by its bounds, with optional start value and prior; or a fixed one by its value.
 
-    `limits` mark default bounds, which a fit of spectra may widen up to them.
+    `limits` mark default bounds, which a fit of spectra may widen up to them. `varies`: how the number
+    changes in a series of spectra.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -125,6 +126,7 @@ class FreeTable(BaseModel):
     upper: float | None = None
     limits: tuple[float, float] | None = None
     prior: PriorTable | None = None
+    varies: Literal["slowly", "freely", "shared"] | None = None
 
 
 Number = float | FreeTable | str

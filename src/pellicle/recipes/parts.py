@@ -54,7 +54,8 @@ def written_number(thing: Any, name: str) -> float | str | dict[str, Any]:
     if isinstance(thing, Free):
         limits = {} if thing.limits is None else {"limits": [*thing.limits]}
         start = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"value": thing.start}
-        bounds, prior = {**start, "lower": thing.lower, "upper": thing.upper, **limits}, thing.prior
+        varies = {} if thing.varies is None else {"varies": thing.varies}
+        bounds, prior = {**start, "lower": thing.lower, "upper": thing.upper, **limits, **varies}, thing.prior
         if prior is None:
             return bounds
         if isinstance(prior, Normal):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, NO_DATA
 from pellicle.fitting.result import Status
 from pellicle.mapping.map_result import Map, Run
-from pellicle.reporting.fit_text import ADVICE
+from pellicle.reporting.fit_text import ADVICE as OF_FITS
 from pellicle.reporting.json_record import strict, taken, versions
 from pellicle.reporting.map_summary import DECIDED, MapSummary, ParameterSummary, dataset_of, summarise
 from pellicle.reporting.plain_text import blocks_of, facts, wrapped
@@ -26,7 +26,7 @@ ERRORS = (
     " the value at a pixel. Differences between pixels have the error of the noise alone (`stderr_noise`)."
 )
 """Explanation of the errors of a map, and when to use which."""
-_ADVICE = {str(status): text for status, text in ADVICE.items()} | {
+ADVICE = {str(status): text for status, text in OF_FITS.items()} | {
     BY_NEIGHBOURS: "Use the numbers where the thickness cannot jump: the order follows from the neighbours'.",
 }
 
@@ -54,7 +54,7 @@ def cube_report(made: Dataset | Map, summary: MapSummary | None = None) -> str:
 
 def status_rows(made: MapSummary) -> list[tuple[str, str]]:
     """Each status that occurs, and what to do."""
-    return [(word, advice) for word, advice in _ADVICE.items() if word in made.counts]
+    return [(word, advice) for word, advice in ADVICE.items() if word in made.counts]
 
 
 def rate_rows(made: MapSummary) -> list[tuple[str, str]]:

@@ -67,6 +67,11 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
         from pellicle.reporting.map_text import cube_report
 
         ways = _Ways(cube_report, lambda made: next(maps.figures(made))[1], maps.write_cube_map)
+    module = sys.modules.get("pellicle.mapping.series")
+    if module is not None and isinstance(result, module.Series):
+        from pellicle.reporting import series
+
+        ways = _Ways(series.report, series.draw, series.write_series)
     way = None if ways is None else getattr(ways, name)
     if way is None:
         raise TypeError(f"a {type(result).__name__} has no {wanted} have")

@@ -18,6 +18,9 @@ from pellicle.scene.priors import Prior
 MOST_FREE = 64
 """Most parameters a fit may have free: 21 took 30 s and 121 did not end within 5 minutes (two cores)."""
 
+VARIES = SLOWLY, FREELY, SHARED = "slowly", "freely", "shared"
+"""How a parameter changes in a series: steadily, from time to time, or not at all."""
+
 
 class Tie(NamedTuple):
     """Expression of labels of free numbers that a tied number follows; its text is None where anonymous."""
@@ -38,10 +41,11 @@ class Free(eqx.Module):
     **Arguments:** `lower` and `upper` bounds, `start` value (the middle of the bounds if None) and `prior`
     (uniform between the bounds if None), all in the parameter's own unit. `limits` marks default bounds,
     which nobody chose for this sample: a fit of spectra may widen them up to these limits (lower, upper) of
-    physics, and a best value on one of them is a remark, not the status `at-bound`.
+    physics, and a best value on one of them is a remark, not the status `at-bound`. `varies`: how the
+    parameter changes in a series, one of `VARIES`; None for the usual way.
 
     **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them,
-    or they are outside the limits.
+    or they are outside the limits, or for another word of `varies`.
 
     >>> Free(10, 3000).start
     1505.0
@@ -52,6 +56,7 @@ class Free(eqx.Module):
     start: float = eqx.field(static=True)
     limits: tuple[float, float] | None = eqx.field(static=True)
     prior: Prior | None
+    varies: str | None = eqx.field(static=True)
     label: Any = eqx.field(static=True)
     """By which ties know it; None where none does."""
     tie: Tie | None = eqx.field(static=True)
@@ -65,6 +70,7 @@ class Free(eqx.Module):
         start: float | None = None,
         prior: Prior | None = None,
         limits: tuple[float, float] | None = None,
+        varies: str | None = None,
     ):
         given = {"lower": lower, "upper": upper, "start": start}
         for name, value in given.items():
@@ -82,7 +88,9 @@ class Free(eqx.Module):
         if limits is not None and not limits[0] <= lower < upper <= limits[1]:
             raise ValueError(f"the bounds {lower:g} to {upper:g} are outside {limits[0]:g} to {limits[1]:g}")
         self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
-        self.limits, self.label, self.tie = limits, None, None
+        if varies is not None and varies not in VARIES:
+            raise ValueError(f"`varies` must be one of {', '.join(VARIES)}, not {varies!r}")
+        self.limits, self.varies, self.label, self.tie = limits, varies, None, None
 
 
 def labelled(free: Free, label: Any) -> Free:
@@ -97,7 +105,8 @@ def tied(lower: float, upper: float, start: float, tie: Tie) -> Free:
     """Return a tied number, whose bounds may be one. Raises UsageError for bounds that are not finite."""
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise UsageError("is not finite within its bounds")
-    other, given = object.__new__(Free), {"prior": None, "limits": None, "label": None, "tie": tie}
+    given: dict[str, Any] = dict.fromkeys(("prior", "limits", "varies", "label"))
+    given["tie"], other = tie, object.__new__(Free)
     for name, own in {"lower": lower, "upper": upper, "start": start, **given}.items():
         object.__setattr__(other, name, own)
     return other

@@ -56,6 +56,14 @@ class Stepped(NamedTuple):
     damping: Any
 
 
+class Curved(NamedTuple):
+    """Misfits around points: slope and Gauss-Newton curvature of half the deviance in the unit cube, arrays
+    (spectra, parameters) and (spectra, parameters, parameters)."""
+
+    gradient: Any
+    hessian: Any
+
+
 class Best(NamedTuple):
     """The best minimum of each spectrum after one more step, as in `Stepped`; the model (spectra, points)
     there and its slopes by the parameters in their own units."""
@@ -101,6 +109,19 @@ def explained(static: Static, common: Common, rows: BatchData, units: Any) -> Ex
         return _residual(static, common, row, unit)[1][0]
 
     return Explained(jax.vmap(jax.vmap(one, (None, 0)))(rows, units))
+
+
+@kept
+def curved(static: Static, common: Common, rows: BatchData, units: Any) -> Curved:
+    """Slope and curvature of the misfits at points `units` (spectra, parameters)."""
+
+    def one(row, unit):
+        _, gradient, hessian, _ = normal_equations(
+            lambda unit, _: _residual(static, common, row, unit), unit, None
+        )
+        return Curved(gradient, hessian)
+
+    return jax.vmap(one)(rows, units)
 
 
 @partial(kept, many_calls=True)

@@ -125,6 +125,7 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         upper=free.upper,
         prior=free.prior,
         limits=free.limits,
+        varies=free.varies,
         natural=(
             (strength or (field or key) in _NATURAL_ZERO) and free.lower == 0,
             key in _NATURAL_ONE and free.upper == 1,
@@ -152,7 +153,7 @@ def with_bounds(scene: Scene, parameters: Sequence[Parameter]) -> Scene:
     """The scene with the bounds of these parameters, which are its own in their order."""
     pairs = zip(free_leaves(scene), parameters, strict=True)
     free = [
-        Free(p.lower, p.upper, start=free.start, prior=free.prior, limits=free.limits)
+        Free(p.lower, p.upper, start=free.start, prior=free.prior, limits=free.limits, varies=free.varies)
         for (_, free), p in pairs
     ]
     return insert(scene, free)

@@ -1,0 +1,118 @@
+"""Series of simulated films that grow, jump and hide, by a simulator of its own, and the command."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+import pellicle as pl
+from pellicle.cli import app
+from pellicle.errors import UsageError
+
+NM, TIME = np.linspace(600, 700, 24), np.arange(80) * 10.0
+GROWN = 200 + 1800 * (1 - np.exp(-TIME / 500))
+SCENE = pl.Scene(pl.Layer(1.46, pl.Free(0, 3000)), 3.9)
+
+
+def reflectance(thickness, n=1.46):
+    """The Airy formula at normal incidence: a layer of index n on one of 3.9, (times, wavelengths)."""
+    upper, lower = (1 - n) / (1 + n), (n - 3.9) / (n + 3.9)
+    turn = np.exp(-4j * np.pi * n * np.asarray(thickness)[:, None] / NM)
+    return np.abs((upper + lower * turn) / (1 + upper * lower * turn)) ** 2
+
+
+def cube(thickness, noise=0.01, seed=0, n=1.46):
+    values = reflectance(thickness, n)
+    values = values + noise * np.random.default_rng(seed).standard_normal(values.shape)
+    coords = {
+        "time": ("time", TIME[: len(values)], {"units": "s"}),
+        "wavelength": ("wavelength", NM, {"units": "nm"}),
+    }
+    return xarray.Dataset({"R": (("time", "wavelength"), values)}, coords)
+
+
+@pytest.fixture(scope="module")
+def grown():
+    return pl.series(cube(GROWN), SCENE)
+
+
+def test_thickness_and_rate_come_back_within_their_errors(grown):
+    found = grown.dataset
+    off = (found.thickness - GROWN) / found.thickness_stderr_noise
+    assert np.sqrt(np.mean(off**2)) < 1.7
+    assert np.abs(found.thickness - GROWN).max() < 4
+    rate = 60 * 1800 / 500 * np.exp(-TIME / 500)  # nm per minute
+    assert found.rate.attrs["units"] == "nm/min"
+    assert (np.abs(found.rate - rate) < 4 * found.rate_stderr).all()
+    assert grown.decided == 1
+    assert not grown.breaks
+
+
+def test_all_times_know_more_than_one(grown):
+    alone = np.asarray(grown.map["thickness"]) - GROWN
+    assert np.sqrt(np.mean((grown["thickness"] - GROWN) ** 2)) < 0.6 * np.sqrt(np.mean(alone**2))
+
+
+def test_a_jump_and_a_gap_are_told_and_nothing_after_them_is_wrong():
+    true = np.where(np.arange(80) < 50, GROWN, GROWN - 160)
+    data = cube(true, seed=1)
+    data.R[20:30] = np.nan
+    found = pl.series(data, SCENE)
+    assert found.breaks == pytest.approx([TIME[50] / 60])
+    assert any("no data between" in text for text in found.warnings)
+    decided = np.isfinite(found["thickness"])
+    assert decided.sum() == 70
+    assert (np.abs(found["thickness"] - true)[decided] < 5).all()
+
+
+def test_an_index_that_all_times_share_is_known_by_all():
+    scene = pl.Scene(pl.Layer(pl.Free(1.4, 1.6), pl.Free(0, 3000)), 3.9)
+    found = pl.series(cube(GROWN, noise=0.003, seed=2, n=1.5), scene).dataset
+    assert abs(found.n - 1.5) < 4 * found.n_stderr_noise
+    assert found.n_stderr_noise < 0.002
+    assert (np.abs(found.thickness - GROWN) < 4 * found.thickness_stderr_noise).all()
+
+
+def test_an_order_that_nothing_decides_is_not_decided():
+    """A film that hardly changes, seen in a narrow band: the order is open, and said to be."""
+    data = cube(1500 + 5 * np.sin(TIME / 100), seed=3).isel(wavelength=slice(0, 6))
+    found = pl.series(data, SCENE)
+    assert found.decided < 0.1
+    assert any("not decided" in text for text in found.warnings)
+
+
+def test_what_is_no_series_is_refused(tmp_path):
+    data = cube(GROWN)
+    with pytest.raises(UsageError, match="comes after a later one"):
+        pl.series(data.isel(time=[0, 2, 1, 3]), SCENE)
+    with pytest.raises(UsageError, match="three times"):
+        pl.series(data.isel(time=[0, 1]), SCENE)
+    with pytest.raises(UsageError, match="along `time` only"):
+        pl.series(data.rename(time="x").expand_dims(y=[0.0]), SCENE)
+    fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 3000, varies="shared")), 3.9)
+    with pytest.raises(UsageError, match="nothing varies"):
+        pl.series(data, fixed)
+
+
+def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    values = cube(GROWN).R.values[::4]
+    names = []
+    for seconds, row in zip(TIME[::4], values, strict=True):
+        names.append(f"film_{seconds:03.0f}s.csv")
+        rows = "\n".join(f"{nm:.4f},{r:.6f}" for nm, r in zip(NM, row, strict=True))
+        (tmp_path / names[-1]).write_text(f"wavelength_nm,R\n{rows}\n")
+    layer = "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 0, upper = 3000 }\n"
+    (tmp_path / "film.toml").write_text(f"[scene]\nsubstrate = 3.9\n{layer}")
+    words = ["series", *names, "--recipe", "film.toml", "--out", "grown", "--workers", "1"]
+    assert app(words) == 0
+    first = xarray.load_dataset("grown/series.nc")
+    assert (np.abs(first.thickness - GROWN[::4]) < 5).all()
+    assert {x.name for x in (tmp_path / "grown").iterdir()} >= {"series.csv", "series.png", "report.html"}
+    capsys.readouterr()
+    assert app([*words, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["schema"] == "pellicle.series/1"
+    assert record["times"]["count"] == 20
+    xarray.testing.assert_identical(xarray.load_dataset("grown/series.nc"), first)
