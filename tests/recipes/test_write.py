@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 PATTERNS = ("docs/**/*.toml", "fits/**/recipe.toml", "measurements/**/*.toml", "benchmarks/**/*.toml")
 SEVERAL = (
     ROOT / "docs/examples/samples.toml"
-)  # of several scenes; its kept recipe: fitting/film/test_samples.py
+)  # of several scenes; tests are in recipes/test_samples.py
 RECIPES = sorted({path for pattern in PATTERNS for path in ROOT.glob(pattern)} - {SEVERAL})
 
 
