@@ -82,6 +82,18 @@ def test_an_order_that_nothing_decides_is_not_decided():
     assert any("not decided" in text for text in found.warnings)
 
 
+def test_a_netcdf_file_and_a_folder_of_files_are_series(grown, tmp_path):
+    data = cube(GROWN)
+    data.to_netcdf(tmp_path / "grown.nc")
+    assert pl.series(tmp_path / "grown.nc", SCENE).dataset.equals(grown.dataset)
+    (tmp_path / "files").mkdir()
+    for seconds, row in zip(TIME[:4], data.R.values, strict=False):
+        rows = "\n".join(f"{nm:.4f},{r:.6f}" for nm, r in zip(NM, row, strict=True))
+        (tmp_path / "files" / f"{seconds:g}s.csv").write_text(f"wavelength_nm,R\n{rows}\n")
+    found = pl.series(tmp_path / "files", SCENE)
+    assert list(found.times) == pytest.approx([0, 10, 20, 30])
+
+
 def test_what_is_no_series_is_refused(tmp_path):
     data = cube(GROWN)
     with pytest.raises(UsageError, match="comes after a later one"):

@@ -20,9 +20,7 @@ from pellicle.scene.instrument import Drift
 
 ROOT = Path(__file__).parents[2]
 PATTERNS = ("docs/**/*.toml", "fits/**/recipe.toml", "measurements/**/*.toml", "benchmarks/**/*.toml")
-SEVERAL = (
-    ROOT / "docs/examples/samples.toml"
-)  # of several scenes; tests are in recipes/test_samples.py
+SEVERAL = ROOT / "docs/examples/samples.toml"  # of several scenes; tests are in recipes/test_samples.py
 RECIPES = sorted({path for pattern in PATTERNS for path in ROOT.glob(pattern)} - {SEVERAL})
 
 

@@ -326,6 +326,18 @@ def read_raw(path: Path, asked: raw_cube.Asked) -> raw_cube.RawCube:
     raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
 
 
+def series_files(source: Any) -> Any:
+    """The source of a series as `read_cube` takes it: a folder that is no cube as a list of its files, and a
+    file that no reader of cubes recognises as a list of one."""
+    if not isinstance(source, str | os.PathLike):
+        return source
+    path = Path(source)
+    if path.is_dir() and not xarray_cubes.is_zarr(path) and spectra_folder.table_of(path) is None:
+        return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
+    known = any(recognises(path) for recognises in READERS) if path.exists() else True
+    return source if known else [path]
+
+
 def is_cube(path: Path) -> bool:
     """True for a file or folder that only a reader of cubes understands; HDF5 may also be a spectrum."""
     read = next((read for recognises, read in READERS.items() if path.exists() and recognises(path)), None)

@@ -7,19 +7,17 @@ again after each pass.
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from inspect import signature
 from itertools import pairwise
 from logging import getLogger
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.read_cube import is_cube, read_cube
+from pellicle.data.read_cube import read_cube, series_files
 from pellicle.errors import UsageError
 from pellicle.fitting.batch import polish
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES, batch_data
@@ -109,9 +107,7 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
     reading: dict[str, Any] = {name: options.pop(name) for name in of_reading}
     if isinstance(scene.instrument.scale, Drift):  # values may have any level
         reading = {"calibrated": False} | reading
-    if isinstance(data, str | os.PathLike) and not is_cube(Path(data)):
-        data = [data]
-    cube = read_cube(data, **reading)
+    cube = read_cube(series_files(data), **reading)
     if cube.dims != (TIME,):
         raise UsageError(
             f"{cube.path or 'data'}: a series has spectra along `time` only, and this has the axes"
