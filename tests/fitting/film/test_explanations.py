@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.errors import DataError
+from pellicle.fitting.film.explanations import _Trials
+from pellicle.fitting.film.mistakes import Mistake
 
 from ...by_tmm import films, ncs, psi_delta
 
@@ -88,3 +91,21 @@ def test_files_of_other_spots_are_told_apart():
     [said] = [warning for warning in fit.warnings if warning.startswith("the files disagree")]
     depths = [float(x) for x in re.findall(r"alone gives ([\d.]+) nm", said)]
     assert depths == pytest.approx([300.0, 330.0], rel=3e-3)
+
+
+def test_a_number_is_sought_where_the_media_are_known(monkeypatch):
+    """Shifted wavelengths may pass the end of a table: the least misfit of those that do not is taken."""
+
+    def change(target, value):
+        if abs(value) > 9:
+            raise DataError("SU-8 is known from 320 to 1450 nm")
+        return target
+
+    def searched(self, trial, thorough, compiled=False):
+        return trial._replace(deviance=(trial.value - 3.3) ** 2)
+
+    monkeypatch.setattr(_Trials, "_searched", searched)
+    mistake = Mistake("{} nm off", "", (), change, np.linspace(-16, 16, 9))
+    trials = object.__new__(_Trials)
+    trials.data = None
+    assert abs(trials._best(mistake, [None]) - 3.3) < 1e-6

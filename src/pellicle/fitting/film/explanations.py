@@ -158,7 +158,9 @@ class _Trials:
                 best = min(known, key=lambda x: known[x])
                 if known[best] > _FALLS * known[middle]:
                     break
-                near = sorted(known, key=lambda x: abs(x - best))[:3]
+                near = sorted((x for x in known if known[x] < math.inf), key=lambda x: abs(x - best))[:3]
+                if len(near) < 3:
+                    break
                 bend, slope, _ = np.polyfit(np.array(near) - best, [known[x] for x in near], 2)
                 reach = max(abs(x - best) for x in near)
                 step = np.clip(-slope / (2 * bend), -reach, reach) if bend > 0 else reach / 2
@@ -166,8 +168,11 @@ class _Trials:
             x = float(todo.pop(0))
             if x in known:
                 break
-            changed = [mistake.change(target, x) for target in targets]
-            known[x] = self._searched(Tried(mistake, x, changed, self.data), False).deviance
+            try:
+                changed = [mistake.change(target, x) for target in targets]
+                known[x] = self._searched(Tried(mistake, x, changed, self.data), False).deviance
+            except DataError:  # wavelengths beyond the table of a material
+                known[x] = math.inf
         return min(known, key=lambda x: known[x])
 
     def _searched(self, trial: Tried, thorough: bool, compiled: bool = False) -> Tried:
