@@ -95,12 +95,14 @@ def draw(series: Series) -> Figure:
     """Draw what varies against time with its errors, the fits of the times alone, and the rates."""
     data, time = series.dataset, series.times
     decided = is_decided(data["status"].values)
+    cut = np.searchsorted(time, series.breaks)  # no line crosses a break
     panels = []
     for name in [str(n) for n in data.data_vars if data[n].dims and f"{n}_stderr_noise" in data]:
         value, error = (data[key].values for key in (name, f"{name}_stderr"))
-        about = data[name].attrs
-        label = labelled(str(about.get("long_name", name)), str(about["units"]).removesuffix("1"))
-        lines = [Line(time, value, "all times together", "fit")]
+        label = labelled(name.replace("_", " "), str(data[name].attrs["units"]).removesuffix("1"))
+        lines = [
+            Line(np.insert(time, cut, np.nan), np.insert(value, cut, np.nan), "all times together", "fit")
+        ]
         if name in series.map.dataset:
             alone = np.where(decided, np.asarray(series.map[name], float), np.nan)
             other = np.where(decided, np.nan, value)
