@@ -80,6 +80,7 @@ def test_an_order_that_nothing_decides_is_not_decided():
     found = pl.series(data, SCENE)
     assert found.decided < 0.1
     assert any("not decided" in text for text in found.warnings)
+    assert not found.breaks
 
 
 def test_a_netcdf_file_and_a_folder_of_files_are_series(grown, tmp_path):

@@ -16,6 +16,8 @@ from pellicle.fitting.robust_losses import MAD_TO_SIGMA
 
 BREAK = 50.0
 """Price of a break, as Δχ²."""
+_STEP = 0.3
+"""Share of the distance of minima above which a step is one between them."""
 _FEWEST = 5
 """Times in a row that show how evenly a thickness changes."""
 
@@ -46,7 +48,9 @@ def order_path(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stder
     path = _best(time, thickness, delta, stderr, uneven, 1.0)
     others = np.where(delta < BREAK, np.abs(thickness - thickness[rows, path.chosen][:, None]), np.nan)
     distance = np.nanmedian(np.where(others > 0, others, np.nan)) if np.any(others > 0) else np.inf
-    steps = np.where(path.breaks[1:], 0.0, np.abs(np.diff(thickness[rows, path.chosen])))
+    steps = np.abs(np.diff(thickness[rows, path.chosen]))
+    # neither a step within the noise nor one to another order is a new look
+    steps = np.where(steps < _STEP * distance, np.maximum(steps - 2 * stderr[1:], 0.0), 0.0)
     looks = 1.0 + float(np.sum(steps)) / (0.5 * distance)
     weight = min(1.0, looks / len(time))
     if weight < 1:

@@ -303,7 +303,9 @@ def _series(
     result = xarray.Dataset(
         variables, {TIME: (TIME, time, {"units": unit, "long_name": "time since the first"})}
     )
-    breaks = tuple(float(x) for x in time[used][path.breaks])
+    # where the order is open a path may jump, and the film need not
+    sure = path.breaks & (path.rival > SURE) & (np.roll(path.rival, 1) > SURE)
+    breaks = tuple(float(x) for x in time[used][sure])
     return Series(result, breaks, _warnings(time, unit, used, breaks, result), made)
 
 
