@@ -31,7 +31,7 @@ from pellicle.fitting.result import Fit as Fit
 from pellicle.fitting.result import Status as Status
 from pellicle.mapping.map_result import Map as Map
 from pellicle.mapping.photograph import ThicknessMap as ThicknessMap
-from pellicle.mapping.series import Series as Series
+from pellicle.mapping.series_result import Series as Series
 from pellicle.materials import material as material
 from pellicle.recipes.read import read_recipe as read_recipe
 from pellicle.recipes.write import write_recipe as write_recipe

@@ -9,6 +9,7 @@ import pellicle as pl
 from pellicle.errors import DataError
 from pellicle.fitting.film.samples import joined
 from pellicle.recipes.read import FilmRecipe
+from pellicle.recipes.write import samples_text
 
 HEAD = """
 [scene]
@@ -62,7 +63,7 @@ def test_the_kept_recipe_is_the_same(tmp_path):
     """Scenes and files are those of the recipe, from another folder."""
     read, folder = recipe(tmp_path, TWO), tmp_path / "deep" / "out"
     folder.mkdir(parents=True)
-    (folder / "recipe.toml").write_text(read.kept({"noise": 0.01}, {}, folder), encoding="utf-8")
+    (folder / "recipe.toml").write_text(samples_text(read, {"noise": 0.01}, {}, folder), encoding="utf-8")
     kept = pl.read_recipe(folder / "recipe.toml")
     assert isinstance(kept, FilmRecipe)
     assert [Path(x).resolve() for x in kept.files] == [Path(x).resolve() for x in read.files]

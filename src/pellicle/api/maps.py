@@ -10,7 +10,8 @@ from pellicle.data.read_cube import is_photograph, read_cube
 from pellicle.errors import UsageError
 from pellicle.mapping.photograph import map_photograph
 from pellicle.mapping.run import map_cube
-from pellicle.mapping.series import Series, fit_series
+from pellicle.mapping.series import fit_series
+from pellicle.mapping.series_result import Series
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene
 
@@ -66,6 +67,10 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     return _verb_for(data, scene, options)(data, scene, **options)
 
 
+_OF_MAPS = "neighbours", "preview", "lamp_curve", "lamp_reference"
+"""Arguments of the map of a cube that a series does not take."""
+
+
 def series(data: Any, scene: Scene, **options: Any) -> Series:
     """Fit a film that changes: thickness and rate against time from all spectra together.
 
@@ -94,11 +99,8 @@ def series(data: Any, scene: Scene, **options: Any) -> Series:
     check_scene(scene)
     if isinstance(scene, Surface):
         raise UsageError("`scene` of a series must be a Scene, a film, not a Surface")
-    known = {*signature(map_cube).parameters, *signature(read_cube).parameters} - {
-        "reading",
-        "neighbours",
-        "preview",
-    }
+    known = {*signature(map_cube).parameters, *signature(read_cube).parameters}
+    known -= {"reading", *_OF_MAPS}
     if unknown := sorted(options.keys() - known):
         raise UsageError(f"`{unknown[0]}` is no argument of a series; leave it out")
     return fit_series(data, scene, **options)

@@ -212,7 +212,9 @@ def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) 
         inputs += _film_inputs(file, scene, how, own_scale)
     data = recipe.tables.data
     if recipe.tables.sample:
-        written = partial(recipe.kept, reading.given())
+        from pellicle.recipes.write import samples_text
+
+        written = partial(samples_text, recipe, reading.given())
         return Inputs(inputs, True, FitOptions.of(data.given()), samples=written)
     result = Inputs(inputs, data.joint, FitOptions.of(data.given()), repeats=data.repeats)
     if not recipe.each:

@@ -29,11 +29,27 @@ STORE, NETCDF, RATES = "map.zarr", "map.nc", "rate.nc"
 
 
 @dataclass(frozen=True)
-class RunFlags(Flags):
-    """Flags of the computation of a map, None where not given."""
+class StoreFlags(Flags):
+    """Flags of the fits of many spectra in a store, None where not given."""
 
     workers: Annotated[int | None, flag(RUN)] = None
     """Processes on this machine, one thread each (its cores, if that saves time)."""
+    resume: Annotated[bool | None, flag(OUTPUT)] = None
+    """Go on with what an earlier run left in --out (the default)."""
+    overwrite: Annotated[bool | None, switch(OUTPUT, "Replace what an earlier run left in --out.")] = None
+
+    def check(self, out: str | None) -> None:
+        """Raise UsageError for flags that do not go together."""
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"--workers must be at least 1, got {self.workers}")
+        if out is None and (idle := [name for name in self.given() if name in ("--resume", "--overwrite")]):
+            raise UsageError(f"{idle[0]} needs --out, the folder of the result")
+
+
+@dataclass(frozen=True)
+class RunFlags(StoreFlags):
+    """Flags of the computation of a map, None where not given."""
+
     scheduler: Annotated[str | None, flag(RUN)] = None
     """Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels."""
     neighbours: Annotated[bool | None, switch(RUN)] = None
@@ -50,21 +66,15 @@ class RunFlags(Flags):
     """Recipe of the region of --lamp-curve (the bare substrate)."""
     preview: Annotated[bool | None, switch(RUN)] = None
     """Fit a few thousand pixels only, into the folder OUT-preview."""
-    resume: Annotated[bool | None, flag(OUTPUT)] = None
-    """Go on with the map that an earlier run left in --out (the default)."""
-    overwrite: Annotated[bool | None, switch(OUTPUT, "Replace a map that is in --out.")] = None
 
 
 def map_cube(
     path: str, described: FilmRecipe, run: RunFlags, cube: CubeFlags, out: str | None, json: bool
 ) -> int:
     """Map a cube, print the report, write the folder, and return the exit code."""
-    if run.workers is not None and run.workers < 1:
-        raise UsageError(f"--workers must be at least 1, got {run.workers}")
+    run.check(out)
     if run.workers is not None and run.scheduler is not None:
         raise UsageError("--workers are processes of this machine, and --scheduler has its own: give one")
-    if out is None and (idle := [name for name in run.given() if name in ("--resume", "--overwrite")]):
-        raise UsageError(f"{idle[0]} needs --out, the folder of the map")
     folder = None if out is None else Path(f"{out.rstrip('/')}-preview" if run.preview else out)
     if folder is not None:
         check_folder(str(folder))
@@ -78,7 +88,7 @@ def map_cube(
     from pellicle.reporting.map_text import cube_json, cube_report
 
     options["recipe"] = Path(described.path).read_text(encoding="utf-8")
-    made = _fitted(path, scene, folder, options | cube.arguments(described))
+    made = fitted("map", path, scene, folder, options | cube.arguments(described))
     if made is None:
         return INTERRUPTED
     if made.run is not None and made.run.earlier:
@@ -99,15 +109,16 @@ def film_recipe(path: str, otherwise: str) -> FilmRecipe:
     return described
 
 
-def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any]) -> Map | None:
-    """The map of a cube in its folder; None where it was interrupted, which is stated."""
+def fitted(verb: str, source: Any, scene: Scene, folder: Path | None, options: dict[str, Any]) -> Any:
+    """The result of a `verb` of `pellicle.api.maps` in its folder; None where it was interrupted, which is
+    stated."""
     from pellicle.api import maps
 
-    progress = PixelProgress(path)
+    progress = PixelProgress(source if isinstance(source, str) else verb)
     try:
-        with progress, started(folder, progress):
+        with progress, _started(folder, progress):
             store = None if folder is None else folder / STORE
-            return maps.map(path, scene, out=store, progress=progress, **options)
+            return getattr(maps, verb)(source, scene, out=store, progress=progress, **options)
     except KeyboardInterrupt:
         kept = f"; they are kept in {folder}, and the same command goes on from there" if folder else ""
         say(f"interrupted after {progress.done} of {progress.total} pixels{kept}")
@@ -115,7 +126,7 @@ def _fitted(path: str, scene: Scene, folder: Path | None, options: dict[str, Any
 
 
 @contextmanager
-def started(folder: Path | None, progress: PixelProgress) -> Iterator[None]:
+def _started(folder: Path | None, progress: PixelProgress) -> Iterator[None]:
     """Make the folder of a map, marked as ours, so that a run that is killed can go on in it; a cube that
     cannot be read leaves none."""
     import shutil

@@ -45,7 +45,7 @@ def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Sp
 
     low, high = common_range(scene)
     ends = low - ROUNDING, high + ROUNDING
-    return [within(x, ends, f"{limits(scene, x.wavelength)}") for x in spectra]
+    return [within(x, ends, limits(scene, x.wavelength)) for x in spectra]
 
 
 def _read(path: str, options: FileOptions, scene: Scene | None) -> list[Spectrum]:

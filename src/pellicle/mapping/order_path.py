@@ -37,12 +37,9 @@ def order_path(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stder
     What all times have in common, such as the error of an index, favours the same order at all of them, so
     Δχ² of times within half an order count once.
 
-    **Arguments:** `time` (times,), increasing; `thickness` and `delta` (times, minima) with NaN and infinity
-    where there are fewer, at least one at each time; `stderr` (times,) by the noise.
+    **Arguments:** `time` (times,), three or more, increasing; `thickness` and `delta` (times, minima) with
+    NaN and infinity where there are fewer, at least one at each time; `stderr` (times,) by the noise.
     """
-    if len(time) < 3:
-        spare = np.full(len(time), np.inf) if delta.shape[1] < 2 else np.sort(delta, axis=1)[:, 1]
-        return OrderPath(np.argmin(delta, axis=1), spare, np.zeros(len(time), bool))
     uneven = _unevenness(time, thickness, delta, stderr)
     rows = np.arange(len(time))
     path = _best(time, thickness, delta, stderr, uneven, 1.0)

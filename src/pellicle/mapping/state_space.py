@@ -108,22 +108,24 @@ def _best(series: _Times) -> tuple[int, np.ndarray]:
     some, slow = series.thinned(), series.kinds.count(SLOWLY)
     if not slow:
         return _DERIVATIVES[0], np.zeros(0)
-    fits = []
-    for states in _DERIVATIVES:
-        arrays = some.arrays(states)
+    return min((_stiffness(some, states, slow) for states in _DERIVATIVES), key=lambda fit: fit[0])[1:]
 
-        def deviance(noise: np.ndarray, states: int = states, arrays: Any = arrays) -> float:
-            value = float(_deviance(some.chain(noise, states), *arrays))
-            return value if np.isfinite(value) else np.inf
 
-        every = _STIFFNESS - (2 * states - 1) * np.log10(np.sum(series.steps))
-        start = np.full(slow, every[int(np.argmin([deviance(np.full(slow, value)) for value in every]))])
-        simplex = start + np.vstack([np.zeros(slow), 0.7 * np.eye(slow)])
-        options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.02, "maxfev": 60 * slow}
-        best = minimize(deviance, start, method="Nelder-Mead", options=options).x
-        best = np.clip(best, every[0] - 4, every[-1] + 4)
-        fits.append((deviance(best), states, best))
-    return min(fits, key=lambda fit: fit[0])[1:]
+def _stiffness(series: _Times, states: int, slow: int) -> tuple[float, int, np.ndarray]:
+    """The marginal deviance at its least, the number of states, and the logarithms of the process noise."""
+    arrays = series.arrays(states)
+
+    def deviance(noise: np.ndarray) -> float:
+        value = float(_deviance(series.chain(noise, states), *arrays))
+        return value if np.isfinite(value) else np.inf
+
+    every = _STIFFNESS - (2 * states - 1) * np.log10(np.sum(series.steps))
+    start = np.full(slow, every[int(np.argmin([deviance(np.full(slow, value)) for value in every]))])
+    simplex = start + np.vstack([np.zeros(slow), 0.7 * np.eye(slow)])
+    options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.02, "maxfev": 60 * slow}
+    best = minimize(deviance, start, method="Nelder-Mead", options=options).x
+    best = np.clip(best, every[0] - 4, every[-1] + 4)
+    return deviance(best), states, best
 
 
 class _Times(NamedTuple):

@@ -33,7 +33,7 @@ R, T and N, C, S by about k itself; what the path through the ambient absorbs is
 in the sample's place, or in both polarisations, so calibration or the ratio has removed it."""
 
 ROUNDING = 0.03
-"""How far (nm) a wavelength may lie beyond the data of a material, which then has the index of their end.
+"""Distance (nm) of a wavelength beyond the data of a material at which it has the index of their end.
 Programs write nm with one or two digits; 1240/E for 1239.84/E moves 230 nm by 0.03."""
 
 _SAMPLES = 200

@@ -192,20 +192,6 @@ class FilmRecipe:
             for name, x in table.given().items()
         }
 
-    def kept(self, reading: Mapping[str, Any], fitting: Mapping[str, Any], folder: Path) -> str:
-        """The text of this recipe of several samples in a folder, with options of the command line.
-
-        **Raises:** UsageError for options that files name, which it cannot express.
-        """
-        from pellicle.recipes.write import moved
-
-        tables = self.tables.model_dump(exclude_unset=True)
-        tables["data"] = tables.get("data", {}) | dict(fitting)
-        for sample in tables["sample"]:
-            for own in (sample, *sample.get("file", ())):
-                own |= reading
-        return moved(tables, Path(self.path).parent, folder)
-
     def sight(self) -> Sight:
         """Sensor and coding of the colours by `[camera]`. Raises DataError, the recipe's path in front."""
         names = {field.name for field in fields(Camera)}

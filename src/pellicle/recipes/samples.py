@@ -12,7 +12,7 @@ from pellicle.recipes import schema
 from pellicle.recipes.media import number
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
-from pellicle.scene.names import full_name, layer_name, location_of
+from pellicle.scene.names import aliases_of, location_of
 from pellicle.scene.samples import Sample
 from pellicle.scene.ties import Tied, bound
 
@@ -75,7 +75,7 @@ def of_sample(scene: Scene, sample: schema.SampleTable) -> Scene:
     known, leaves = {}, [x for _, x in pairs]
     for i, (path, x) in enumerate(pairs):
         if path[0].name in ("layers", "substrate", "ambient") and (leaf(x) or isinstance(x, int | float)):
-            known |= dict.fromkeys(_aliases(scene, path), i)
+            known |= dict.fromkeys(aliases_of(scene, path, location_of(scene, path).name), i)
     for name, value in numbers.items():
         if name not in known:
             near = did_you_mean(name, [*known, *schema.SampleTable.model_fields])
@@ -85,18 +85,15 @@ def of_sample(scene: Scene, sample: schema.SampleTable) -> Scene:
         except ValidationError:
             raise UsageError(f"sample {sample.name}: {name}: a number was expected, not {value!r}") from None
     changed = bound(jax.tree_util.tree_unflatten(structure, leaves), again=True)
+    free = (
+        (path, aliases_of(changed, path, location_of(changed, path).name)) for path, _ in free_leaves(changed)
+    )
     shared = [
         aliases[-1]
-        for path, _ in free_leaves(changed)
-        if not _own(changed, path, sample) and not numbers.keys() & {*(aliases := _aliases(changed, path))}
+        for path, aliases in free
+        if not _own(changed, path, sample) and not numbers.keys() & {*aliases}
     ]
     return replace(changed, sample=Sample(sample.name, tuple(shared)))
-
-
-def _aliases(scene: Scene, path: tuple) -> list[str]:
-    last = location_of(scene, path).name
-    own = [f"{layer_name(scene, path[1].idx)}.{last}"] if path[0].name == "layers" else []
-    return [full_name(scene, path, last), *own]
 
 
 def _own(scene: Scene, path: tuple, sample: schema.SampleTable) -> bool:

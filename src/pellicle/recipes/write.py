@@ -19,7 +19,7 @@ from pellicle.files import write_text
 from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
 from pellicle.recipes import parts
 from pellicle.recipes.parts import same, written_medium, written_number
-from pellicle.recipes.read import checked
+from pellicle.recipes.read import FilmRecipe, checked
 from pellicle.recipes.schema import SceneTable
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
@@ -104,8 +104,20 @@ def recipe_text(
     return text
 
 
-def moved(tables: Mapping[str, Any], source: Path, folder: Path) -> str:
-    """The text of the tables of a recipe in `source` as one in `folder`: paths in them are adapted."""
+def samples_text(
+    recipe: FilmRecipe, reading: Mapping[str, Any], fitting: Mapping[str, Any], folder: Path
+) -> str:
+    """Return the text of a recipe of several samples as one in `folder`, with options of the command line and
+    paths that are adapted.
+
+    **Raises:** UsageError for options that files name, which it cannot express.
+    """
+    tables = recipe.tables.model_dump(exclude_unset=True)
+    tables["data"] = tables.get("data", {}) | dict(fitting)
+    for sample in tables["sample"]:
+        for own in (sample, *sample.get("file", ())):
+            own |= reading
+    source = Path(recipe.path).parent
     files = {name for name, (_, option) in FileOptions.declared().items() if option.is_file}
 
     def adapted(thing: Any, key: str = "") -> Any:

@@ -314,6 +314,7 @@ def map_page(summary: MapSummary, images: Mapping[str, bytes]) -> str:
         "map.html",
         f"Map of {PurePosixPath(path).name}" if path else "Map",
         [],
+        kind="Map of a cube of spectra",
         tone="good" if 2 * summary.decided >= summary.with_data > 0 else "warn",
         sentence=sentence,
         decided=decided_in_words(summary),

@@ -67,7 +67,7 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
         from pellicle.reporting.map_text import cube_report
 
         ways = _Ways(cube_report, lambda made: next(maps.figures(made))[1], maps.write_cube_map)
-    module = sys.modules.get("pellicle.mapping.series")
+    module = sys.modules.get("pellicle.mapping.series_result")
     if module is not None and isinstance(result, module.Series):
         from pellicle.reporting import series
 

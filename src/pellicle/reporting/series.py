@@ -12,13 +12,13 @@ import numpy as np
 from pellicle.files import replacing, write_text
 from pellicle.fitting.batch.data import STATUSES
 from pellicle.mapping.growth import TIME
-from pellicle.mapping.series import Series
+from pellicle.mapping.series_result import Series
 from pellicle.reporting import matplotlib_figure
 from pellicle.reporting.drawable import Band, Line, Panel, Section, Table, labelled
 from pellicle.reporting.folders import PAGE, REPORT
 from pellicle.reporting.json_record import strict, versions, write_result
-from pellicle.reporting.map_summary import is_decided
-from pellicle.reporting.map_text import ADVICE
+from pellicle.reporting.map_summary import is_decided, summarise
+from pellicle.reporting.map_text import ADVICE, plan_rows
 from pellicle.reporting.page.document import Table as PageTable
 from pellicle.reporting.page.document import page, picture
 from pellicle.reporting.plain_text import blocks_of, csv_text, facts, wrapped, written_by
@@ -123,7 +123,7 @@ def _unit(series: Series) -> str:
 
 
 def _sentence(series: Series) -> str:
-    """How many times have an answer."""
+    """Number of times of each status, in words."""
     counts = ", ".join(f"{count} {word}" for word, count in series.status.items())
     return f"{len(series.times)} times: {counts}."
 
@@ -180,6 +180,7 @@ def _page(series: Series, image: bytes) -> str:
         "map.html",
         f"Series of {Path(series.map.input).name}",
         [],
+        kind="Series of spectra",
         tone="good" if series.decided >= 0.5 else "warn",
         sentence=" ".join(
             [_sentence(series), *(f"{text[0].upper()}{text[1:]}." for text in series.warnings)]
@@ -189,6 +190,6 @@ def _page(series: Series, image: bytes) -> str:
         parameters=PageTable("Parameters", (), _value_rows(series)),
         rates=PageTable("", (), []),
         statuses=PageTable("Statuses, and what to do", (), _status_rows(series)),
-        plan=PageTable("", (), []),
+        plan=PageTable("Effects of the simulation", (), plan_rows(summarise(series.map))),
         file=PageTable("Files, and how they were read", (), _file_rows(series)),
     )

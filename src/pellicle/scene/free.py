@@ -19,7 +19,7 @@ MOST_FREE = 64
 """Most parameters a fit may have free: 21 took 30 s and 121 did not end within 5 minutes (two cores)."""
 
 VARIES = SLOWLY, FREELY, SHARED = "slowly", "freely", "shared"
-"""How a parameter changes in a series: steadily, from time to time, or not at all."""
+"""Changes of a parameter in a series: steadily, from time to time, or not at all."""
 
 
 class Tie(NamedTuple):

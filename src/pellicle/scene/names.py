@@ -46,10 +46,15 @@ def name_in_fit(scene: Any, path: tuple, last: str, own: str = "") -> str:
     """Return the full name of a number in a fit, where the scene may be that of one of several samples."""
     if scene.sample is None:
         return full_name(scene, path, last, own)
-    aliases = [full_name(scene, path, last)]
-    if path[0].name == "layers":
-        aliases.append(f"{layer_name(scene, path[1].idx)}.{last}")
-    return scene.sample.called(aliases, full_name(scene, path, last, own) if own else "")
+    return scene.sample.called(
+        aliases_of(scene, path, last), full_name(scene, path, last, own) if own else ""
+    )
+
+
+def aliases_of(scene: Any, path: tuple, last: str) -> list[str]:
+    """Return the names by which samples share a number: the full one and, of a layer, that below it."""
+    below = [f"{layer_name(scene, path[1].idx)}.{last}"] if path[0].name == "layers" else []
+    return [full_name(scene, path, last), *below]
 
 
 def layer_prefix(scene: Any, position: int) -> list[str]:

@@ -20,7 +20,7 @@ from pellicle.errors import DataError, UsageError
 
 TIME = "time"
 BY_NAME, BY_DATE, BY_HEADER = "name", "mtime", "header"
-"""Where the times of files are from: their names, their dates, or a date in their first lines."""
+"""Sources of the times of files: their names, their dates, or a date in their first lines."""
 _NUMBER = re.compile(
     r"(?<![\d.])(\d+(?:[.,]\d+)?)[ _]?(s|sec|min|h|hours?|minutes?|seconds?|d|ms|°C|C|K)?(?![A-Za-z\d.])"
 )

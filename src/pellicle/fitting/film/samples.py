@@ -11,7 +11,7 @@ from pellicle.errors import UsageError, did_you_mean
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Content, Free, free_leaves, is_free
 from pellicle.scene.layers import Interface
-from pellicle.scene.names import full_name, layer_name, location_of, name_in_fit
+from pellicle.scene.names import aliases_of, layer_name, location_of, name_in_fit
 from pellicle.scene.samples import Sample, as_sample
 
 
@@ -38,7 +38,14 @@ def joined(scenes: Sequence[Scene], names: Sequence[str], shared: Sequence[str] 
     for name, own in by_sample.items():
         _check_one(own, f"sample {name}: ")
     firsts = [own[0] for own in by_sample.values()]
-    every = [{alias: free for path, free in free_leaves(s) for alias in _aliases(s, path)} for s in firsts]
+    every = [
+        {
+            alias: free
+            for path, free in free_leaves(s)
+            for alias in aliases_of(s, path, location_of(s, path).name)
+        }
+        for s in firsts
+    ]
     wanted = dict.fromkeys(shared or (x for s in firsts if s.sample for x in s.sample.shared))
     known = [name for name in wanted if _stands_in(name, firsts, every, explicit=shared is not None)]
     if not known:
@@ -72,13 +79,6 @@ def _check_one(scenes: Sequence[Scene], of: str = "") -> None:
             f"{of}the scenes of one sample must have the same layers, ambient and substrate; of several"
             " samples `shared` names the numbers that they have in common, as in shared=['film.n']"
         )
-
-
-def _aliases(scene: Scene, path: tuple) -> list[str]:
-    """Names of a number within its scene."""
-    last = location_of(scene, path).name
-    own = [f"{layer_name(scene, path[1].idx)}.{last}"] if path[0].name == "layers" else []
-    return [full_name(scene, path, last), *own]
 
 
 def _stands_in(
