@@ -3,15 +3,22 @@
 import numpy as np
 import pytest
 
+import pellicle as pl
+from pellicle.api import fits
 from pellicle.cli.reading import read
 from pellicle.data.options import FileOptions
 from pellicle.errors import DataError
+from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.curves import Curve
+from pellicle.fitting.result import Part
 from pellicle.materials import ROUNDING, check_common_range, material
 from pellicle.reporting.json_record import left_out
 from pellicle.scene.film import Scene
+from pellicle.scene.free import Free
 from pellicle.scene.layers import Layer
+from tests.made_fits import made_fit
 
-SCENE = Scene(Layer("SU-8", 500.0), "Si")  # known from 320 to 1450 nm together
+SCENE = Scene(Layer("SU-8", Free(450, 550)), "Si")  # known from 320 to 1450 nm together
 
 
 @pytest.fixture
@@ -35,10 +42,32 @@ def test_points_beyond_the_media_are_left_out_and_said(spectrum):
     np.testing.assert_array_equal(cut.left_out.wavelength, np.arange(250, 320, 5))
 
 
-def test_all_points_stay_with_a_range_or_without_a_scene(spectrum):
+def test_points_within_a_range_that_media_do_not_cover(spectrum):
     path = spectrum(250, 1000)
-    assert read(path, FileOptions(range=(250.0, 1000.0)), SCENE)[0].wavelength[0] == 250
+    assert read(path, FileOptions(range=(250.0, 900.0)), SCENE)[0].wavelength[0] == 320
     assert read(path, FileOptions())[0].left_out is None
+
+
+def test_fits_in_python_leave_them_out_and_say_it(monkeypatch, spectrum):
+    """A joint fit of two samples, and a comparison, which is of what all scenes cover."""
+    seen = []
+
+    def told(data, *_, **__):
+        seen.append(data)
+        curve, [first, *_] = Curve(*[np.ones(1)] * 8), data if isinstance(data, list) else [data]
+        return made_fit(Part("", first, curve, pl.plan(SCENE), 0.0, 1.0, 9.0), warnings=("own",))
+
+    monkeypatch.setattr(fits, "fit_spectra", told)
+    whole, other = pl.read_spectrum(spectrum(250, 1000)), Scene(Layer("SiO2", Free(100, 900)), "Ge")
+    fit = pl.fit([whole, whole], [SCENE, other])
+    assert [x.wavelength[0] for x in seen.pop()] == [320, 250]
+    sentence = "137 of 151 points kept, 320 to 1000 nm: all media are known from 320 to 1450 nm"
+    assert fit.warnings[0].startswith(sentence)
+    assert fit.warnings[1:] == ("own",)
+
+    monkeypatch.setattr(fits, "compare_fits", lambda done: Comparison((), float(len(done))))
+    pl.compare(whole, {"oxide": other, "polymer": SCENE})
+    assert [x.wavelength[0] for x in seen] == [320, 320]
 
 
 def test_less_than_half_is_not_cut_but_refused(spectrum):

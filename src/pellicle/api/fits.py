@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pellicle.data.brdf_samples import BrdfSamples
@@ -17,6 +18,7 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, STEPS, measured, sampled, subject_of
+from pellicle.scene.common_range import covered
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene, refuse
 
@@ -57,7 +59,8 @@ def fit(
     **Raises:** UsageError where nothing is free, where the scenes of a joint fit are not of one sample and
     nothing is `shared`, for a shared name that is free in fewer than two samples or has two bounds, where an
     uncalibrated signal has a fixed scale, for an unknown loss or residual, and for too few samples;
-    ValueError where a material has no data at a wavelength.
+    ValueError where materials have no data for more than half of the points; others are left out, with a
+    warning.
 
     ```python
     >>> scene = pl.Scene(pl.Layer("SiO2", pl.Free(100, 1000)), "Si")
@@ -70,6 +73,7 @@ def fit(
     """
     check_measurement(data)
     check_scene(scene, several=True)
+    data, said = _covered(data, scene)
     both: Any = data, scene
     if joint.of_both_kinds(scene) or isinstance(scene, Surface):
         refuse("several scenes", shared=shared)
@@ -79,7 +83,20 @@ def fit(
         return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)
     films = measured(OF_A_FILM, data)
-    return fit_spectra(films, both[1], shared=shared, tolerance=tolerance, loss=loss, progress=progress)
+    of_film = fit_spectra(films, both[1], shared=shared, tolerance=tolerance, loss=loss, progress=progress)
+    return replace(of_film, warnings=(*said, *of_film.warnings))
+
+
+def _covered(data: Any, *scenes: Any) -> tuple[Any, list[str]]:
+    """Measurements without the points that a medium does not cover, and what was left out.
+
+    Each of `scenes` is one for all measurements, or a list of one for each.
+    """
+    rows = list(data) if isinstance(data, list | tuple) else [data]
+    own = [x if isinstance(x, Sequence) and len(x) == len(rows) else [x] * len(rows) for x in scenes]
+    kept = [covered(row, seen) for row, *seen in zip(rows, *own, strict=True)]
+    said = [new.notes[-1] for old, new in zip(rows, kept, strict=True) if new is not old]
+    return (kept if isinstance(data, list | tuple) else kept[0]), said
 
 
 def sample(
@@ -121,6 +138,7 @@ def sample(
         refuse("a Scene", residual=residual)
     if joint.of_both_kinds(scene) or isinstance(scene, Surface):
         refuse("several scenes", shared=shared)
+    data, _ = _covered(data, scene)
     subject = subject_of(data, scene, tolerance, residual, progress, shared)
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
@@ -148,4 +166,5 @@ def compare(
     if not isinstance(scenes, Mapping):
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}
+    data, _ = _covered(data, *scenes.values())
     return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})

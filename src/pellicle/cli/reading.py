@@ -34,18 +34,15 @@ def read(path: str, options: FileOptions, scene: Scene | None = None) -> list[Sp
     """Read the spectra of a file that are meant; where the scale of the `scene` is free any level is
     acceptable, and its reference is that of counts or of relative reflectances.
 
-    Without a range, points where media of the scene have no data are left out, if half of them remain. Raises
-    DataError or UsageError.
+    Points where media of the scene have no data are left out, if half of them remain. Raises DataError or
+    UsageError.
     """
     spectra = _read(path, options, scene)
-    if scene is None or options.range is not None:
+    if scene is None:
         return spectra
-    from pellicle.data.spectrum import within
-    from pellicle.materials import ROUNDING, common_range, limits
+    from pellicle.scene.common_range import covered
 
-    low, high = common_range(scene)
-    ends = low - ROUNDING, high + ROUNDING
-    return [within(x, ends, limits(scene, x.wavelength)) for x in spectra]
+    return [covered(x, scene) for x in spectra]
 
 
 def _read(path: str, options: FileOptions, scene: Scene | None) -> list[Spectrum]:
