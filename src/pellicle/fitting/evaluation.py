@@ -44,11 +44,29 @@ def curves(form: Form, arrays: Any, values: Any) -> Curves:
 
 
 def explained(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> tuple[list[Explained], Any]:
-    """Every view at one point of the unit cube, and the values of the parameters."""
+    """Every view at one point of the unit cube, and the values of the parameters.
+
+    Views of one form whose arrays have the same structure and shapes are mapped over: they are traced and
+    compiled once.
+    """
     coordinates, looks = static
     values = coordinates.values(box, unit)
-    views = zip(looks, arrays, strict=True)
-    return [form.explain(own, [values[i] for i in takes]) for (form, takes), own in views], values
+    alike: dict[Any, list[int]] = {}
+    for number, ((form, takes), own) in enumerate(zip(looks, arrays, strict=True)):
+        leaves, structure = jax.tree.flatten(own)
+        shapes = tuple((jnp.shape(leaf), jnp.result_type(leaf)) for leaf in leaves)
+        alike.setdefault((form, len(takes), structure, shapes), []).append(number)
+    views: dict[int, Explained] = {}
+    for (form, *_), numbers in alike.items():
+        if len(numbers) == 1:
+            [only] = numbers
+            views[only] = form.explain(arrays[only], [values[i] for i in looks[only][1]])
+            continue
+        stacked = jax.tree.map(lambda *each: jnp.stack(each), *(arrays[number] for number in numbers))
+        takes = np.array([looks[number][1] for number in numbers], int)
+        every = jax.vmap(form.explain)(stacked, values[takes])
+        views |= {n: jax.tree.map(lambda x, i=i: x[i], every) for i, n in enumerate(numbers)}
+    return [views[number] for number in range(len(looks))], values
 
 
 class Polished(NamedTuple):

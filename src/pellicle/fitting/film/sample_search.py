@@ -94,10 +94,10 @@ def _starts(
     counts = np.zeros(len(problem.parameters), int)
     for part in parts:
         counts[list(part.takes)] += 1
-    each = []
-    for part, own in zip(parts, found, strict=True):
-        keep = counts[list(part.takes)] > 1
-        each.append([_orders(part, own, one[list(part.takes)], keep) for one in proposals])
+    each = [
+        _orders(part, own, proposals[:, list(part.takes)], counts[list(part.takes)] > 1)
+        for part, own in zip(parts, found, strict=True)
+    ]
     starts, sums = [], []
     for row in range(len(proposals)):
         sample_rows = [own[row] for own in each]
@@ -115,31 +115,43 @@ def _starts(
     return np.array(starts)[np.argsort(sums, kind="stable")]
 
 
-def _orders(part: SamplePart, own: Minima, at: np.ndarray, keep: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The best points (orders, parameters) of a sample at shared numbers, and their deviance: those that
-    `keep` marks are as `at`, the thickness is scanned, and others are those of its minima."""
+def _orders(
+    part: SamplePart, own: Minima, proposals: np.ndarray, keep: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The best points (orders, parameters) of a sample, and their deviance, at the shared numbers of each of
+    its `proposals` (proposals, parameters): those that `keep` marks are as there, the thickness is scanned,
+    and others are those of its minima."""
     depth, problem = part.problem.thickness_axis, part.problem.thinned()
     grid = np.zeros(1)
     if depth is not None and not keep[depth]:
         p = part.problem.parameters[depth]
         count = int(np.clip(np.ceil((p.upper - p.lower) / (shortest_wavelength(part.problem) / 8)), 9, _MOST))
         grid = np.linspace(0.0, 1.0, count + 1)
-    bases = np.where(keep, at, own.units[:_OWN])
-    units = np.repeat(bases, len(grid), axis=0)
+    bases = own.units[:_OWN].copy()
     if len(grid) > 1:
-        units[:, depth] = np.tile(grid, len(bases))
-    units = np.concatenate([np.where(keep, at, own.units), at[None], units])
-    deviance = scanned(problem, units).sum(axis=1)
+        bases[:, depth] = 0.0
+    bases = np.unique(np.where(keep, 0.0, bases), axis=0)
+    scan = np.repeat(bases, len(grid), axis=0)
+    if len(grid) > 1:
+        scan[:, depth] = np.tile(grid, len(bases))
+    tried = [
+        np.concatenate([np.where(keep, at, np.concatenate([own.units, scan])), at[None]]) for at in proposals
+    ]
+    table = scanned(problem, np.concatenate(tried)).sum(axis=1).reshape(len(proposals), -1)
+    step = 3 * grid[1] if len(grid) > 1 else None
+    return [_best(units, row, depth, step) for units, row in zip(tried, table, strict=True)]
+
+
+def _best(
+    units: np.ndarray, deviance: np.ndarray, depth: int | None, apart: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The `_ORDERS` least points of `units` (points, parameters), whose positions `depth` are `apart`; the
+    least alone where no thickness is scanned."""
     order, kept = np.argsort(deviance, kind="stable"), list[int]()
-    for i in order.tolist():
-        near = (
-            depth is not None
-            and len(grid) > 1
-            and any(abs(units[i, depth] - units[j, depth]) < 3 * grid[1] for j in kept)
-        )
-        if np.isfinite(deviance[i]) and not near:
+    for i in order[np.isfinite(deviance[order])].tolist():
+        if apart is None or all(abs(units[i, depth] - units[j, depth]) >= apart for j in kept):
             kept.append(i)
-        if len(kept) == _ORDERS or (kept and len(grid) == 1):
+        if len(kept) == _ORDERS or apart is None:
             break
     kept = kept or [int(order[0])]
     return units[kept], deviance[kept]
