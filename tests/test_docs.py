@@ -53,6 +53,7 @@ SLOW = (
     "pellicle simulate docs/examples/tilted_microscope.toml",  # forward_model/test_lens.py
     "pellicle fit oriented.csv --recipe docs/examples/tilted_microscope.toml",
     "pellicle fit soap_film.csv --recipe docs/examples/soap_film.toml",  # fitting/film/test_ties.py
+    "pellicle simulate docs/examples/samples.toml",  # cli/test_simulate_command.py
     "pellicle fit --recipe docs/examples/samples.toml",  # fitting/film/test_samples.py
     "pellicle fit intensity.csv --layer",  # fitting/film/test_fit.py
     "pellicle fit partial.csv --recipe docs/examples/partial_window.toml",  # test_back_collected.py

@@ -35,6 +35,27 @@ def test_a_plan_as_table_and_record(pellicle, faint):
     assert "the tolerance is 0.001" in table[len(rows) + 2]
 
 
+def test_each_sample_has_its_plan(pellicle, write, tmp_path):
+    """One table for those of the same effects."""
+    names = "abc"
+    for name in names:
+        (tmp_path / f"{name}.csv").write_text("nm,R\n400,0.3\n500,0.31\n600,0.32\n")
+    own = {"a": "angle = 0", "b": "angle = 0", "c": "angle = 50"}
+    tables = [f'[[sample]]\nname = "{x}"\nfiles = ["{x}.csv"]\n{own[x]}\n' for x in names]
+    recipe = write(
+        FAINT.replace("wavelengths = { start = 400, stop = 790, step = 65 }\n", "") + "".join(tables)
+    )
+    heads = [line for line in pellicle("plan", recipe, code=0).out.splitlines() if line.endswith(":")]
+    assert [[word in head for word in ("a (", "b (", "c (")] for head in heads] == [
+        [True, True, False],
+        [False, False, True],
+    ]
+    (record,) = pellicle("plan", recipe, "--json", code=0).objects
+    assert record["effects"] == record["samples"][0]["effects"]
+    on = [next(row["on"] for row in x["effects"] if row["effect"] == "oblique") for x in record["samples"]]
+    assert on == [False, False, True]
+
+
 def test_tolerances_that_are_none(pellicle, faint):
     for tolerance in (0, -1e-3, "nan"):
         pellicle("plan", faint, "--tolerance", tolerance).refused(2, "--tolerance must be above zero")

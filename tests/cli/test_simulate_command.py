@@ -134,3 +134,34 @@ def test_each_angle_of_a_list_has_its_rows_at_each_azimuth(pellicle, tmp_path):
         alone = pl.Scene(pl.Layer(1.46, 321.5), 3.9 + 0.02j, light=pl.Light(angle=own.angle))
         one = pl.simulate(alone, spectrum.wavelength[own.rows])
         np.testing.assert_allclose(spectrum.values[own.rows], one.values, atol=1e-8)
+
+
+def test_each_file_of_samples_is_simulated_into_a_folder(pellicle, write, tmp_path):
+    """With its own noise and truth, R of a bare layer by Fresnel's formula."""
+    samples = (
+        RECIPE
+        + """
+[[sample]]
+name = "thin"
+files = ["measured/a.txt"]
+oxide.thickness = 0
+[[sample]]
+name = "glass"
+files = ["b.csv"]
+substrate = 1.52
+oxide.thickness = 0
+"""
+    )
+    recipe = write(samples, "samples.toml")
+    ran = pellicle("simulate", recipe, "--out", tmp_path / "out", "--seed", 7, code=0)
+    assert "a.csv: 100 points" in ran.err
+    thin, glass = (np.loadtxt(tmp_path / "out" / f"{x}.csv", delimiter=",", skiprows=5) for x in "ab")
+    assert "glass.oxide.thickness = 0 nm" in (tmp_path / "out" / "b.csv").read_text()
+    expected = [abs((n - 1) / (n + 1)) ** 2 for n in (3.9 + 0.02j, 1.52)]
+    noises = [x[:, 1] - r for x, r in zip((thin, glass), expected, strict=True)]
+    assert all(0.001 < np.std(x) < 0.003 for x in noises)
+    assert abs(np.corrcoef(*noises)[0, 1]) < 0.5
+    pellicle("simulate", recipe, "--out", tmp_path / "out").refused(2, "a.csv")
+    pellicle("simulate", recipe, "--out", tmp_path / "a.csv").refused(2, "into a folder")
+    recipe.write_text(samples.replace("b.csv", "a.csv"))
+    pellicle("simulate", recipe, "--out", tmp_path / "other").refused(3, "two files")

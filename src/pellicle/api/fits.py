@@ -14,6 +14,7 @@ from pellicle.fitting.brdf import fit as brdf
 from pellicle.fitting.comparison import Comparison
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.film.fit import fit as fit_spectra
+from pellicle.fitting.film.samples import shared_by_each
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
 from pellicle.sampling.result import Posterior
@@ -147,6 +148,7 @@ def compare(
     data: Measurement,
     scenes: Mapping[str, Scene | Surface | Sequence[Scene | Surface]],
     *,
+    shared: Sequence[str] | None = None,
     tolerance: float = 0.0,
     residual: str | None = None,
     progress: Progress = quiet,
@@ -157,6 +159,8 @@ def compare(
 
     - `data`: as in `pellicle.fit`.
     - `scenes`: two or more descriptions by name, each as `pellicle.fit` takes it.
+    - `shared`: names of free numbers that the samples have in common, as in `pellicle.fit`. A description
+      that lacks some of them shares the others.
     - `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
 
     **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, and a verdict.
@@ -166,5 +170,6 @@ def compare(
     if not isinstance(scenes, Mapping):
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}
+    own = shared_by_each(scenes, shared)
     data, _ = _covered(data, *scenes.values())
-    return compare_fits({name: fit(data, scene, **options) for name, scene in scenes.items()})
+    return compare_fits({n: fit(data, scene, shared=own[n], **options) for n, scene in scenes.items()})

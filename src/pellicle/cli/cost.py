@@ -117,16 +117,21 @@ def plan(
     if isinstance(described, SurfaceRecipe):
         view = surface_view(described.scene(), directions(described))
         chosen = surface_plan.plan(view, tolerance)
-        savings = surface_plan.savings(view, chosen)
+        planned = {"": (chosen, surface_plan.savings(view, chosen))}
     else:
-        scene = with_wavelength(*measured_scene(described))
-        log_scene(scene)
-        chosen = film_plan.plan(scene, tolerance)
-        savings = film_plan.savings(scene, chosen)
+        planned = {}
+        for one in described.samples or [described]:
+            scene = with_wavelength(*measured_scene(one))
+            log_scene(scene)
+            chosen = film_plan.plan(scene, tolerance)
+            name = "" if one.sample is None else f"{one.sample.name} ({one.files[0]})"
+            planned[name] = chosen, film_plan.savings(scene, chosen)
     if json:
-        show(plans.to_json(chosen, savings))
+        show(plans.to_json(planned))
         return 0
-    show(plans.report_with_savings(chosen, savings), end="")
-    if chosen.error_bound > tolerance:
-        say(f"no plan is within {tolerance:g}: averages alone have errors up to {chosen.error_bound:.1g}")
+    show(plans.report_with_savings(planned), end="")
+    for name, (chosen, _) in planned.items():
+        if chosen.error_bound > tolerance:
+            of, error = f"{name}: " if name else "", f"{chosen.error_bound:.1g}"
+            say(f"{of}no plan is within {tolerance:g}: averages alone have errors up to {error}")
     return 0

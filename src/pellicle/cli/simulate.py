@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from math import inf
 from pathlib import Path
@@ -20,6 +20,8 @@ from pellicle.data.options import SPACES
 from pellicle.errors import DataError, UsageError, install_command
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
     from pellicle.scene.film import Scene
     from pellicle.signals.base import Signal
@@ -53,7 +55,11 @@ def simulate(
     recipe: Annotated[str, Parameter(help="TOML file that describes the scene or surface.")],
     *,
     out: Annotated[
-        str, Parameter(help="CSV file to write; an existing file is not overwritten. A folder with --depth.")
+        str,
+        Parameter(
+            help="CSV file to write; an existing file is not overwritten. A folder with --depth, and for a"
+            " recipe of several samples."
+        ),
     ],
     how: Annotated[SimulationFlags, Parameter(name="*")] = SimulationFlags(),
     depth: Annotated[
@@ -76,14 +82,48 @@ def simulate(
 
     spread = _checked_spread(how, depth, json)
     described = read_recipe(recipe)
-    _check_depolarisation(described, how.depolarisation_noise)
+    several = [] if isinstance(described, SurfaceRecipe) else described.samples
+    recipes = several or [described]
+    for one in recipes:
+        _check_depolarisation(one, how.depolarisation_noise)
     if depth is not None:
         _write_depth_profile(described, out, depth, json)
         return 0
+    paths = _paths(several, out) if several else [out]
     start()
+    for number, (one, path) in enumerate(zip(recipes, paths, strict=True)):
+        # noise of its own for each file
+        _write(one, path, replace(how, seed=how.seed + number), spread)
+    return 0
+
+
+def _paths(recipes: Sequence[FilmRecipe], out: str) -> list[str]:
+    """Path in the folder `out`, which is made, of the CSV file of each recipe, by the stem of its file.
+
+    Raises UsageError where `out` is no folder, and DataError where two files have one name.
+    """
+    if Path(out).suffix or Path(out).is_file():
+        raise UsageError(f"--out {out}: several samples are simulated into a folder, as in --out simulated")
+    paths = [str(Path(out) / f"{Path(one.files[0]).stem}.csv") for one in recipes]
+    if twice := [path for path in paths if paths.count(path) > 1]:
+        raise DataError(
+            f"{recipes[0].path}: two files of its samples would be simulated as {twice[0]}: give each a name"
+            " of its own"
+        )
+    Path(out).mkdir(parents=True, exist_ok=True)
+    return paths
+
+
+def _write(
+    described: FilmRecipe | SurfaceRecipe, out: str, how: SimulationFlags, spread: float | str | None
+) -> None:
+    """Simulate one film or surface, and write it to the file `out`."""
+    from pellicle.recipes.read import SurfaceRecipe
+
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
     said = f"{noise:g}" if isinstance(noise, float | int) else noise
-    source = f"recipe {Path(recipe).name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
+    name = Path(described.path).name
+    source = f"recipe {name}, seed {how.seed}, noise {said}, pellicle {version('pellicle')}"
     comments = [SYNTHETIC, source]
     if isinstance(described, SurfaceRecipe):
         _write_samples(described, out, noise, how, comments)
@@ -95,7 +135,6 @@ def simulate(
         _write_colours(described, out, noise, how, comments)
     else:
         _write_spectrum(described, out, noise, how, comments)
-    return 0
 
 
 def _checked_spread(how: SimulationFlags, depth: str | None, json: bool) -> float | str | None:

@@ -145,8 +145,8 @@ class FilmRecipe:
     def files(self) -> list[str]:
         """Data files, relative to the recipe."""
         data = self.tables.data
-        if self.tables.sample and self.sample is None:
-            return [file for one in self.each for file in one.files]
+        if self.samples:
+            return [file for one in self.samples for file in one.files]
         names = [*data.files, *(file.path for file in data.file)]
         return [os.path.normpath(Path(self.path).parent / name) for name in names]
 
@@ -154,6 +154,8 @@ class FilmRecipe:
     def each(self) -> list[FilmRecipe]:
         """One recipe for each `[[data.file]]`, with the keys of that table, or for each file of each sample;
         empty without such tables."""
+        if self.sample is not None:
+            return []
         if self.tables.sample:
             return [
                 FilmRecipe(self.path, _of_file(tables, file), sample)
@@ -162,6 +164,11 @@ class FilmRecipe:
                 for file in [*(schema.FileTable(path=x) for x in sample.files), *sample.file]
             ]
         return [FilmRecipe(self.path, _of_file(self.tables, file)) for file in self.tables.data.file]
+
+    @property
+    def samples(self) -> list[FilmRecipe]:
+        """One recipe for each file of each sample; empty without `[[sample]]`."""
+        return self.each if self.tables.sample else []
 
     @property
     def first(self) -> FilmRecipe:
@@ -202,11 +209,11 @@ class FilmRecipe:
     def scene(self, fitted: bool = False) -> Scene:
         """Build the scene. Raises DataError, the path in front; if `fitted`, where nothing is free."""
         tables = self.tables
-        if tables.sample and self.sample is None:
+        if self.samples:
             names = ", ".join(one.name for one in tables.sample)
             raise DataError(
-                f"{self.path}: has [[sample]] tables ({names}), which fit and sample take together; write a"
-                " recipe of one sample for this"
+                f"{self.path}: has [[sample]] tables ({names}), which fit, sample, simulate and plan take"
+                " together; write a recipe of one sample for this"
             )
         described, data, folder = tables.scene, tables.data, Path(self.path).parent
         azimuth = np.array(data.azimuth) if isinstance(data.azimuth, list) else data.azimuth

@@ -13,6 +13,7 @@ from pellicle.fitting.status import RIVAL, describe
 from pellicle.reporting.plain_text import COLUMNS, INDENT, blocks_of, facts, table, with_unit, wrapped
 from pellicle.reporting.quantities import colours_in_words, differences, weighted_delta
 from pellicle.sampling.result import Posterior
+from pellicle.scene.film import Scene
 
 ADVICE = {
     Status.FAILED: "There is no result: the error says what to change.",
@@ -192,13 +193,37 @@ _IMPOSSIBLE = 1e-6
 NUISANCE = re.compile(r"instrument\.((scale|offset)(_\d+)?|white_balance_.+|camera_\d+)(\..+)?")
 
 
-def _parameters(fit: Fit) -> list[str]:
-    """One line for each, the free ones first: name, value ± error or limit, unit and bounds."""
-    width = max((len(name) for name in fit.parameters), default=0) + 1
+def by_sample(fit: Fit) -> dict[str, list[Estimate]]:
+    """Parameters below the heading of their sample, in its order, then those that samples share; the free
+    ones first. One heading, an empty one, where the fit is not of several samples."""
     every = sorted(fit.parameters.values(), key=lambda p: (not p.free, not p.tied))
-    rows = [(f"{p.name + ':':<{width}}", value_in_words(p), bounds_in_words(p)) for p in every]
-    middle = max((len(value) for _, value, bounds in rows if bounds), default=0)
-    return [f"{INDENT}{name}  {value:<{middle}}  {bounds}".rstrip() for name, value, bounds in rows]
+    scenes = fit.scene if isinstance(fit.scene, tuple) else ()
+    pairs = [
+        (part.name, x.sample) for part, x in zip(fit.parts, scenes, strict=False) if isinstance(x, Scene)
+    ]
+    of_part = {name: sample.name for name, sample in pairs if sample is not None}
+    if not of_part:
+        return {"": every}
+    heads = {name: f"sample {name}" for name in of_part.values()}
+    rows: dict[str, list[Estimate]] = {head: [] for head in [*heads.values(), "shared"]}
+    for p in every:
+        first, last = p.name.split(".")[0], p.name.split(".")[-1]
+        rows[heads.get(first) or heads.get(of_part.get(last, ""), "shared")].append(p)
+    return {head: own for head, own in rows.items() if own}
+
+
+def _parameters(fit: Fit) -> list[str]:
+    """One line for each: name, value ± error or limit, unit and bounds; those of a sample below its name."""
+    width, lines = max((len(name) for name in fit.parameters), default=0) + 1, list[str]()
+    words = {p.name: (value_in_words(p), bounds_in_words(p)) for p in fit.parameters.values()}
+    middle = max((len(value) for value, bounds in words.values() if bounds), default=0)
+    for head, own in by_sample(fit).items():
+        lines += [f"{INDENT}{head}"] if head else []
+        indent = INDENT + "  " * bool(head)
+        for p in own:
+            value, bounds = words[p.name]
+            lines.append(f"{indent}{p.name + ':':<{width}}  {value:<{middle}}  {bounds}".rstrip())
+    return lines
 
 
 def value_in_words(p: Estimate) -> str:

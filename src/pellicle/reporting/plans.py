@@ -9,7 +9,12 @@ from pellicle.reporting.json_record import taken
 from pellicle.reporting.plain_text import aligned
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from pellicle.effects.differences import Savings
+
+    Planned = Mapping[str, tuple[Plan, Savings]]
+    """Plans of samples by their names, and what leaving out each effect saves; one without a name."""
 
 _UNIT_OF_BRDF = "of each value of the BRDF (of 0.01/π where that is more)"
 
@@ -21,8 +26,20 @@ def report(plan: Plan) -> str:
     return "\n".join([*aligned(rows), "", *_summary(plan)]) + "\n"
 
 
-def report_with_savings(plan: Plan, savings: Savings) -> str:
-    """Format a plan with the error and the time of leaving each effect out of the exact plan."""
+def report_with_savings(planned: Planned) -> str:
+    """Format plans with the error and the time of leaving each effect out of the exact plan.
+
+    Samples whose plans have the same effects for the same reasons have one table, of the first of them.
+    """
+    alike: dict[Any, list[str]] = {}
+    for name, (plan, _) in planned.items():
+        alike.setdefault(tuple((row.effect, row.on, row.why) for row in plan.rows), []).append(name)
+    heads = [f"{', '.join(names)}:\n" if len(planned) > 1 else "" for names in alike.values()]
+    tables = [_with_savings(*planned[names[0]]) for names in alike.values()]
+    return "\n".join(head + table for head, table in zip(heads, tables, strict=True))
+
+
+def _with_savings(plan: Plan, savings: Savings) -> str:
     rows = [("effect", "", "error bound", "if left out", "saves", "why")]
     for row in plan.rows:
         saving = savings.effects.get(row.effect)
@@ -54,16 +71,20 @@ def _time(seconds: float) -> str:
     return f"{seconds / 1e-9:.3g} ns"
 
 
-def to_json(plan: Plan, savings: Savings) -> dict[str, Any]:
-    """Convert a plan to dictionaries.
+def to_json(planned: Planned) -> dict[str, Any]:
+    """Convert a plan to dictionaries; those of several samples are `samples` beside the first one's.
 
     `cost` is the seconds that leaving an effect out of the exact plan saves, 0 where it is absent or must
     stay; `error_without` is the change of the signal.
     """
-    effects = []
-    for row in plan.rows:
-        saving = savings.effects.get(row.effect)
-        saved = {"cost": getattr(saving, "seconds", 0.0), "error_without": getattr(saving, "error", None)}
-        effects.append(taken(row, "effect", "on", "why", "error_bound") | saved)
-    record = taken(plan, "tolerance", "error_bound", "gradient_error")
-    return {"schema": "pellicle.plan/1", **record, "effects": effects}
+    records = {}
+    for name, (plan, savings) in planned.items():
+        effects = []
+        for row in plan.rows:
+            saving = savings.effects.get(row.effect)
+            saved = {"cost": getattr(saving, "seconds", 0.0), "error_without": getattr(saving, "error", None)}
+            effects.append(taken(row, "effect", "on", "why", "error_bound") | saved)
+        records[name] = taken(plan, "tolerance", "error_bound", "gradient_error") | {"effects": effects}
+    several = [{"name": name, **record} for name, record in records.items()] if len(records) > 1 else None
+    first = {"schema": "pellicle.plan/1", **next(iter(records.values()))}
+    return first | ({"samples": several} if several else {})

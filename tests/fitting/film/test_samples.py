@@ -1,13 +1,21 @@
 """Several samples in one fit, with shared numbers."""
 
+from types import SimpleNamespace
+
+import jax
 import numpy as np
 import pytest
 
 import pellicle as pl
 from pellicle.dispersion.empirical import Cauchy
 from pellicle.errors import UsageError
+from pellicle.fitting.evaluation import explained
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.samples import shared_by_each
+from pellicle.fitting.film.view import SpectrumForm
+from pellicle.fitting.result import Estimate, Fit
+from pellicle.reporting.fit_text import by_sample
 
 from ... import by_tmm
 
@@ -76,6 +84,46 @@ def test_effects_of_media_are_shared_and_those_of_a_sample_its_own():
         {"film": "", "substrate": " of 110nm"},
         {"film": "", "substrate": " of 430nm"},
     ]
+
+
+def test_views_of_one_form_are_traced_once(monkeypatch):
+    """And their residuals are those of each view by itself."""
+    data = [spectrum(depth, i) for i, depth in enumerate(DEPTHS)]
+    problem = make(*measurements(data, [scene()] * 3, ["A", "B"]))
+    unit = np.linspace(0.2, 0.7, 5)
+    values = problem.values(unit)
+    alone = [view.form.explain(view.arrays, values[list(view.takes)]) for view in problem.views]
+    calls = []
+    explain = SpectrumForm.explain
+    monkeypatch.setattr(SpectrumForm, "explain", lambda *given: calls.append(given) or explain(*given))
+    together, _ = jax.jit(explained, static_argnums=0)(problem.static, problem.arrays, problem.box, unit)
+    assert len(calls) == 1
+    for one, other in zip(alone, together, strict=True):
+        np.testing.assert_allclose(other.residual, one.residual, rtol=1e-9, atol=1e-9)
+
+
+def test_the_report_lists_numbers_by_sample():
+    def number(name):
+        return Estimate(name, 1.0, 0.1, "", 0.0, 2.0, True)
+
+    names = ("film.A", "instrument.scale.b", "one.film.thickness", "two.film.thickness")
+    parts = [SimpleNamespace(name="a"), SimpleNamespace(name="b")]
+    scenes = tuple(pl.Scene(pl.Layer(1.5, 1.0), 1.6, sample=name) for name in ("one", "two"))
+    fit = object.__new__(Fit)  # with what the report looks at
+    vars(fit).update(parameters={x: number(x) for x in names}, parts=parts, scene=scenes)
+    assert {head: [p.name for p in own] for head, own in by_sample(fit).items()} == {
+        "sample one": ["one.film.thickness"],
+        "sample two": ["instrument.scale.b", "two.film.thickness"],
+        "shared": ["film.A"],
+    }
+
+
+def test_descriptions_share_what_each_has():
+    other = pl.Scene(pl.Layer(pl.dispersion.Constant(pl.Free(1, 2)), pl.Free(1, 9), "film"), 1.5)
+    given = {"cauchy": [scene(), scene()], "constant": other}
+    assert shared_by_each(given, ["A", "film.n"]) == {"cauchy": ["A"], "constant": ["film.n"]}
+    with pytest.raises(UsageError, match=r"'film\.x' is free in no description"):
+        shared_by_each(given, ["A", "film.x"])
 
 
 @pytest.mark.parametrize(

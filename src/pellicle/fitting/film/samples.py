@@ -1,6 +1,6 @@
 """Several samples in one fit: scenes with the names of their samples, and checks of what they share."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -38,14 +38,7 @@ def joined(scenes: Sequence[Scene], names: Sequence[str], shared: Sequence[str] 
     for name, own in by_sample.items():
         _check_one(own, f"sample {name}: ")
     firsts = [own[0] for own in by_sample.values()]
-    every = [
-        {
-            alias: free
-            for path, free in free_leaves(s)
-            for alias in aliases_of(s, path, location_of(s, path).name)
-        }
-        for s in firsts
-    ]
+    every = [_free_numbers(s) for s in firsts]
     wanted = dict.fromkeys(shared or (x for s in firsts if s.sample for x in s.sample.shared))
     known = [name for name in wanted if _stands_in(name, firsts, every, explicit=shared is not None)]
     if not known:
@@ -63,6 +56,32 @@ def joined(scenes: Sequence[Scene], names: Sequence[str], shared: Sequence[str] 
             for owner, names in alike.items()
         )
     return [_named(s, s.sample, known, common[s.sample.name]) for s in scenes if s.sample is not None]
+
+
+def _free_numbers(scene: Scene) -> dict[str, Free]:
+    """Free numbers of a scene by the names that `shared` may have for them."""
+    leaves = free_leaves(scene)
+    return {name: x for path, x in leaves for name in aliases_of(scene, path, location_of(scene, path).name)}
+
+
+def shared_by_each(scenes: Mapping[str, Any], shared: Sequence[str] | None) -> dict[str, list[str] | None]:
+    """Names of `shared` numbers that each description, a scene or a list of some, has free.
+
+    Raises UsageError for one that none has.
+    """
+    if shared is None:
+        return dict.fromkeys(scenes)
+    known = {
+        name: {x for s in ([own] if isinstance(own, Scene) else own) for x in _free_numbers(s)}
+        for name, own in scenes.items()
+    }
+    every = set[str]().union(*known.values())
+    for name in shared:
+        if name not in every:
+            raise UsageError(
+                f"the shared number {name!r} is free in no description{did_you_mean(name, sorted(every))}"
+            )
+    return {name: [x for x in shared if x in own] for name, own in known.items()}
 
 
 def _named(scene: Scene, sample: Any, shared: Iterable[str], common: Any = ()) -> Scene:

@@ -121,7 +121,7 @@ def _rivals(fit: Fit) -> Table:
 
 def _parameters(fit: Fit) -> Table:
     rows = []
-    for p in sorted(fit.parameters.values(), key=lambda p: (not p.free, not p.tied)):
+    for p in (p for own in fit_text.by_sample(fit).values() for p in own):
         noise = expanded = ""
         if (p.free or p.tied) and math.isfinite(p.stderr_noise):
             noise = with_unit(f"{p.stderr_noise:.2g}", p.unit)
