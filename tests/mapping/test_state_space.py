@@ -29,8 +29,8 @@ def test_values_rates_and_errors_are_those_of_all_times_together(states):
     sigma, y, power, fastest = 0.02, rng.uniform(0.3, 0.7, 8), 1e-3, 0.4
     information = rows[:, :, None] * rows[:, None, :] / sigma**2
     vector = rows * y[:, None] / sigma**2
-    like = Smoothed(*[np.zeros(0)] * 4, derivatives=states, stiffness=np.array([np.log10(power)]))
-    found = smooth(t, Quadratics(vector, information), ("slowly", "shared"), breaks, fastest, like)
+    like = Smoothed(*[np.zeros(0)] * 6, derivatives=states, stiffness=np.array([np.log10(power)]))
+    found = smooth(t, Quadratics(vector, information, np.zeros((8, 2, 0))), ("slowly", "shared"), breaks, fastest, like)
 
     part = np.cumsum(breaks)
     unit = np.median(np.diff(t))
@@ -71,7 +71,7 @@ def test_the_stiffness_is_that_of_the_data():
     rng, t = np.random.default_rng(4), np.linspace(0, 10, 300)
     for truth in (0.3 + 0.03 * t, 0.5 + 0.2 * np.sin(3 * t)):
         y = truth + 0.01 * rng.standard_normal(300)
-        quadratics = Quadratics((y / 1e-4)[:, None], np.full((300, 1, 1), 1e4))
+        quadratics = Quadratics((y / 1e-4)[:, None], np.full((300, 1, 1), 1e4), np.zeros((300, 1, 0)))
         found = smooth(t, quadratics, ("slowly",), np.zeros(300, bool), 0.1)
         off = (found.mean[:, 0] - truth) / np.sqrt(found.variance[:, 0])
         assert np.abs(off).max() < 4
@@ -80,6 +80,6 @@ def test_the_stiffness_is_that_of_the_data():
 
 def test_a_freely_varying_parameter_has_the_error_of_its_time():
     t, sigma = np.arange(5.0), np.array([0.1, 0.2, 0.1, 0.3, 0.1])
-    quadratics = Quadratics((0.4 / sigma**2)[:, None], (1 / sigma**2)[:, None, None])
+    quadratics = Quadratics((0.4 / sigma**2)[:, None], (1 / sigma**2)[:, None, None], np.zeros((5, 1, 0)))
     found = smooth(t, quadratics, ("freely",), np.zeros(5, bool), 0.1)
     np.testing.assert_allclose(found.variance[:, 0], 1 / (1 / sigma**2 + 1), rtol=1e-10)

@@ -43,8 +43,10 @@ def order_path(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stder
     uneven = _unevenness(time, thickness, delta, stderr)
     rows = np.arange(len(time))
     path = _best(time, thickness, delta, stderr, uneven, 1.0)
-    others = np.where(delta < BREAK, np.abs(thickness - thickness[rows, path.chosen][:, None]), np.nan)
-    distance = np.nanmedian(np.where(others > 0, others, np.nan)) if np.any(others > 0) else np.inf
+    others = np.abs(thickness - thickness[rows, path.chosen][:, None])
+    others = np.where(np.isfinite(delta) & (others > 0), others, np.nan)
+    near = others[(delta < BREAK) & np.isfinite(others)]
+    distance = float(np.median(near)) if near.size else float(np.nanmin(others, initial=np.inf))
     steps = np.abs(np.diff(thickness[rows, path.chosen]))
     # neither a step within the noise nor one to another order is a new look
     steps = np.where(steps < _STEP * distance, np.maximum(steps - 2 * stderr[1:], 0.0), 0.0)

@@ -11,7 +11,7 @@ from pellicle.data.cube import Cube
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError
 from pellicle.fitting.batch.candidates import BatchSearch, prepared
-from pellicle.fitting.batch.data import BatchFits, batch_data
+from pellicle.fitting.batch.data import ORDERS, BatchFits, batch_data
 from pellicle.fitting.batch.errors import BatchErrors
 from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.fit import measurements
@@ -46,8 +46,10 @@ class PixelModel:
         return self.problem.parameters
 
 
-def prepare(cube: Cube, scene: Scene) -> PixelModel:
+def prepare(cube: Cube, scene: Scene, orders: int = ORDERS) -> PixelModel:
     """Prepare the fits of the pixels of a cube: media, effects, bounds and the table of the search.
+
+    `orders` is the number of minima of each pixel that are kept.
 
     **Raises:** as `pellicle.fit` does; DataError where no pixel has data.
     """
@@ -56,7 +58,7 @@ def prepare(cube: Cube, scene: Scene) -> PixelModel:
     with jax.enable_x64(True):
         [target] = measurements(example, scene)
         problem = make(target)
-        search = prepared(problem, batch_data(sample, problem.views[0].noise))
+        search = prepared(problem, batch_data(sample, problem.views[0].noise), orders)
         assert isinstance(target, Measured)
         errors = BatchErrors(problem, target, cube.calibrated, search)
     return PixelModel(scene, problem, example, search, errors)

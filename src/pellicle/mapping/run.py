@@ -51,6 +51,7 @@ def map_cube(
     neighbours: bool = False,
     lamp_curve: str | Sequence[int] | LampCurve | None = None,
     lamp_reference: Scene | None = None,
+    orders: int = ORDERS,
     recipe: str = "",
     progress: Progress = quiet,
     **reading: Any,
@@ -75,7 +76,13 @@ def map_cube(
         folder = tempfile.mkdtemp(prefix="pellicle-map-")
         out = Path(folder) / "map.zarr"
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "recipe": recipe}
-    options |= {"resume": resume, "overwrite": overwrite, "preview": factor, "progress": progress}
+    options |= {
+        "resume": resume,
+        "overwrite": overwrite,
+        "preview": factor,
+        "progress": progress,
+        "orders": orders,
+    }
     made = run_map(cube, scene, out, **options)
     if neighbours:
         made = made.by_neighbours()
@@ -92,6 +99,7 @@ def run_map(
     resume: bool = True,
     overwrite: bool = False,
     preview: int = 1,
+    orders: int = ORDERS,
     recipe: str = "",
     progress: Progress = quiet,
     fit: Fitter | None = None,
@@ -106,6 +114,7 @@ def run_map(
       and with None as soon as one block has shown that the others take longer than processes to start.
     - `scheduler`: address of a running dask scheduler, "tcp://host:8786", whose workers share the files.
     - `preview`: the cube has every so many of the pixels in each direction.
+    - `orders`: number of minima of each pixel that are kept.
     - `recipe`: the text of it, which is kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
     - `fit`: the function that fits a block, `pixels.fit_pixels` by default.
@@ -116,13 +125,13 @@ def run_map(
     if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
-    model = prepare(cube, scene)
-    about, who = attributes(cube, model, recipe, preview), identity(cube, scene)
+    model = prepare(cube, scene, orders)
+    about, who = attributes(cube, model, recipe, preview), identity(cube, scene, orders)
     tried = time.monotonic()
     if fit is None and (overwrite or not Path(path).exists()):
         about["notes"] += bands_off(model, cube)
     tried = time.monotonic() - tried  # nearly all of it compilation
-    store = begin(path, cube, model.parameters, who, about, orders=ORDERS, resume=resume, overwrite=overwrite)
+    store = begin(path, cube, model.parameters, who, about, orders=orders, resume=resume, overwrite=overwrite)
     with held(store.path):
         run = _fit_blocks(Job(model, cube, store, fit or fit_pixels), workers, scheduler, progress)
     return Map(path, run._replace(seconds=time.monotonic() - began, compiling=run.compiling + tried))
@@ -186,8 +195,8 @@ def attributes(cube: Cube, model: PixelModel, recipe: str, preview: int) -> dict
     }
 
 
-def identity(cube: Cube, scene: Scene) -> dict[str, str]:
-    """Hash the input and the scene of a map.
+def identity(cube: Cube, scene: Scene, orders: int = ORDERS) -> dict[str, str]:
+    """Hash the input and the scene of a map; `orders`, the minima of each pixel that it keeps.
 
     The content of a cube without a `fingerprint` is read once, in slabs along the first axis of pixels.
     """
@@ -204,4 +213,5 @@ def identity(cube: Cube, scene: Scene) -> dict[str, str]:
         "version": version("pellicle"),
         "input": fingerprint(content, cube.shape, *read),
         "scene": fingerprint(scene),
+        "orders": str(orders),
     }

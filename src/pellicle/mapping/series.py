@@ -7,9 +7,10 @@ again after each pass.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from inspect import signature
 from logging import getLogger
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
@@ -18,7 +19,7 @@ from pellicle.data.cube import Cube
 from pellicle.data.read_cube import read_cube, series_files
 from pellicle.errors import UsageError
 from pellicle.fitting.batch import polish
-from pellicle.fitting.batch.data import CODES, batch_data
+from pellicle.fitting.batch.data import CODES, BatchData, batch_data
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME, elapsed
@@ -27,7 +28,7 @@ from pellicle.mapping.order_path import order_path
 from pellicle.mapping.pixels import PixelModel, prepare
 from pellicle.mapping.run import map_cube
 from pellicle.mapping.series_result import SURE, Joined, Series, series_of
-from pellicle.mapping.state_space import Quadratics, smooth
+from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.store import variable_name
 from pellicle.scene.film import Scene
 from pellicle.scene.free import FREELY, SHARED, SLOWLY
@@ -40,6 +41,11 @@ log = getLogger(__name__)
 
 _PASSES, _SETTLED = 8, 0.05
 """Most passes of the smoother, and the change of all values, in standard errors, that ends them."""
+_ORDERS = 12
+"""Minima of each spectrum that continuity chooses from."""
+_DRIFT = 0.5
+"""Standard deviation of how much of its size a systematic effect drifts from the middle of the series to an
+end."""
 _BLOCK = 4096
 """Times that are linearised at once."""
 
@@ -57,7 +63,7 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
             f" {', '.join(cube.dims)}: choose one position, or use pellicle map"
         )
     _check_times(cube)
-    return smoothed_series(cube, scene, map_cube(cube, scene, **options))
+    return smoothed_series(cube, scene, map_cube(cube, scene, orders=_ORDERS, **options))
 
 
 def smoothed_series(cube: Cube, scene: Scene, made: Map) -> Series:
@@ -104,6 +110,34 @@ def _kinds(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
     return kinds
 
 
+class _Spectra(NamedTuple):
+    """The spectra of the times with data `used` (times,), and their model."""
+
+    model: PixelModel
+    cube: Cube
+    used: np.ndarray
+
+    def blocks(self) -> Iterator[tuple[slice, BatchData]]:
+        """Some of the times, and their data."""
+        for first in range(0, len(self.used), _BLOCK):
+            which = self.used[first : first + _BLOCK]
+            block = self.cube.pixels((slice(int(which[0]), int(which[-1]) + 1),))
+            own = {name: rows[which - which[0]] for name, rows in block.items()}
+            yield slice(first, first + _BLOCK), batch_data(own, self.model.problem.views[0].noise)
+
+    def quadratic(self, units: np.ndarray) -> polish.Curved:
+        """Slopes and curvatures of the misfits at points (times, parameters) of the unit cube."""
+        static, common = self.model.search.static, self.model.search.common
+        parts = [
+            polish.in_rows(polish.curved, static, common, data, units[own]) for own, data in self.blocks()
+        ]
+        return polish.Curved(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    def responses(self, units: np.ndarray) -> np.ndarray:
+        """Changes (times, effects, parameters) by systematic effects, of the fits of each time alone."""
+        return np.concatenate([self.model.errors.responses(data, units[own]) for own, data in self.blocks()])
+
+
 def _joined(
     model: PixelModel, cube: Cube, dataset: Dataset, time: np.ndarray, kinds: tuple[str, ...]
 ) -> Joined:
@@ -119,33 +153,57 @@ def _joined(
     used = np.flatnonzero(np.isfinite(delta).any(axis=1))
     if used.size < 3:
         raise UsageError(f"a series needs spectra at three times at least, and {used.size} have data")
-    time, minima, noise, rows = time[used], minima[used], noise[used], np.arange(used.size)
+    time, minima, noise, spectra = time[used], minima[used], noise[used], _Spectra(model, cube, used)
     limits = np.asarray(dataset["status"])[used] == CODES[str(Status.NOT_IDENTIFIABLE)]
-    known = _known_error(noise[:, depth], minima[:, 0, depth], limits)
+    systematic = _systematic(dataset, names[depth], used)
+    known = _known_error(noise[:, depth], np.maximum(minima[:, 0, depth], systematic), limits)
     path = order_path(time, minima[..., depth], delta[used], known)
     lower, upper = (np.array([getattr(p, side) for p in model.parameters]) for side in ("lower", "upper"))
     units = (minima - lower) / (upper - lower)
-    factor = _noise_factor(_quadratic(model, cube, used, units[:, 0]), noise / (upper - lower))
-    units, shared = units[rows, path.chosen], np.array([kind == SHARED for kind in kinds])
-    sure = path.rival > SURE
-    units[:, shared] = np.median(units[sure if sure.any() else rows][:, shared], axis=0)
+    factor = _noise_factor(spectra.quadratic(units[:, 0]), noise / (upper - lower))
+    units = _start(units[np.arange(used.size), path.chosen], path.rival, kinds)
     along = np.diff(time) / np.median(np.diff(time))
     fastest = 10 * float(np.max(np.abs(np.diff(units[:, depth]) / along))) + 1e-3
-    smoothed = None
+    about = time, kinds, path.breaks, fastest
+    smoothed, quadratics = _settled(spectra, about, units, factor)
+    changes = spectra.responses(np.clip(smoothed.mean, 0.0, 1.0)) / (upper - lower)
+    # together as large as the error of each time alone, which the data may have limited
+    size = np.sqrt(np.sum(changes[..., depth] ** 2, axis=1))
+    changes *= (systematic / (upper - lower)[depth] / np.where(size > 0, size, np.inf))[:, None, None]
+    pushes = np.einsum("tij,tkj->tik", quadratics.information, changes)
+    drift = _DRIFT * np.interp(time, time[[0, -1]], [-1, 1])[:, None, None]
+    pushes = np.concatenate([pushes, drift * pushes], axis=2)
+    smoothed = smooth(time, quadratics._replace(pushes=pushes), kinds, path.breaks, fastest, smoothed)
+    return Joined(path, smoothed, kinds, used)
+
+
+def _settled(
+    spectra: _Spectra,
+    about: tuple[np.ndarray, tuple[str, ...], np.ndarray, float],
+    units: np.ndarray,
+    factor: np.ndarray,
+) -> tuple[Smoothed, Quadratics]:
+    """Smooth and linearise from `units` (times, parameters) until nothing moves; the misfits times `factor`.
+
+    `about` are times, kinds of change, breaks and the fastest rate.
+    """
+    time, kinds, breaks, fastest = about
+    smoothed, none = None, np.zeros((*units.shape, 0))
     for number in range(_PASSES):
         at = np.clip(units, 0.0, 1.0)
-        curved = _quadratic(model, cube, used, at)
+        curved = spectra.quadratic(at)
         information = curved.hessian * factor[:, None, None]
         vector = np.einsum("tij,tj->ti", information, at) - curved.gradient * factor[:, None]
+        quadratics = Quadratics(vector, information, none)
         like = smoothed if number > 1 else None  # the stiffness is that of the second pass
-        smoothed = smooth(time, Quadratics(vector, information), kinds, path.breaks, fastest, like)
+        smoothed = smooth(time, quadratics, kinds, breaks, fastest, like)
         moved = np.max(np.abs(smoothed.mean - units) / np.sqrt(np.maximum(smoothed.variance, 1e-30)))
         units = smoothed.mean
         log.info("pass %d of the smoother: values moved by up to %.2g standard errors", number + 1, moved)
         if moved < _SETTLED:
             break
     assert smoothed is not None
-    return Joined(path, smoothed, kinds, used)
+    return smoothed, quadratics
 
 
 def _known_error(noise: np.ndarray, thickness: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -155,20 +213,11 @@ def _known_error(noise: np.ndarray, thickness: np.ndarray, limits: np.ndarray) -
     return np.where(limits, np.maximum(known, thickness), known)
 
 
-def _quadratic(model: PixelModel, cube: Cube, used: np.ndarray, units: np.ndarray) -> polish.Curved:
-    """Slopes and curvatures of the misfits of the times `used` at points of the unit cube."""
-    parts = []
-    for first in range(0, len(used), _BLOCK):
-        which = used[first : first + _BLOCK]
-        block = cube.pixels((slice(int(which[0]), int(which[-1]) + 1),))
-        data = batch_data(
-            {name: rows[which - which[0]] for name, rows in block.items()}, model.problem.views[0].noise
-        )
-        search = model.search
-        parts.append(
-            polish.in_rows(polish.curved, search.static, search.common, data, units[first : first + _BLOCK])
-        )
-    return polish.Curved(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+def _start(units: np.ndarray, rival: np.ndarray, kinds: tuple[str, ...]) -> np.ndarray:
+    """Values (times, parameters) of the path, those of shared parameters by the times of a sure order."""
+    shared, sure = np.array([kind == SHARED for kind in kinds]), rival > SURE
+    units[:, shared] = np.median(units[sure if sure.any() else ...][:, shared], axis=0)
+    return units
 
 
 def _noise_factor(curved: polish.Curved, noise: np.ndarray) -> np.ndarray:
@@ -183,3 +232,15 @@ def _noise_factor(curved: polish.Curved, noise: np.ndarray) -> np.ndarray:
     ).filled(0.0)
     good = np.isfinite(ratio) & (ratio > 0)
     return np.where(good, ratio, np.median(ratio[good]) if good.any() else 1.0)
+
+
+def _systematic(dataset: Dataset, name: str, used: np.ndarray) -> np.ndarray:
+    """Errors (times,) that all times have in common: of an index, of the angle."""
+    stderr, noise = (np.asarray(dataset[f"{name}{key}"], float)[used] for key in ("_stderr", "_stderr_noise"))
+    with np.errstate(invalid="ignore"):
+        square = np.where(np.isfinite(stderr), stderr**2 - noise**2, np.nan)
+    known = np.isfinite(square)
+    if not known.any():
+        return np.zeros(len(used))
+    at = np.arange(len(used))
+    return np.sqrt(np.maximum(np.interp(at, at[known], square[known]), 0.0))

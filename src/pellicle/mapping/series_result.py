@@ -122,17 +122,17 @@ def _variables(
     dataset: Dataset, parameter: Parameter, i: int, joined: Joined, unit: str
 ) -> dict[str, tuple[Any, Any, dict[str, str]]]:
     """Value, errors and rate of the i-th parameter: axes, values at the times with data, attributes."""
-    _, smoothed, kinds, used = joined
-    name, span, own_unit = (
+    _, smoothed, kinds, _ = joined
+    name, own_unit, span = (
         variable_name(parameter.name),
-        parameter.upper - parameter.lower,
         parameter.unit or "1",
+        parameter.upper - parameter.lower,
     )
-    value, noise = parameter.lower + span * smoothed.mean[:, i], span * np.sqrt(smoothed.variance[:, i])
-    systematic = _systematic(dataset, name, used)
+    value = parameter.lower + span * smoothed.mean[:, i]
+    noise, systematic = (span * np.sqrt(x[:, i]) for x in (smoothed.variance, smoothed.systematic))
     about = {"long_name": parameter.name, "units": own_unit}
     if kinds[i] == SHARED:
-        numbers = value[-1], np.hypot(noise[-1], np.median(systematic)), noise[-1]
+        numbers = value[-1], np.hypot(noise[-1], systematic[-1]), noise[-1]
         return {f"{name}{key}": ((), x, about) for key, x in zip(_ERRORS, numbers, strict=True)}
     columns = value, np.hypot(noise, systematic), noise
     found: dict[str, Any] = {
@@ -140,7 +140,7 @@ def _variables(
     }
     if kinds[i] == SLOWLY:
         rate, error = span * smoothed.rate[:, i], span * np.sqrt(smoothed.rate_variance[:, i])
-        common = np.abs(rate) * np.median(systematic / np.maximum(np.abs(value), 1e-300))
+        common = span * np.sqrt(smoothed.rate_systematic[:, i])
         about = {"long_name": f"rate of change of {parameter.name}", "units": f"{own_unit}/{unit}"}
         before = "" if kinds.count(SLOWLY) == 1 else f"{name}_"
         columns = rate, np.hypot(error, common), error
@@ -152,18 +152,6 @@ def _along(values: np.ndarray, used: np.ndarray, count: int) -> np.ndarray:
     result = np.full(count, np.nan)
     result[used] = values
     return result
-
-
-def _systematic(dataset: Dataset, name: str, used: np.ndarray) -> np.ndarray:
-    """Errors (times,) that all times have in common: of an index, of the angle."""
-    stderr, noise = (np.asarray(dataset[f"{name}{key}"], float)[used] for key in ("_stderr", "_stderr_noise"))
-    with np.errstate(invalid="ignore"):
-        square = np.where(np.isfinite(stderr), stderr**2 - noise**2, np.nan)
-    known = np.isfinite(square)
-    if not known.any():
-        return np.zeros(len(used))
-    at = np.arange(len(used))
-    return np.sqrt(np.maximum(np.interp(at, at[known], square[known]), 0.0))
 
 
 def _status(dataset: Dataset, path: OrderPath, used: np.ndarray) -> np.ndarray:

@@ -35,25 +35,30 @@ _STIFFNESS = np.arange(-12.0, 15.0, 1.5)
 class Quadratics(NamedTuple):
     """Misfits of all times around points, −2 ln likelihood = c − 2 vᵀu + uᵀΛu for u in the unit cube.
 
-    `vector` v (times, parameters) and `information` Λ (times, parameters, parameters).
+    `vector` v (times, parameters) and `information` Λ (times, parameters, parameters); `pushes` (times,
+    parameters, effects) are changes of v by systematic effects that all times have in common.
     """
 
     vector: np.ndarray
     information: np.ndarray
+    pushes: np.ndarray
 
 
 class Smoothed(NamedTuple):
     """Parameters at all times in the unit cube, and rates of those that vary slowly.
 
     `mean` and `variance` (times, parameters); `rate` and `rate_variance` (times, parameters), per unit of
-    time, NaN for the others; `derivatives`: states of each of these, and `stiffness` (slow,) the logarithms
-    of their process noise.
+    time, NaN for the others; the variances are those of the noise, and `systematic` and `rate_systematic`
+    those of the effects together; `derivatives`: states of each of these, and `stiffness` (slow,) the
+    logarithms of their process noise.
     """
 
     mean: np.ndarray
     variance: np.ndarray
     rate: np.ndarray
     rate_variance: np.ndarray
+    systematic: np.ndarray
+    rate_systematic: np.ndarray
     derivatives: int
     stiffness: np.ndarray
 
@@ -94,18 +99,19 @@ def smooth(
             states, best = like.derivatives, like.stiffness
         arrays = series.arrays(states)
         mean, variance, answer, spread = map(np.asarray, _smoothed(series.chain(best, states), *arrays))
-    means, variances = np.empty((2, len(time), len(kinds)))
-    means[:, shared], variances[:, shared] = answer, spread
-    means[:, ~shared], variances[:, ~shared] = mean[:, : len(own)], variance[:, : len(own)]
-    rate, rate_variance = np.full((2, len(time), len(kinds)), np.nan)
-    at, rates = np.flatnonzero(~shared)[slow], len(own) + (states - 1) * np.arange(len(slow))
-    rate[:, at], rate_variance[:, at] = mean[:, rates] / unit, variance[:, rates] / unit**2
-    return Smoothed(means, variances, rate, rate_variance, states, best)
+    columns = mean[..., 0], variance, np.sum(mean[..., 1:] ** 2, axis=2)
+    of_shared = answer[:, 0], spread, np.sum(answer[:, 1:] ** 2, axis=1)
+    values, rates = np.empty((3, len(time), len(kinds))), np.full((3, len(time), len(kinds)), np.nan)
+    at, first = np.flatnonzero(~shared)[slow], len(own) + (states - 1) * np.arange(len(slow))
+    for value, rate, of_time, of_all, power in zip(values, rates, columns, of_shared, (1, 2, 2), strict=True):
+        value[:, shared], value[:, ~shared] = of_all, of_time[:, : len(own)]
+        rate[:, at] = of_time[:, first] / unit**power
+    return Smoothed(*values[:2], *rates[:2], values[2], rates[2], states, best)
 
 
 def _best(series: _Times) -> tuple[int, np.ndarray]:
     """The states and stiffness of the highest marginal likelihood, of some of the times of a long series."""
-    some, slow = series.thinned(), series.kinds.count(SLOWLY)
+    some, slow = series.without_effects().thinned(), series.kinds.count(SLOWLY)
     if not slow:
         return _DERIVATIVES[0], np.zeros(0)
     return min((_stiffness(some, states, slow) for states in _DERIVATIVES), key=lambda fit: fit[0])[1:]
@@ -139,6 +145,10 @@ class _Times(NamedTuple):
     shared: np.ndarray
     fastest: float
 
+    def without_effects(self) -> _Times:
+        """The series without pushes."""
+        return self._replace(quadratics=self.quadratics._replace(pushes=self.quadratics.pushes[..., :0]))
+
     def thinned(self) -> _Times:
         """A series of at most `_ENOUGH` times."""
         first = np.arange(0, len(self.steps), -(-len(self.steps) // _ENOUGH))
@@ -149,22 +159,20 @@ class _Times(NamedTuple):
         )
 
     def arrays(self, states: int) -> tuple[Any, ...]:
-        """The misfits as functions of the states at given shared parameters: −Λ of both beside v (times,
-        states, 1 + shared), Λ (times, states, states), and the sum of the rest (1 + shared, 1 + shared)."""
-        own, vector, information = ~self.shared, *self.quadratics
+        """The misfits as functions of the states at given shared parameters: v, −Λ of both, and pushes
+        (times, states, 1 + shared + effects), Λ (times, states, states), and the sums of those of the shared
+        parameters (shared, 1 + shared + effects)."""
+        own, shared, (vector, information, pushes) = ~self.shared, self.shared, self.quadratics
         count, size = int(own.sum()), int(own.sum()) + (states - 1) * self.kinds.count(SLOWLY)
-        columns = np.zeros((len(vector), size, 1 + int(self.shared.sum())))
-        columns[:, :count, 0] = vector[:, own]
-        columns[:, :count, 1:] = -information[:, own][:, :, self.shared]
+        beside = np.concatenate([vector[:, :, None], -information[:, :, shared], pushes], axis=2)
+        columns = np.zeros((len(vector), size, beside.shape[2]))
+        columns[:, :count] = beside[:, own]
         square = np.zeros((len(vector), size, size))
         square[:, :count, :count] = information[:, own][:, :, own]
-        rest = np.zeros((columns.shape[2],) * 2)
-        rest[0, 1:] = rest[1:, 0] = -vector[:, self.shared].sum(axis=0)
-        rest[1:, 1:] = information[:, self.shared][:, :, self.shared].sum(axis=0)
+        rest = -beside[:, shared].sum(axis=0)
         # the prior of the shared parameters
-        rest[0, 1:] -= 0.5 / _PRIOR**2
-        rest[1:, 0] -= 0.5 / _PRIOR**2
-        rest[1:, 1:] += np.eye(len(rest) - 1) / _PRIOR**2
+        rest[:, 0] -= 0.5 / _PRIOR**2
+        rest[:, 1 : 1 + len(rest)] += np.eye(len(rest)) / _PRIOR**2
         return jnp.asarray(columns), jnp.asarray(square), jnp.asarray(rest)
 
     def chain(self, noise: np.ndarray, states: int) -> _Chain:
@@ -204,7 +212,8 @@ def _wiener(steps: np.ndarray, states: int, power: float) -> tuple[np.ndarray, n
 def _forward(chain: _Chain, vectors: Any, information: Any) -> Any:
     """Means and square roots of the covariances of the filter, those predicted, and the marginal misfit.
 
-    Means have a column for each shared parameter, its effect, and the misfit is a quadratic form of these.
+    Means have a column for each shared parameter and effect, what it adds, and the misfit is a quadratic form
+    of these.
     Square roots S of covariances P = S Sᵀ stay positive where P itself, whose variances span twenty decades,
     would lose its sign.
     """
@@ -232,15 +241,17 @@ def _forward(chain: _Chain, vectors: Any, information: Any) -> Any:
 
 
 def _shared(misfit: Any, rest: Any) -> tuple[Any, Any, Any]:
-    """Best shared parameters, a square root of their covariance, and the marginal deviance there."""
-    form = jnp.sum(misfit, axis=0) + rest
-    if len(form) == 1:
-        return jnp.zeros(0), jnp.zeros((0, 0)), form[0, 0]
-    factor = jnp.linalg.cholesky(form[1:, 1:])
-    inverse = jax.scipy.linalg.solve_triangular(factor, jnp.eye(len(factor)), lower=True)
-    short = inverse @ form[1:, 0]
-    deviance = form[0, 0] - short @ short + 2 * jnp.sum(jnp.log(jnp.diagonal(factor)))
-    return -inverse.T @ short, inverse.T, deviance
+    """Best shared parameters and their changes by the effects (shared, 1 + effects), a square root of their
+    covariance, and the marginal deviance there."""
+    count, form = len(rest), jnp.sum(misfit, axis=0)
+    if not count:
+        return jnp.zeros((0, len(form))), jnp.zeros((0, 0)), form[0, 0]
+    rows = form[1 : 1 + count] + rest
+    factor = jnp.linalg.cholesky(rows[:, 1 : 1 + count])
+    inverse = jax.scipy.linalg.solve_triangular(factor, jnp.eye(count), lower=True)
+    short = inverse @ jnp.concatenate([rows[:, :1], rows[:, 1 + count :]], axis=1)
+    log_determinant = 2 * jnp.sum(jnp.log(jnp.diagonal(factor)))
+    return -inverse.T @ short, inverse.T, form[0, 0] - short[:, 0] @ short[:, 0] + log_determinant
 
 
 @jax.jit
@@ -252,11 +263,14 @@ def _deviance(chain: _Chain, vectors: Any, information: Any, rest: Any) -> Any:
 
 @jax.jit
 def _smoothed(chain: _Chain, vectors: Any, information: Any, rest: Any) -> tuple[Any, ...]:
-    """Means and variances (times, states) of all times by all times, by the adjoint of the filter, which
-    inverts no covariance; means and variances of the shared parameters."""
+    """Means (times, states, 1 + effects), with changes by the effects, and variances (times, states) of all
+    times by all times, by the adjoint of the filter, which inverts no covariance; the same of the shared
+    parameters (shared, 1 + effects) and (shared,)."""
     mean, root, predicted, misfit, _ = _forward(chain, vectors, information)
     answer, spread, _ = _shared(misfit, rest)
-    weights = jnp.concatenate([jnp.ones(1), answer])
+    count, effects = len(rest), vectors.shape[2] - 1 - len(rest)
+    each = jnp.eye(1 + effects)
+    weights = jnp.concatenate([each[:1], answer, each[1:]])
 
     def step(carry, now):
         pull, weight = carry
@@ -264,7 +278,8 @@ def _smoothed(chain: _Chain, vectors: Any, information: Any, rest: Any) -> tuple
         covariance, unit = root @ root.T, jnp.eye(len(mean))
         every = mean - covariance @ pull
         left = unit - root.T @ weight @ root
-        variance = jnp.sum((root @ left) * root, axis=1) + jnp.sum((every[:, 1:] @ spread) ** 2, axis=1)
+        of_shared = every[:, 1 : 1 + count] @ spread
+        variance = jnp.sum((root @ left) * root, axis=1) + jnp.sum(of_shared**2, axis=1)
         kept = unit - covariance @ information
         residual = vector - information @ predicted
         pull = kept.T @ pull - (residual - information @ (covariance @ residual))

@@ -39,6 +39,7 @@ _OTHERWISE = {
     "version": "was made by another version of pellicle",
     "input": "is of another input, or of one that was read otherwise",
     "scene": "is of another scene",
+    "orders": "keeps another number of minima of each pixel",
 }
 """Messages on a store whose identity differs in one of its parts."""
 STATUS = "status"

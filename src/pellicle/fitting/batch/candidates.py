@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pellicle.fitting.batch import polish
-from pellicle.fitting.batch.data import BatchData
+from pellicle.fitting.batch.data import ORDERS, BatchData
 from pellicle.fitting.batch.lookup import Layout, Lookup, scan, table
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
@@ -32,6 +32,7 @@ class BatchSearch(NamedTuple):
     layout: Layout
     thickness: np.ndarray
     dark: float  # known offset
+    orders: int  # minima of each spectrum that are kept
 
     @property
     def static(self) -> polish.Static:
@@ -56,8 +57,8 @@ class BatchSearch(NamedTuple):
         return int(np.clip(2 ** int(np.log2(_MOST_PRODUCTS / width)), _FEWEST_PIXELS, _MOST_PIXELS))
 
 
-def prepared(problem: Problem, sample: BatchData) -> BatchSearch:
-    """The search of spectra for a problem of one spectrum; `sample` are a few spectra, as all are."""
+def prepared(problem: Problem, sample: BatchData, orders: int = ORDERS) -> BatchSearch:
+    """The search for so many minima of spectra by a problem of one; `sample` are a few, as all are."""
     view: SpectrumView = problem.views[0].unpadded()
     view = replace(view, data=view.data._replace(frame=None))
     instrument, level = view.scene.instrument, float(np.median(sample.level))
@@ -65,10 +66,10 @@ def prepared(problem: Problem, sample: BatchData) -> BatchSearch:
     if isinstance(instrument.scale, Drift):
         weight = weight * sample.level[:, None]
     weight = np.ma.median(np.ma.masked_equal(weight, 0.0), axis=0).filled(0.0)
-    lookup, layout, thickness = table(problem, view, weight, level)
+    lookup, layout, thickness = table(problem, view, weight, level, orders)
     common = polish.Common(view.scene, view.data, problem.box)
     dark = 0.0 if isinstance(instrument.offset, Drift) else float(instrument.offset)
-    return BatchSearch(problem, view, common, lookup, layout, thickness, dark)
+    return BatchSearch(problem, view, common, lookup, layout, thickness, dark, orders)
 
 
 def _even_weight(data: BatchData, channels: int) -> np.ndarray:

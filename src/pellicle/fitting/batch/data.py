@@ -19,7 +19,7 @@ STATUSES = (NO_DATA, *(str(status) for status in Status), BY_NEIGHBOURS)
 without data, and that of one whose order of interference its neighbours decide."""
 CODES = {word: code for code, word in enumerate(STATUSES)}
 ORDERS = 4
-"""Minima of each spectrum that are kept."""
+"""Minima of each spectrum that are kept, where no more are asked for."""
 _TO_NORMAL = MAD_TO_SIGMA / np.sqrt(6.0)
 """Standard deviation of normal noise over the median size of its second differences."""
 

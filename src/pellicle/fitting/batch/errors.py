@@ -141,6 +141,31 @@ class BatchErrors:
             result[group.spectra[:, None], rows, : left.far.shape[-1]] = left.far
         return result
 
+    def responses(self, data: BatchData, units: np.ndarray) -> np.ndarray:
+        """Changes (spectra, effects, parameters) of the parameters, in their own units, by one standard
+        uncertainty of each effect, at points `units` (spectra, parameters) near minima; 0 without data."""
+        best = polish.in_rows(polish.at_best, self.search.static, self.search.common, data, units)
+        curves = {name: getattr(best, name) for name in ("model", "signal", "gain", "offset", "slope")}
+        points = best.units, self.problem.values(best.units), best.deviance, best.misfit
+        names = "units", "values", "deviance", "misfit"
+        minima = BatchMinima(
+            converged=np.ones((len(units), 1), bool),
+            profile=np.zeros((len(units), 0)),
+            thickness=self.search.thickness,
+            **{name: np.asarray(x)[:, None] for name, x in zip(names, points, strict=True)},
+            **curves,
+        )
+        result = np.zeros((len(units), 0, units.shape[1]))
+        for group in groups(self.view, data.weight, np.isfinite(best.deviance)):
+            for part in group.chunks(BLOCK):
+                _, ranked, jacobian, evidence = self._linear(data, minima, part)
+                found = discrepancy([evidence], jacobian, ranked.minima.units[:, 0]).contributions
+                if not result.size and found:
+                    result = np.zeros((len(units), len(found), units.shape[1]))
+                for i, effect in enumerate(found):
+                    result[part.spectra, i] = effect.changes[:, : units.shape[1]]
+        return np.where(np.isfinite(result), result, 0.0)
+
     def _fits(self, data: BatchData, minima: BatchMinima, group: Group) -> BatchFits:
         """Fits of a group; the first minimum of a spectrum is its answer, even if another is better."""
         linear = whole, ranked, jacobian, evidence = self._linear(data, minima, group)

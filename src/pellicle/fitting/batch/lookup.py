@@ -31,9 +31,9 @@ _FINER = 4
 wavelength in the layer apart, a linear step leaves a third of the fringes' amplitude, a fourth of it 2 %."""
 _MOST_NUMBERS = 40_000_000
 """Numbers of a table at most, 160 MB: with more the design of the other parameters is coarser."""
-_SINGLE, _SEVERAL = 4, 12
-"""Candidates of each spectrum, where the thickness alone is scanned and beside a design of other parameters:
-the nodes of one minimum at several of its rows are all candidates."""
+_ROWS = 3
+"""Candidates for each minimum that is kept, where the thickness is scanned beside a design of other
+parameters: the nodes of one minimum at several of its rows are all candidates."""
 _DEPENDENT = 1e-9
 """Length of a column beside others, as a share of its own, below which they span it."""
 _BATCH = 256
@@ -98,13 +98,13 @@ def _signals(form: SpectrumForm, arrays: tuple[Scene, Any], values: Any) -> _Sig
 
 
 def table(
-    problem: Problem, view: SpectrumView, weight: np.ndarray, level: float
+    problem: Problem, view: SpectrumView, weight: np.ndarray, level: float, orders: int
 ) -> tuple[Lookup, Layout, np.ndarray]:
     """The lookup of a problem's one view, its layout, and the thicknesses of its nodes in nm.
 
     **Arguments:** `view` without padding and without a frame; `weight` (points,), which all spectra have
     about in common, of values in units of their level where the scale is free, else of values of this
-    `level`.
+    `level`; `orders`, the minima of each spectrum that are kept.
     """
     instrument, data, points = view.scene.instrument, view.data, len(weight)
     gain_sd = scale_prior(instrument.scale)[1] if isinstance(instrument.scale, Drift) else np.zeros(0)
@@ -130,7 +130,7 @@ def table(
         np.concatenate([getattr(block, name) for block in blocks]) for name in _Block._fields[1:]
     )
     prior = np.sum(np.asarray(problem.box.prior_rows(np.asarray(problem.values(units)))) ** 2, axis=1)
-    candidates = _SINGLE if len(design) == 1 else _SEVERAL
+    candidates = orders * (1 if len(design) == 1 else _ROWS)
     layout = Layout(len(design), len(grid), gains, order, free_scale, candidates)
     lookup = Lookup(
         units=units,

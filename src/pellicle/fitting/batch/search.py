@@ -7,7 +7,6 @@ scan predicts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from logging import getLogger
 
@@ -15,8 +14,7 @@ import numpy as np
 
 from pellicle.fitting.batch import polish
 from pellicle.fitting.batch.candidates import BatchSearch, Candidates, candidates
-from pellicle.fitting.batch.data import ORDERS, BatchData, BatchMinima
-from pellicle.fitting.parameter import Parameter
+from pellicle.fitting.batch.data import BatchData, BatchMinima
 from pellicle.scene.instrument import Drift
 
 log = getLogger(__name__)
@@ -45,7 +43,7 @@ def minima(search: BatchSearch, data: BatchData) -> BatchMinima:
     best = _minima(search, data.of(valid) if len(valid) < spectra else data) if len(valid) else None
     if best is not None and len(valid) == spectra:
         return best
-    orders, curve = (spectra, ORDERS), (spectra, points)
+    orders, curve = (spectra, search.orders), (spectra, points)
     result = BatchMinima(
         values=np.full((*orders, count), np.nan),
         units=np.full((*orders, count), np.nan),
@@ -186,7 +184,7 @@ def _ordered(
     search, problem = points.search, points.search.problem
     # along a valley of several parameters, points that have not settled are no minima
     listed = settled if len(problem.parameters) > 1 else np.isfinite(points.deviance)
-    order = _distinct(problem.parameters, points.units, points.deviance, lowest, listed)
+    order = _distinct(search, points.units, points.deviance, lowest, listed)
     rows, here, absent = np.arange(len(order))[:, None], np.maximum(order, 0), order < 0
     ordered = np.where(absent[..., None], np.nan, points.units[rows, here])
     with np.errstate(invalid="ignore"):  # of points that were not tried, which are infinite
@@ -271,20 +269,21 @@ def _root(deviance: np.ndarray) -> np.ndarray:
 
 
 def _distinct(
-    parameters: Sequence[Parameter],
+    search: BatchSearch,
     units: np.ndarray,
     deviance: np.ndarray,
     lowest: np.ndarray,
     listed: np.ndarray,
 ) -> np.ndarray:
-    """Positions of the best distinct minima of each spectrum (spectra, `ORDERS`), −1 where there are no more:
+    """Positions of the best distinct minima of each spectrum (spectra, orders), −1 where there are no more:
     the `lowest` (spectra,), and the best of the others that are `listed` (spectra, candidates)."""
     rows, count = np.arange(len(units)), units.shape[1]
+    parameters = search.problem.parameters
     resolution = np.stack([p.resolutions_at(x) for p, x in zip(parameters, units.T, strict=True)]).T
     left = np.where(listed, deviance, np.inf)
-    chosen, at = np.full((len(units), ORDERS), -1), lowest
+    chosen, at = np.full((len(units), search.orders), -1), lowest
     chosen[:, 0] = at
-    for k in range(1, min(ORDERS, count)):
+    for k in range(1, min(search.orders, count)):
         apart = np.any(np.abs(units - units[rows, at][:, None]) > resolution[rows, at][:, None], axis=2)
         left = np.where(apart, left, np.inf)
         at = np.argmin(left, axis=1)

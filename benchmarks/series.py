@@ -1,0 +1,131 @@
+"""Series of simulated films: orders, errors and coverage of thickness and rate, with flaws of real runs.
+
+Run: `python benchmarks/series.py [--draws 10] [--only NAME] [--narrow]`. Spectra by the Airy formula in NumPy, of a
+film that grows to 3 µm on an absorbing substrate, at 500 times, with noise of 1 % of the values. Each draw has
+another film, noise and flaws. `single` are the fits of each spectrum alone. Coverage is that of 1.96 standard errors.
+"""
+
+import argparse
+from time import perf_counter
+
+import numpy as np
+import xarray
+
+import pellicle as pl
+
+TIME = np.arange(500) * 2.0
+SUBSTRATE = 3.9 + 0.02j
+
+
+def reflectance(thickness, index, nm):
+    """Spectra (times, wavelengths) of a layer at normal incidence."""
+    upper, lower = (1 - index) / (1 + index), (index - np.conj(SUBSTRATE)) / (index + np.conj(SUBSTRATE))
+    turn = np.exp(-4j * np.pi * index * thickness[:, None] / nm)
+    return np.abs((upper + lower * turn) / (1 + upper * lower * turn)) ** 2
+
+
+def slow(random, count=3):
+    """A smooth curve of the time, of size 1."""
+    at = TIME / TIME[-1]
+    curve = sum(
+        random.standard_normal() / k * np.sin(np.pi * k * at + random.uniform(0, 6))
+        for k in range(1, count + 1)
+    )
+    return curve / np.abs(curve).max()
+
+
+def lamp(random, nm):
+    """A level that drifts by 2 % and a tilt that drifts by 1 %."""
+    tilt = (nm - nm.mean()) / np.ptp(nm)
+    return 1 + 0.02 * slow(random)[:, None] + 0.02 * slow(random)[:, None] * tilt
+
+
+def window(random, nm):
+    """A curve of 1 % that no time changes."""
+    at = (nm - nm[0]) / np.ptp(nm)
+    return 1 + 0.01 * np.sin(2 * np.pi * at * random.uniform(0.3, 1.5) + random.uniform(0, 6))
+
+
+FLAWS = {
+    "none": (),
+    "lamp": ("lamp",),
+    "window": ("window",),
+    "index": ("index",),
+    "wavelength": ("wavelength",),
+    "all": ("lamp", "window", "index", "wavelength"),
+}
+
+
+def draw(random, nm, flaws):
+    """True thickness and rate (nm/min), and the data."""
+    top, pace = random.uniform(2500, 3000), random.uniform(300, 900)
+    grown = top * (1 - np.exp(-TIME / pace)) / (1 - np.exp(-TIME[-1] / pace))
+    rate = 60 * top / pace * np.exp(-TIME / pace) / (1 - np.exp(-TIME[-1] / pace))
+    index = 1.46 + (0.003 * slow(random)[:, None] if "index" in flaws else 0.0)
+    seen = nm + (random.normal(0, 0.3) if "wavelength" in flaws else 0.0)
+    values = reflectance(grown, index, seen)
+    values = values * (lamp(random, nm) if "lamp" in flaws else 1.0)
+    values = values * (window(random, nm) if "window" in flaws else 1.0)
+    values = values * (1 + 0.01 * random.standard_normal(values.shape))
+    axes = {"time": ("time", TIME, {"units": "s"}), "wavelength": ("wavelength", nm, {"units": "nm"})}
+    return grown, rate, xarray.Dataset({"R": (("time", "wavelength"), values)}, axes)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=10)
+    parser.add_argument("--only", choices=FLAWS)
+    parser.add_argument("--narrow", action="store_true", help="600 to 700 nm, else 450 to 900 nm")
+    parser.add_argument("--scale", default=1.0, help="of the scene: 1, free or slow")
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    nm = np.linspace(600, 700, 60) if given.narrow else np.linspace(450, 900, 120)
+    scale = float(given.scale) if str(given.scale)[0].isdigit() or given.scale == 1.0 else given.scale
+    scene = pl.Scene(pl.Layer(1.46, pl.Free(0, 4000)), SUBSTRATE, instrument=pl.Instrument(scale=scale))
+    print(
+        "flaw        single: wrong %, open %, rms | wrong %  open %  rms nm  z noise  95 %  | rate rms  z noise  95 %  | s"
+    )
+    for name in [given.only] if given.only else FLAWS:
+        rows = []
+        for number in range(given.draws):
+            random = np.random.default_rng([given.seed, number, len(name)])
+            grown, rate, data = draw(random, nm, FLAWS[name])
+            began = perf_counter()
+            found = pl.series(data, scene)
+            seconds = perf_counter() - began
+            alone, d = np.asarray(found.map["thickness"]) - grown, found.dataset
+            own = found.map.status
+            off, turn = np.asarray(d.thickness) - grown, np.asarray(d.rate) - rate
+            near = np.abs(alone) < 70
+            status = found.status
+            rows.append(
+                [
+                    100 * np.mean(~near),
+                    100 * own.get("ambiguous", 0) / len(TIME),
+                    np.sqrt(np.mean(alone[near] ** 2)),
+                    100 * np.mean(np.abs(off) > 70),
+                    100 * status.get("ambiguous", 0) / len(TIME),
+                    np.sqrt(np.mean(off**2)),
+                    np.sqrt(np.mean((off / d.thickness_stderr_noise) ** 2)),
+                    100 * np.mean(np.abs(off) < 1.96 * d.thickness_stderr),
+                    np.sqrt(np.mean(turn**2)),
+                    np.sqrt(np.mean((turn / d.rate_stderr_noise) ** 2)),
+                    100 * np.mean(np.abs(turn) < 1.96 * d.rate_stderr),
+                    seconds,
+                ]
+            )
+            if found.breaks:
+                print("breaks", number, found.breaks[:5])
+        mean = np.mean(rows, axis=0)
+        worst = np.max(rows, axis=0)
+        least = np.min(rows, axis=0)
+        print(
+            f"{name:10}",
+            " ".join(f"{x:8.3g}" for x in mean),
+            "| worst",
+            f"{worst[3]:.3g} {worst[5]:.3g} cover {least[7]:.3g} {least[10]:.3g}",
+            flush=True,
+        )
+
+
+main()
