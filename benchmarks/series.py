@@ -77,6 +77,7 @@ def main():
     parser.add_argument("--only", choices=FLAWS)
     parser.add_argument("--narrow", action="store_true", help="600 to 700 nm, else 450 to 900 nm")
     parser.add_argument("--scale", default=1.0, help="of the scene: 1, free or slow")
+    parser.add_argument("--lamp-curve", choices=["joint"], help="one gain against wavelength for all times")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     nm = np.linspace(600, 700, 60) if given.narrow else np.linspace(450, 900, 120)
@@ -91,7 +92,7 @@ def main():
             random = np.random.default_rng([given.seed, number, len(name)])
             grown, rate, data = draw(random, nm, FLAWS[name])
             began = perf_counter()
-            found = pl.series(data, scene)
+            found = pl.series(data, scene, lamp_curve=given.lamp_curve)
             seconds = perf_counter() - began
             alone, d = np.asarray(found.map["thickness"]) - grown, found.dataset
             own = found.map.status

@@ -44,6 +44,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     - `lamp_curve`: a gain against wavelength that all pixels have in common, by which the cube is divided:
       "joint", fitted together with the films of some pixels; "x,y,width,height", from a region whose scene is
       `lamp_reference`, by default the bare substrate; or a `LampCurve`.
+    - `orders`: minima of each pixel that are kept, 4 by default.
     - `recipe`: text of the scene's recipe, kept in the map. `progress`: called with the name of a stage, the
       number of pixels done and their total. Others, such as `wavelengths`, `signal_unit`, `noise` and `mask`,
       are those of `pellicle.read_cube`.
@@ -67,7 +68,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     return _verb_for(data, scene, options)(data, scene, **options)
 
 
-_OF_MAPS = "neighbours", "preview", "lamp_curve", "lamp_reference"
+_OF_MAPS = "neighbours", "preview", "lamp_reference", "orders"
 """Arguments of the map of a cube that a series does not take."""
 
 
@@ -85,6 +86,8 @@ def series(data: Any, scene: Scene, **options: Any) -> Series:
     - `scene`: a film with a free thickness. It varies slowly, and all times share the other free numbers,
       unless their `varies` states otherwise.
     - `out`, `workers`, `resume`, `overwrite`, `progress`: of the map, as in `pellicle.map`.
+    - `lamp_curve`: a gain against wavelength that no time changes, as of a window, by which all spectra are
+      divided: "joint", fitted together with the films of all times, or a `LampCurve`.
 
     **Returns:** a `Series`: `dataset` has thickness, rate, errors and status of each time.
 

@@ -34,6 +34,14 @@ class StoreFlags(Flags):
 
     workers: Annotated[int | None, flag(RUN)] = None
     """Processes on this machine, one thread each (its cores, if that saves time)."""
+    lamp_curve: Annotated[
+        str | None,
+        flag(
+            RUN,
+            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT "
+            "of an image, a region of known reflectance.",
+        ),
+    ] = None
     resume: Annotated[bool | None, flag(OUTPUT)] = None
     """Go on with what an earlier run left in --out (the default)."""
     overwrite: Annotated[bool | None, switch(OUTPUT, "Replace what an earlier run left in --out.")] = None
@@ -54,14 +62,6 @@ class RunFlags(StoreFlags):
     """Address of a dask scheduler, tcp://HOST:8786, whose workers fit the pixels."""
     neighbours: Annotated[bool | None, switch(RUN)] = None
     """Decide ambiguous pixels by the order of their neighbours."""
-    lamp_curve: Annotated[
-        str | None,
-        flag(
-            RUN,
-            "Divide all spectra by one lamp curve: joint, fitted with the films, or X,Y,WIDTH,HEIGHT, "
-            "from a region of known reflectance.",
-        ),
-    ] = None
     lamp_reference: Annotated[str | None, flag(RUN)] = None
     """Recipe of the region of --lamp-curve (the bare substrate)."""
     preview: Annotated[bool | None, switch(RUN)] = None

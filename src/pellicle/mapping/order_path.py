@@ -8,8 +8,10 @@ a break. Least costs of the paths through each minimum say how sure the order is
 Koller and Friedman 2009, Probabilistic Graphical Models, ch. 13.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.robust_losses import MAD_TO_SIGMA
@@ -18,8 +20,8 @@ BREAK = 50.0
 """Price of a break, as Δχ²."""
 _STEP = 0.3
 """Share of the distance of minima above which a step is one between them."""
-_FEWEST = 5
-"""Times in a row that show how evenly a thickness changes."""
+_FEWEST, _MOST = 5, 2000
+"""Times that show how evenly a thickness changes."""
 
 
 class OrderPath(NamedTuple):
@@ -70,12 +72,14 @@ def _unlisted(path: OrderPath, cost: np.ndarray) -> np.ndarray:
 def _unevenness(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stderr: np.ndarray) -> float:
     """Usual departure from a straight line through three times, in nm over the square of the interval, from
     times that have one minimum; where these are few, from the straightest three minima of any times."""
-    steps, there = np.diff(time), np.where(delta < BREAK, thickness, np.nan)
-    before, now, after = there[:-2, :, None, None], there[1:-1, None, :, None], there[2:, None, None, :]
-    first, second = (x[:, None, None, None] for x in (steps[:-1], steps[1:]))
+    there, at = np.where(delta < BREAK, thickness, np.nan), np.arange(1, len(time) - 1)
+    at = at[:: -(-len(at) // _MOST)]
+    steps = np.diff(time)
+    before, now, after = there[at - 1, :, None, None], there[at, None, :, None], there[at + 1, None, None, :]
+    first, second = (x[:, None, None, None] for x in (steps[at - 1], steps[at]))
     bends = np.abs((after - now) / second - (now - before) / first) / (0.5 * (first + second))
     bends = bends.reshape(len(bends), -1)
-    error = 2 * (stderr[2:] / steps[1:] + stderr[:-2] / steps[:-1]) / (steps[1:] + steps[:-1])
+    error = 2 * (stderr[at + 1] / steps[at] + stderr[at - 1] / steps[at - 1]) / (steps[at] + steps[at - 1])
     known = np.isfinite(bends)
     sure = known.sum(axis=1) == 1
     # the least of several is less than what is usual
@@ -94,41 +98,65 @@ def _best(
     weight: float,
 ) -> OrderPath:
     """The path of least cost, with Δχ² times a `weight`."""
-    count, orders = thickness.shape
-    there, cost = np.nan_to_num(thickness, nan=1e9), weight * np.where(np.isnan(thickness), np.inf, delta)
-    steps = np.diff(time)
-
-    def price(t: int) -> np.ndarray:
-        """Prices (minima at t − 2, t − 1, t) of departures from straight lines."""
-        ratio = steps[t - 1] / steps[t - 2]
-        line = there[t - 1][None, :] + ratio * (there[t - 1][None, :] - there[t - 2][:, None])
-        known = stderr[t] ** 2 + ((1 + ratio) * stderr[t - 1]) ** 2 + (ratio * stderr[t - 2]) ** 2
-        bend = 0.5 * uneven * steps[t - 1] * (steps[t - 1] + steps[t - 2])
-        return np.minimum((there[t][None, None, :] - line[..., None]) ** 2 / (known + bend**2), BREAK)
-
-    forward = np.empty((count, orders, orders))  # of paths that end in a pair of minima
-    forward[1] = cost[0][:, None] + cost[1][None, :]
-    origin = np.zeros((count, orders, orders), int)
-    for t in range(2, count):
-        total = forward[t - 1][..., None] + price(t)
-        origin[t] = np.argmin(total, axis=0)
-        forward[t] = np.min(total, axis=0) + cost[t][None, :]
-    backward = np.zeros((orders, orders))
-    least = np.empty((count, orders))  # of paths through each minimum
-    least[-1] = forward[-1].min(axis=0)
-    for t in range(count - 1, 1, -1):
-        backward = np.min(price(t) + (cost[t][None, :] + backward)[None], axis=2)
-        least[t - 1] = np.min(forward[t - 1] + backward, axis=0)
-    least[0] = np.min(forward[1] + backward, axis=1)
-    chosen = np.empty(count, int)
-    chosen[-2:] = np.unravel_index(int(np.argmin(forward[-1])), (orders, orders))
-    for t in range(count - 1, 1, -1):
-        chosen[t - 2] = origin[t][chosen[t - 1], chosen[t]]
-    rows = np.arange(count)
+    cost = weight * np.where(np.isnan(thickness), np.inf, delta)
+    # leaving a path for one time and coming back pays for three departures
+    cost = np.where(cost - cost.min(axis=1, keepdims=True) > 3 * BREAK, np.inf, cost)
+    kept = np.argsort(cost, axis=1, kind="stable")[:, : int(np.isfinite(cost).sum(axis=1).max())]
+    cost, there = (np.take_along_axis(x, kept, axis=1) for x in (cost, np.nan_to_num(thickness, nan=1e9)))
+    rows, steps = np.arange(len(time)), np.diff(time)
+    ratio = np.concatenate([[0.0, 0.0], steps[1:] / steps[:-1]])
+    known = stderr**2 + ((1 + ratio) * np.roll(stderr, 1)) ** 2 + (ratio * np.roll(stderr, 2)) ** 2
+    bend = 0.5 * uneven * np.concatenate([[0.0, 0.0], steps[1:] * (steps[1:] + steps[:-1])])
+    with jax.enable_x64(True):
+        chosen, least, paid = map(np.asarray, _viterbi(there, cost, ratio, known + bend**2))
     left = least - least[rows, chosen][:, None]
     left[rows, chosen] = np.inf
-    paid = np.array([price(t)[tuple(chosen[t - 2 : t + 1])] for t in range(2, count)])
-    return OrderPath(chosen, left.min(axis=1), _breaks(paid >= BREAK, count))
+    breaks = _breaks(paid[2:] >= BREAK, len(time))
+    return OrderPath(kept[rows, chosen], left.min(axis=1), breaks)
+
+
+@jax.jit
+def _viterbi(thickness: Any, cost: Any, ratio: Any, variance: Any) -> tuple[Any, Any, Any]:
+    """The best path through minima (times, minima), least costs of paths through each of them, and prices
+    (times,) of departures from straight lines on the best path, of which the first two have none.
+
+    `cost` (times, minima) is that of a minimum; `ratio` (times,) that of a step to the one before, and
+    `variance` (times,) that of a departure.
+    """
+
+    def price(before: Any, now: Any) -> Any:
+        """Prices (minima at t − 2, t − 1, t)."""
+        (first, second), (third, _, ratio, variance) = before, now
+        line = second[None, :] + ratio * (second[None, :] - first[:, None])
+        return jnp.minimum((third[None, None, :] - line[..., None]) ** 2 / variance, BREAK)
+
+    def forward(least: Any, now: Any) -> Any:
+        """Least costs of paths that end in a pair of minima, and the minima two times before."""
+        before, own = now
+        total = least[..., None] + price(before, own)
+        return jnp.min(total, axis=0) + own[1][None, :], (least, jnp.argmin(total, axis=0))
+
+    def backward(carry: Any, now: Any) -> Any:
+        """Least costs of the rest of a path, and of paths through the minima one time before."""
+        rest, pair = carry
+        before, own, least, origin = now
+        paid = price(before, own)
+        rest = jnp.min(paid + (own[1][None, :] + rest)[None], axis=2)
+        first = origin[pair]
+        return (rest, (first, pair[0])), (jnp.min(least + rest, axis=0), pair[1], paid[(first, *pair)])
+
+    every = thickness, cost, ratio, variance
+    later = (thickness[:-2], thickness[1:-1]), tuple(x[2:] for x in every)
+    last, (before, origin) = jax.lax.scan(forward, cost[0][:, None] + cost[1][None, :], later)
+    pair = jnp.unravel_index(jnp.argmin(last), last.shape)
+    carry = jnp.zeros_like(last), pair
+    (rest, (first, second)), (least, third, paid) = jax.lax.scan(
+        backward, carry, (*later, before, origin), reverse=True
+    )
+    chosen = jnp.concatenate([jnp.stack([first, second]), third])
+    start = jnp.min(cost[0][:, None] + cost[1][None, :] + rest, axis=1)
+    least = jnp.concatenate([start[None], least, jnp.min(last, axis=0)[None]])
+    return chosen, least, jnp.concatenate([jnp.zeros(2), paid])
 
 
 def _breaks(paid: np.ndarray, count: int) -> np.ndarray:

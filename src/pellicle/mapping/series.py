@@ -23,6 +23,7 @@ from pellicle.fitting.batch.data import CODES, BatchData, batch_data
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME, elapsed
+from pellicle.mapping.lamp import lamp_curve_of
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.order_path import order_path
 from pellicle.mapping.pixels import PixelModel, prepare
@@ -63,6 +64,8 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
             f" {', '.join(cube.dims)}: choose one position, or use pellicle map"
         )
     _check_times(cube)
+    if (lamp := options.pop("lamp_curve", None)) is not None:
+        cube = lamp_curve_of(lamp, cube, scene).correct(cube)
     return smoothed_series(cube, scene, map_cube(cube, scene, orders=_ORDERS, **options))
 
 
