@@ -16,7 +16,7 @@ def test_the_path_is_the_cheapest_of_all():
     delta = np.abs(rng.normal(0, 3, (7, 3)))
     delta -= delta.min(axis=1, keepdims=True)
     sigma = np.full(7, 0.5)
-    found = order_path(t, thickness, delta, sigma)
+    found = order_path(t, thickness, delta, sigma, 0 * t)
     assert (found.chosen == found.chosen[0]).all()
     assert not found.breaks.any()
     # parallel paths differ in Δχ² alone, less what all times have in common
@@ -43,7 +43,7 @@ def test_a_jump_is_a_break_and_what_follows_is_right():
     true = np.where(t < 12, 500 + 3 * t, 300 + 3 * t)
     thickness = np.stack([true, true + 110, true - 110], axis=1)
     delta = np.tile([0.0, 2.0, 3.0], (30, 1))
-    found = order_path(t, thickness, delta, np.full(30, 0.3))
+    found = order_path(t, thickness, delta, np.full(30, 0.3), 0 * t)
     assert list(np.flatnonzero(found.breaks)) == [12]
     assert (found.chosen == 0).all()
 
@@ -52,5 +52,17 @@ def test_a_film_that_stands_still_repeats_one_measurement():
     """A hundred equal spectra decide no more than one: the error of an index favours one order in all."""
     still = np.tile([500.0, 610.0], (100, 1))
     still += np.random.default_rng(1).normal(0, 0.3, (100, 1))
-    found = order_path(np.arange(100.0), still, np.tile([0.0, 2.0], (100, 1)), np.full(100, 0.3))
+    found = order_path(
+        np.arange(100.0), still, np.tile([0.0, 2.0], (100, 1)), np.full(100, 0.3), np.zeros(100)
+    )
     assert (found.rival < 12).all()
+
+
+def test_orders_that_every_time_decides_are_not_weighed_down():
+    """No rival is near, and the thin start of a film bends: the few times there are not one measurement."""
+    t = np.arange(300.0)
+    true = 10 * t
+    true[:2] = 0  # too thin to be seen
+    thickness = np.stack([true, true + 200, true + 500], axis=1)
+    found = order_path(t, thickness, np.tile([0.0, 400.0, 900.0], (300, 1)), np.full(300, 0.2), 0 * t)
+    assert (found.chosen == 0).all()

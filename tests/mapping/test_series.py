@@ -129,3 +129,20 @@ def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeyp
     assert record["schema"] == "pellicle.series/1"
     assert record["times"]["count"] == 20
     xarray.testing.assert_identical(xarray.load_dataset("grown/series.nc"), first)
+
+
+@pytest.mark.slow
+def test_a_window_that_no_time_changes_is_a_lamp_curve_of_the_series():
+    data = cube(GROWN, seed=4)
+    window = 1 + 0.02 * np.sin(2 * np.pi * (NM - 600) / 100)
+    data["R"] = data.R * window
+    errors = {}
+    for lamp in (None, "joint"):
+        found = pl.series(data, SCENE, lamp_curve=lamp)
+        errors[lamp] = np.sqrt(np.mean((found["thickness"] - GROWN)[5:] ** 2))
+        off = np.abs(found["thickness"] - GROWN) < 1.96 * found["thickness_stderr"]
+        assert off.mean() > 0.9
+        turning = np.abs(found["rate"] - 60 * 1800 / 500 * np.exp(-TIME / 500)) < 1.96 * found["rate_stderr"]
+        assert turning.mean() > 0.9
+    assert errors["joint"] < 0.7 * errors[None]
+    assert any("lamp curve" in note for note in found.map.notes)

@@ -30,7 +30,10 @@ def test_values_rates_and_errors_are_those_of_all_times_together(states):
     information = rows[:, :, None] * rows[:, None, :] / sigma**2
     vector = rows * y[:, None] / sigma**2
     like = Smoothed(*[np.zeros(0)] * 6, derivatives=states, stiffness=np.array([np.log10(power)]))
-    found = smooth(t, Quadratics(vector, information, np.zeros((8, 2, 0))), ("slowly", "shared"), breaks, fastest, like)
+    pushed = rng.uniform(-1, 1, (8, 3))  # changes of y by three effects
+    pushes = rows[:, :, None] * pushed[:, None, :] / sigma**2
+    quadratics = Quadratics(vector, information, pushes)
+    found = smooth(t, quadratics, ("slowly", "shared"), breaks, fastest, like)
 
     part = np.cumsum(breaks)
     unit = np.median(np.diff(t))
@@ -64,6 +67,10 @@ def test_values_rates_and_errors_are_those_of_all_times_together(states):
     spread = np.diag(covariance(1, 1) - cross @ np.linalg.solve(seen, cross.T))
     np.testing.assert_allclose(found.rate[:, 0] * unit, rate, rtol=1e-7)
     np.testing.assert_allclose(found.rate_variance[:, 0] * unit**2, spread, rtol=1e-5)
+    systematic = np.sum((gain @ pushed) ** 2, axis=1)
+    np.testing.assert_allclose(found.systematic.T.ravel(), systematic, rtol=1e-7)
+    of_rate = np.sum((cross @ np.linalg.solve(seen, pushed)) ** 2, axis=1)
+    np.testing.assert_allclose(found.rate_systematic[:, 0] * unit**2, of_rate, rtol=1e-7)
 
 
 def test_the_stiffness_is_that_of_the_data():

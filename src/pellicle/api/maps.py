@@ -44,7 +44,6 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     - `lamp_curve`: a gain against wavelength that all pixels have in common, by which the cube is divided:
       "joint", fitted together with the films of some pixels; "x,y,width,height", from a region whose scene is
       `lamp_reference`, by default the bare substrate; or a `LampCurve`.
-    - `orders`: minima of each pixel that are kept, 4 by default.
     - `recipe`: text of the scene's recipe, kept in the map. `progress`: called with the name of a stage, the
       number of pixels done and their total. Others, such as `wavelengths`, `signal_unit`, `noise` and `mask`,
       are those of `pellicle.read_cube`.
@@ -68,7 +67,7 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
     return _verb_for(data, scene, options)(data, scene, **options)
 
 
-_OF_MAPS = "neighbours", "preview", "lamp_reference", "orders"
+_OF_MAPS = "neighbours", "preview", "lamp_reference", "model"
 """Arguments of the map of a cube that a series does not take."""
 
 

@@ -33,14 +33,18 @@ class OrderPath(NamedTuple):
     breaks: np.ndarray
 
 
-def order_path(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stderr: np.ndarray) -> OrderPath:
+def order_path(
+    time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stderr: np.ndarray, systematic: np.ndarray
+) -> OrderPath:
     """Choose the minima of a series by continuity.
 
     What all times have in common, such as the error of an index, favours the same order at all of them, so
-    Δχ² of times within half an order count once.
+    Δχ² of times within half an order count once. Systematic errors change with the phase of the fringes, so
+    that of a step has their share that goes with a quarter of an order.
 
     **Arguments:** `time` (times,), three or more, increasing; `thickness` and `delta` (times, minima) with
-    NaN and infinity where there are fewer, at least one at each time; `stderr` (times,) by the noise.
+    NaN and infinity where there are fewer, at least one at each time; `stderr` (times,) by the noise, and the
+    `systematic` error (times,).
     """
     uneven = _unevenness(time, thickness, delta, stderr)
     rows = np.arange(len(time))
@@ -54,8 +58,8 @@ def order_path(time: np.ndarray, thickness: np.ndarray, delta: np.ndarray, stder
     steps = np.where(steps < _STEP * distance, np.maximum(steps - 2 * stderr[1:], 0.0), 0.0)
     looks = 1.0 + float(np.sum(steps)) / (0.5 * distance)
     weight = min(1.0, looks / len(time))
-    if weight < 1:
-        path = _best(time, thickness, delta, stderr, uneven, weight)
+    share = np.minimum(np.pad(steps, (1, 0), "edge") / (0.25 * distance), 1.0)
+    path = _best(time, thickness, delta, np.hypot(stderr, share * systematic), uneven, weight)
     return path._replace(rival=np.minimum(path.rival, _unlisted(path, weight * delta)))
 
 

@@ -51,7 +51,7 @@ def map_cube(
     neighbours: bool = False,
     lamp_curve: str | Sequence[int] | LampCurve | None = None,
     lamp_reference: Scene | None = None,
-    orders: int = ORDERS,
+    model: PixelModel | None = None,
     recipe: str = "",
     progress: Progress = quiet,
     **reading: Any,
@@ -81,7 +81,7 @@ def map_cube(
         "overwrite": overwrite,
         "preview": factor,
         "progress": progress,
-        "orders": orders,
+        "model": model,
     }
     made = run_map(cube, scene, out, **options)
     if neighbours:
@@ -99,7 +99,7 @@ def run_map(
     resume: bool = True,
     overwrite: bool = False,
     preview: int = 1,
-    orders: int = ORDERS,
+    model: PixelModel | None = None,
     recipe: str = "",
     progress: Progress = quiet,
     fit: Fitter | None = None,
@@ -114,7 +114,7 @@ def run_map(
       and with None as soon as one block has shown that the others take longer than processes to start.
     - `scheduler`: address of a running dask scheduler, "tcp://host:8786", whose workers share the files.
     - `preview`: the cube has every so many of the pixels in each direction.
-    - `orders`: number of minima of each pixel that are kept.
+    - `model` of the pixels, by default that of `pixels.prepare`.
     - `recipe`: the text of it, which is kept in the store.
     - `progress`: called with "pixels", the number that is done and their total.
     - `fit`: the function that fits a block, `pixels.fit_pixels` by default.
@@ -125,7 +125,8 @@ def run_map(
     if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
     began = time.monotonic()
-    model = prepare(cube, scene, orders)
+    model = prepare(cube, scene) if model is None else model
+    orders = model.search.orders
     about, who = attributes(cube, model, recipe, preview), identity(cube, scene, orders)
     tried = time.monotonic()
     if fit is None and (overwrite or not Path(path).exists()):

@@ -98,15 +98,18 @@ def smooth(
         else:
             states, best = like.derivatives, like.stiffness
         arrays = series.arrays(states)
-        mean, variance, answer, spread = map(np.asarray, _smoothed(series.chain(best, states), *arrays))
-    columns = mean[..., 0], variance, np.sum(mean[..., 1:] ** 2, axis=2)
-    of_shared = answer[:, 0], spread, np.sum(answer[:, 1:] ** 2, axis=1)
+        states_mean, spread, answer, certainty = map(
+            np.asarray, _smoothed(series.chain(best, states), *arrays)
+        )
+    varying = states_mean[..., 0], spread, np.sum(states_mean[..., 1:] ** 2, axis=2)
+    common = answer[:, 0], certainty, np.sum(answer[:, 1:] ** 2, axis=1)
     values, rates = np.empty((3, len(time), len(kinds))), np.full((3, len(time), len(kinds)), np.nan)
     at, first = np.flatnonzero(~shared)[slow], len(own) + (states - 1) * np.arange(len(slow))
-    for value, rate, of_time, of_all, power in zip(values, rates, columns, of_shared, (1, 2, 2), strict=True):
-        value[:, shared], value[:, ~shared] = of_all, of_time[:, : len(own)]
-        rate[:, at] = of_time[:, first] / unit**power
-    return Smoothed(*values[:2], *rates[:2], values[2], rates[2], states, best)
+    for i, power in enumerate((1, 2, 2)):
+        values[i][:, shared], values[i][:, ~shared] = common[i], varying[i][:, : len(own)]
+        rates[i][:, at] = varying[i][:, first] / unit**power
+    (mean, variance, systematic), (rate, rate_variance, of_rate) = values, rates
+    return Smoothed(mean, variance, rate, rate_variance, systematic, of_rate, states, best)
 
 
 def _best(series: _Times) -> tuple[int, np.ndarray]:
