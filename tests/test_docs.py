@@ -50,6 +50,7 @@ SLOW = (
     "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv",  # forward_model
     "pellicle simulate docs/examples/mica.toml --out flake.csv --seed 1",  # signals/test_mica.py
     "pellicle fit flake.csv --recipe docs/examples/mica.toml",
+    "pellicle simulate docs/examples/mica_flakes.toml",
     "pellicle simulate docs/examples/tilted_microscope.toml",  # forward_model/test_lens.py
     "pellicle fit oriented.csv --recipe docs/examples/tilted_microscope.toml",
     "pellicle fit soap_film.csv --recipe docs/examples/soap_film.toml",  # fitting/film/test_ties.py

@@ -2,13 +2,14 @@
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import pellicle as pl
-from pellicle.errors import DataError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.samples import joined
-from pellicle.recipes.read import FilmRecipe
+from pellicle.recipes.read import FilmRecipe, checked
 from pellicle.recipes.write import samples_text
 
 HEAD = """
@@ -90,6 +91,16 @@ def test_the_kept_recipe_is_the_same(tmp_path):
 )
 def test_errors_are_one_sentence(tmp_path, text, said, refuses):
     refuses(DataError, said, lambda: [one.scene() for one in recipe(tmp_path, text).each])
+
+
+def test_shared_names_of_the_instrument():
+    """Each sample has them, under one name; a wrong one is refused."""
+    loaded = tomllib.loads(HEAD + TWO) | {"instrument": {"bandwidth": {"lower": 1, "upper": 9}}}
+    read: Any = checked(loaded | {"shared": ["instrument.bandwidth"]}, "recipe.toml")
+    of_all = [one.scene().sample.shared for one in read.samples]
+    assert all("instrument.bandwidth" in shared for shared in of_all)
+    with pytest.raises(UsageError, match=r"did you mean 'instrument\.bandwidth'"):
+        checked(loaded | {"shared": ["instrument.bandwith"]}, "recipe.toml")
 
 
 def test_one_scene_of_several_samples_is_refused(tmp_path, refuses):

@@ -20,8 +20,9 @@ from pellicle.scene.instrument import Drift
 
 ROOT = Path(__file__).parents[2]
 PATTERNS = ("docs/**/*.toml", "fits/**/recipe.toml", "measurements/**/*.toml", "benchmarks/**/*.toml")
-SEVERAL = ROOT / "docs/examples/samples.toml"  # of several scenes; tests are in recipes/test_samples.py
-RECIPES = sorted({path for pattern in PATTERNS for path in ROOT.glob(pattern)} - {SEVERAL})
+# of several scenes; tests are in recipes/test_samples.py and signals/test_mica.py
+SEVERAL = {ROOT / "docs/examples" / name for name in ("samples.toml", "mica_flakes.toml")}
+RECIPES = sorted({path for pattern in PATTERNS for path in ROOT.glob(pattern)} - SEVERAL)
 
 
 def equal(one, other) -> bool:

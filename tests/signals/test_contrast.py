@@ -13,6 +13,8 @@ from pellicle.data.read_spectrum import read_spectrum
 from pellicle.data.write_spectrum import write_spectrum
 from pellicle.effects.film_plan import exact, plan
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film.extended_scene import extended
+from pellicle.fitting.film.problem import Measured, make
 from pellicle.recipes.python_text import python_text
 from pellicle.recipes.read import read_recipe
 from pellicle.recipes.write import recipe_text
@@ -167,3 +169,39 @@ def test_the_example_recipe():
     data = pl.simulate(read, NM, noise=0.004, seed=1)
     assert data.signal == "contrast"
     assert 0.2 < np.ptp(data.values) < 3
+
+
+def test_effects_on_one_wafer_move_sample_and_reference():
+    """Index of the oxide in both, an oxide on bare silicon in both, by tmm; `pl.Tied` follows the sample."""
+    film, nm = pl.Layer(2.0, pl.Free(1, 150), "film"), NM
+
+    def by_stacks(*below: tuple[float, float]) -> np.ndarray:
+        stacks = [(2.0, 54.0), *below], [*below]
+        return contrast("relative", *(reflectance(stack, 0.0, "s") for stack in stacks))
+
+    def changed(scene: pl.Scene, number, *sizes: float) -> np.ndarray:
+        seen = with_wavelength(eqx.tree_at(lambda s: s.light, scene, pl.Light(signal="contrast")), nm)
+        view = make(Measured(seen, nm, np.zeros(nm.size), np.ones(nm.size), seen.light.kind)).views[0]
+        extension = extended(view, np.array([54.0]))
+        changes = [(number(extension), size) for size in sizes]
+        rows = extension.signals(view.data, np.array([54.0]), changes)
+        return rows[:, : nm.size]
+
+    oxidised = pl.Scene(
+        [film, pl.Layer(OXIDE, 285.0)], SILICON, reference=pl.Reference(SILICON, pl.Layer(OXIDE, 285.0))
+    )
+    more, less = changed(oxidised, lambda x: x.index[1], 0.01, -0.01)
+    np.testing.assert_allclose(more, by_stacks((1.01 * OXIDE, 285.0)), atol=1e-9)
+    np.testing.assert_allclose(less, by_stacks((0.99 * OXIDE, 285.0)), atol=1e-9)
+    bare = pl.Scene(film, SILICON, reference=pl.Reference(SILICON))
+    [one] = changed(bare, lambda x: x.oxide, 1.0)
+    np.testing.assert_allclose(one, by_stacks((1.46, 1.0)), atol=1e-9)
+    tied = pl.Reference(SILICON, pl.Layer(OXIDE, pl.Tied("layer2.thickness / 2 + 100")))
+    light = pl.Light(signal="contrast")
+    given = pl.Scene(
+        [pl.Layer(2.0, 54.0), pl.Layer(OXIDE, pl.Free(200, 400))], SILICON, light=light, reference=tied
+    )
+    sample, known = (
+        reflectance(stack, 0.0, "s") for stack in ([(2.0, 54.0), (OXIDE, 300.0)], [(OXIDE, 250.0)])
+    )
+    np.testing.assert_allclose(pl.simulate(given, nm).values, contrast("relative", sample, known), atol=1e-9)

@@ -6,18 +6,15 @@ The contrasts are simulated by the package tmm, ray by ray: no measured flakes a
 from functools import cache
 from pathlib import Path
 
-import equinox as eqx
 import numpy as np
 import tmm
 
 import pellicle as pl
-from pellicle.recipes.read import read_recipe
-from pellicle.scene.priors import Normal
+from pellicle.recipes.read import FilmRecipe, read_recipe
 
-RECIPE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "mica.toml"
+RECIPE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "mica_flakes.toml"
 NM = np.linspace(450.0, 750.0, 61)
 NOISE, STRAY = 0.005, 0.025
-KNOWN, TESTED = (12.0, 31.0, 77.0), (6.0, 22.0, 54.0, 110.0)
 
 
 @cache
@@ -45,21 +42,18 @@ def measured(thickness: float, seed: int) -> pl.Spectrum:
     return pl.Spectrum(NM, (flake - bare) / (flake + bare) + noise, "contrast", sigma=np.full(len(NM), NOISE))
 
 
-def test_flakes_tested_with_the_stray_light_of_others():
-    scene = read_recipe(RECIPE).scene()
-
-    def fitted(thickness, seed, *priors):
-        numbers = pl.Free(0.5, 150, prior=priors[0]), pl.Free(0, 0.1, start=0.02, prior=priors[1])
-        own = eqx.tree_at(lambda s: (s.layers[0].thickness, s.instrument.stray_light), scene, numbers)
-        return pl.fit(measured(thickness, seed), own).parameters
-
-    known = [fitted(d, seed, Normal(d, 1.0), None) for seed, d in enumerate(KNOWN)]
-    strays = [x["instrument.stray_light"] for x in known]
-    weights = np.array([1 / x.stderr**2 for x in strays])
-    stray = Normal(
-        float(np.average([x.value for x in strays], weights=weights)), float(weights.sum() ** -0.5)
-    )
-    assert abs(stray.mean - STRAY) < 3 * stray.sd < 0.01
-    for seed, thickness in enumerate(TESTED, len(KNOWN)):
-        result = fitted(thickness, seed, None, stray)["mica.thickness"]
-        assert abs(result.value - thickness) < 4 * result.stderr_noise < result.stderr
+def test_flakes_calibrated_by_others_in_one_fit():
+    """Oxide, aperture and stray light are shared, and those of the reference."""
+    recipe = read_recipe(RECIPE)
+    assert isinstance(recipe, FilmRecipe)
+    scenes = {x.sample.name: x.scene() for x in recipe.samples if x.sample}
+    flakes = {"known31": 31.0, "known77": 77.0, "flake22": 22.0, "flake110": 110.0}
+    data = [measured(thickness, seed) for seed, thickness in enumerate(flakes.values())]
+    fit = pl.fit(data, [scenes[name] for name in flakes])
+    assert fit.status == "converged"
+    truth = {f"{name}.mica.thickness": x for name, x in flakes.items()}
+    truth |= {"oxide.thickness": 285.0, "instrument.stray_light": STRAY, "instrument.numerical_aperture": 0.8}
+    assert {p.name for p in fit.free} == truth.keys()
+    for name, x in truth.items():
+        assert abs(fit[name].value - x) < 4 * fit[name].stderr_noise < 4 * fit[name].stderr, name
+    assert fit["flake22.mica.thickness"].stderr_noise < 0.2

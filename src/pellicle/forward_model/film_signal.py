@@ -26,9 +26,9 @@ from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
-from pellicle.scene.film import Reference, Scene, media, of_reference, thickness_spread, turned
+from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned
 from pellicle.scene.free import free_leaves
-from pellicle.scene.layers import Layer
+from pellicle.scene.layers import Interface, Layer
 
 Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
@@ -168,8 +168,11 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
 
     if (reference := scene.reference) is not None:
         known = tabulated(of_reference(scene), slope)
-        layers = known.layers if reference.layers else ()
-        scene = replace(scene, reference=Reference(known.substrate, layers, reference.form))
+        # each medium of it, which leaves ties to the sample
+        pairs: Any = zip(reference.layers, known.layers, strict=False)
+        layers = [x if isinstance(x, Interface) else replace(x, material=y.material) for x, y in pairs]
+        substrate = replace(reference.substrate, material=known.substrate.material)
+        scene = replace(scene, reference=reference.of(substrate, layers))
     check_common_range(media(scene), wavelength)
     return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
 

@@ -229,7 +229,7 @@ class FilmRecipe:
                 reference=None if tables.reference is None else parts.reference(tables.reference, folder),
             )
             if self.sample is not None:
-                scene = of_sample(scene, self.sample)
+                scene = of_sample(scene, self.sample, tables.shared)
             check_free_count(len(free_leaves(scene)), least=int(fitted))
         return scene
 

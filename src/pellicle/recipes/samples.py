@@ -1,6 +1,6 @@
 """Samples of a recipe: the tables and the scene of each, with what is not as in `[scene]`."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -64,8 +64,9 @@ def _numbers(given: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
             yield prefix + key, value
 
 
-def of_sample(scene: Scene, sample: schema.SampleTable) -> Scene:
-    """The scene of a sample with its own numbers, and the names of those that it has of `[scene]`.
+def of_sample(scene: Scene, sample: schema.SampleTable, also: Sequence[str] = ()) -> Scene:
+    """The scene of a sample with its own numbers, and the names of those that it has of `[scene]`, and of
+    numbers of light and instrument that it `also` shares.
 
     Raises UsageError for an unknown name.
     """
@@ -91,7 +92,7 @@ def of_sample(scene: Scene, sample: schema.SampleTable) -> Scene:
     shared = [
         aliases[-1]
         for path, aliases in free
-        if not _own(changed, path, sample) and not numbers.keys() & {*aliases}
+        if aliases[-1] in also or not (_own(changed, path, sample) or numbers.keys() & {*aliases})
     ]
     return replace(changed, sample=Sample(sample.name, tuple(shared)))
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
 from pellicle.brdf.models import MODELS as BRDF_MODELS
 from pellicle.data.options import CameraOptions, FitOptions, ReadingOptions
+from pellicle.errors import did_you_mean
 from pellicle.recipes.medium_schema import FreeTable, Medium, Number
 from pellicle.scene.surface import SurfaceUncertainty
 from pellicle.scene.uncertainty import Uncertainty
@@ -244,12 +245,17 @@ class SampleTable(_OwnTable):
         return self
 
 
+_OF_LIGHT = ("angle", *(f"instrument.{name}" for name in InstrumentTable.model_fields))
+"""Names of numbers of light and instrument."""
+
+
 class RecipeTable(_Table):
-    """A whole recipe."""
+    """A whole recipe. `shared` names free numbers of light and instrument that its samples have in common."""
 
     data: DataTable = DataTable()
     scene: SceneTable
     sample: list[SampleTable] = []
+    shared: list[str] = []
     reference: ReferenceTable | None = None
 
     @model_validator(mode="after")
@@ -257,6 +263,13 @@ class RecipeTable(_Table):
         names = [one.name for one in self.sample]
         if twice := [name for name in names if names.count(name) > 1]:
             raise ValueError(f"two samples have the name {twice[0]!r}: give each its own")
+        for name in self.shared:
+            if name not in _OF_LIGHT or not names:
+                near = did_you_mean(name, _OF_LIGHT)
+                raise ValueError(
+                    f"shared names numbers of light and instrument that the samples of [[sample]] have in"
+                    f' common, as in shared = ["instrument.numerical_aperture"], not {name!r}{near}'
+                )
         if names and (self.data.files or self.data.file):
             raise ValueError("files of [data] and [[sample]] exclude each other: each sample names its files")
         return self

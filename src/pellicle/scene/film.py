@@ -5,6 +5,7 @@ marks an absent effect, which costs nothing.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, final
@@ -17,7 +18,7 @@ from jax.core import Tracer
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
-from pellicle.scene.free import Free, free_leaves
+from pellicle.scene.free import Free, is_free
 from pellicle.scene.graded import AtDepth, Graded, face
 from pellicle.scene.groups import listed
 from pellicle.scene.instrument import Instrument
@@ -46,6 +47,8 @@ class Reference(eqx.Module):
     **Arguments:** `substrate`: a `Substrate`, or its material; `layers` from the ambient down; `form` of a
     contrast against it: "relative", (R − R₀)/R₀, or "normalised", (R − R₀)/(R + R₀).
 
+    A number may be tied to one of the sample, as the oxide that both have: `Tied("oxide.thickness")`.
+
     **Raises:** UsageError for another form, and for free parameters.
 
     >>> Reference("Si", [Layer("SiO2", 285.0)]).form
@@ -59,8 +62,20 @@ class Reference(eqx.Module):
     def __check_init__(self):
         if self.form not in FORMS:
             raise UsageError(f"`form` must be one of {', '.join(FORMS)}, not {self.form!r}")
-        if free_leaves((self.substrate, self.layers)):
-            raise UsageError("a `reference` is known: give its thicknesses and indices as plain numbers")
+        numbers = jax.tree_util.tree_leaves((self.substrate, self.layers), is_leaf=is_free)
+        if any(is_free(x) and x.tie is None for x in numbers):
+            raise UsageError(
+                "a `reference` is known: give its thicknesses and indices as plain numbers, or tie them to"
+                ' those of the sample, as in thickness = "oxide.thickness"'
+            )
+
+    def of(self, substrate: Substrate, layers: Sequence[Layer | Interface | Plate]) -> "Reference":
+        """Return the reference of this form with another substrate and other layers, which are not checked:
+        they may have numbers that a simulation changes."""
+        other = object.__new__(Reference)
+        for name, own in (vars(self) | {"substrate": substrate, "layers": tuple(layers)}).items():
+            object.__setattr__(other, name, own)
+        return other
 
 
 POLARISATIONS = ("unpolarised", "s", "p")
@@ -269,6 +284,7 @@ def of_reference(scene: Scene) -> Scene:
             f"the signal {light.signal} needs a reference: give the scene `reference=pl.Reference(...)`, or a"
             " recipe [reference] with its substrate"
         )
+    reference = jax.tree_util.tree_map(_untied, reference, is_leaf=is_free)
     instrument = {"scale": 1.0, "offset": 0.0, "thickness_spread": None, "stray_light": None}
     return Scene(
         reference.layers or Layer(1.0, 0.0),
@@ -277,6 +293,15 @@ def of_reference(scene: Scene) -> Scene:
         Light(light.wavelength, light.angle, "R", light.polarisation, light.azimuth),
         replace(scene.instrument, **instrument),
     )
+
+
+def _untied(number: Any) -> Any:
+    """A tied number as a free one of its bounds, for a part of a scene that lacks what it is tied to."""
+    if not is_free(number) or number.tie is None:
+        return number
+    if not number.lower < number.upper:
+        return number.start
+    return Free(number.lower, number.upper, start=number.start)
 
 
 def media(scene: Scene) -> list[AbstractDispersion]:

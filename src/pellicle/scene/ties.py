@@ -76,6 +76,8 @@ class _Binding:
         self.units: dict[str, str] = {}
         self.own: dict[int, str] = {}
         for i, (path, x) in enumerate(zip(self.paths, self.leaves, strict=True)):
+            if path[0].name == "reference" and i in self.loose:
+                self._add(i, path)  # it follows the sample, whose numbers do not name it
             if path[0].name in ("reference", "uncertainty") or (
                 not hasattr(path[-1], "name") and len(path) < 3
             ):
@@ -86,6 +88,9 @@ class _Binding:
     def _add(self, i: int, path: tuple) -> None:
         location = location_of(self.scene, path)
         name = full_name(self.scene, path, location.name)
+        if path[0].name == "reference":
+            self.units[name], self.own[i] = unit_of(location), name
+            return
         aliases = [name]
         if path[0].name == "layers":
             aliases.append(f"{layer_name(self.scene, path[1].idx)}.{location.name}")
@@ -100,7 +105,8 @@ class _Binding:
         leaves = [self.resolved.get(i, x) for i, x in enumerate(self.leaves)]
         scene = jax.tree_util.tree_unflatten(self.structure, leaves)
         try:
-            check_parts((*scene.layers, scene.substrate, scene.ambient, scene.light, scene.instrument))
+            parts = scene.substrate, scene.ambient, scene.light, scene.instrument, scene.reference
+            check_parts((*scene.layers, *parts))
         except ValueError as error:
             ranges = [
                 f"{self.own[i]} = {self._text(i)!r} goes from {x.lower:g} to {x.upper:g}"
@@ -150,7 +156,7 @@ class _Binding:
             raise UsageError(
                 f"{name} is tied to {text!r}: numbers in an expression have no unit, leave out {word}"
             )
-        known = sorted({*self.own.values()} - {name})
+        known = sorted({self.own[i] for i in self.places.values()} - {name})
         raise UsageError(
             f"{name} must be a number or an expression of other numbers of the scene: {text!r} names"
             f" {word!r}, which it lacks{did_you_mean(word, self.places)}; it has {', '.join(known)}"

@@ -22,8 +22,8 @@ from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.expressions import value
-from pellicle.scene.film import Scene, thickness_spread
-from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered
+from pellicle.scene.film import Reference, Scene, thickness_spread
+from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
 
@@ -208,7 +208,9 @@ class ExtendedScene:
             substrate=replace(opened.substrate, material=below),
             ambient=_with_slope(opened.ambient, nm),
             instrument=instrument,
+            reference=self._reference(opened, layers, below),
         )
+        self._foot: list[Any] = []
         self._with_face: dict[int, tuple[Any, ...]] = {}
         self._stacks, self._programs = [tuple(layers)], dict[int, Program]()
         if judged.substrate:
@@ -221,6 +223,47 @@ class ExtendedScene:
             self._stacks.append((Layer(Constant(OVERLAYER_INDEX), thin), *self._stacks[_PLAIN]))
             self._with_face[self.overlayer.position] = self._stacks[-1]
 
+    def _reference(self, opened: Scene, layers: list[Any], below: Any) -> Reference | None:
+        """The reference. Media that the sample has too are those of one wafer, and layers of one thickness
+        one layer: they change together."""
+        if opened.reference is None:
+            return None
+        own, nm = opened.reference, np.asarray(opened.light.wavelength)
+        pairs = zip(opened.layers, layers, strict=True)
+        alike = {Content(x.material): (x, y) for x, y in pairs if isinstance(x, Layer)}
+
+        def known(x: Any) -> Any:
+            if isinstance(x, Interface):
+                return x
+            given, changed = alike.get(Content(x.material), (None, None))
+            if changed is None or given is None:
+                return replace(x, material=_with_slope(x.material, nm))
+            same = isinstance(x, Layer) and not is_free(x.thickness) and x.thickness == given.thickness
+            thickness = {"thickness": changed.thickness} if same else {}
+            return replace(x, material=changed.material, **thickness)
+
+        self._one_wafer = Content(own.substrate.material) == Content(opened.substrate.material)
+        substrate = replace(own.substrate, material=below) if self._one_wafer else known(own.substrate)
+        return own.of(substrate, [known(x) for x in own.layers])
+
+    def _on_reference(self, layers: Sequence[Any]) -> Reference | None:
+        """The reference of a stack: on a substrate that the sample has too lies the same oxide, unless the
+        reference ends with one, and below the same last layer the same mixed interface."""
+        reference, fitted = self._plain.reference, self._fitted.reference
+        if reference is None or fitted is None or not self._one_wafer:
+            return reference
+        added = [x for x in layers if any(x is own for own in self._foot)]
+        foot, own = (next(iter(x.layers[::-1]), None) for x in (fitted, self._fitted))
+        same = False
+        if isinstance(foot, Layer):
+            nm = np.asarray(self._fitted.light.wavelength)
+            oxidised = abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE
+            added = [x for x in added if not (oxidised and isinstance(x, Layer))]
+            same = isinstance(own, Layer) and Content(foot.material) == Content(own.material)
+        if not same and not any(isinstance(x, Layer) for x in added):
+            added = []
+        return reference.of(reference.substrate, [*reference.layers, *added])
+
     def _faces(self, layers: list[Any]) -> list[Any]:
         """The layers with a roughness, an oxide and a mixed interface of no size."""
         plain, top, foot = tuple(layers), layers[0], self._fitted.layers[-1]
@@ -232,14 +275,17 @@ class ExtendedScene:
         if isinstance(foot, Layer) and self._judged.oxidises:
             if not self._judged.like_oxide:
                 self.oxide, thin = self._number(0.0)
-                layers = [*layers, Layer(Constant(OXIDE_INDEX), thin)]
+                self._foot = [Layer(Constant(OXIDE_INDEX), thin)]
+                layers = [*layers, *self._foot]
                 self._with_face[self.oxide.position] = (*plain, layers[-1])
             # media with an index of their own mix: under a birefringent layer an oxide does
             isotropic = not isinstance(foot.material, Anisotropic)
             if isotropic or self.oxide is not None:
                 self.mixture, thin = self._number(0.0)
-                between = [Interface(thin)] if isotropic else [*layers[len(plain) :], Interface(thin)]
-                layers = [*layers, Interface(thin)]
+                face = Interface(thin)
+                between = [face] if isotropic else [*layers[len(plain) :], face]
+                layers = [*layers, face]
+                self._foot.append(face)
                 self._with_face[self.mixture.position] = (*plain, *between)
         return layers
 
@@ -312,7 +358,7 @@ class ExtendedScene:
         return {None: self._program_of(_PLAIN), **faces}
 
     def _program(self, layers: tuple[Any, ...]) -> Program:
-        scene = replace(self._plain, layers=layers)
+        scene = replace(self._plain, layers=layers, reference=self._on_reference(layers))
         # the order of a pytree is that of its fields
         order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(scene)]
         form = self._form.with_plan(exact(scene, _rows_of_fit(self._form.plan)).static_key)

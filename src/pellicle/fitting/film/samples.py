@@ -72,7 +72,12 @@ def shared_by_each(scenes: Mapping[str, Any], shared: Sequence[str] | None) -> d
     if shared is None:
         return dict.fromkeys(scenes)
     known = {
-        name: {x for s in ([own] if isinstance(own, Scene) else own) for x in _free_numbers(s)}
+        name: {
+            x
+            for s in (own if isinstance(own, list | tuple) else [own])
+            if isinstance(s, Scene)
+            for x in _free_numbers(s)
+        }
         for name, own in scenes.items()
     }
     every = set[str]().union(*known.values())
