@@ -113,6 +113,7 @@ ELSEWHERE = (
     # take minutes, for which a test has a few films or pixels: reference, colour, mapping, rendering, brdf
     *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
     *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
+    "python benchmarks/sample_coverage.py",  # fits 120 times; fitting/film/test_samples.py: errors by noise
     "python benchmarks/shared_index.py",  # fits for minutes; fitting/film/test_samples.py: two samples
     "python benchmarks/dispersion_models.py",  # fits for minutes; dispersion: the values of each model
     "python scripts/render_blade.py",  # rendering/test_mitsuba.py: its materials

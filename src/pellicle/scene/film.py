@@ -286,13 +286,23 @@ def of_reference(scene: Scene) -> Scene:
         )
     reference = jax.tree_util.tree_map(_untied, reference, is_leaf=is_free)
     instrument = {"scale": 1.0, "offset": 0.0, "thickness_spread": None, "stray_light": None}
-    return Scene(
-        reference.layers or Layer(1.0, 0.0),
-        reference.substrate,
-        scene.ambient,
-        Light(light.wavelength, light.angle, "R", light.polarisation, light.azimuth),
-        replace(scene.instrument, **instrument),
+    return unchecked(
+        scene,
+        layers=reference.layers or (Layer(1.0, 0.0),),
+        substrate=reference.substrate,
+        light=Light(light.wavelength, light.angle, "R", light.polarisation, light.azimuth),
+        instrument=replace(scene.instrument, **instrument),
+        reference=None,
     )
+
+
+def unchecked(scene: Scene, **parts: Any) -> Scene:
+    """Return a scene with other parts, without checks: its numbers may have bounds that nobody chose, as an
+    aperture of 0 to 1 beside an oblique angle."""
+    other = object.__new__(Scene)
+    for name, own in (vars(scene) | parts).items():
+        object.__setattr__(other, name, own)
+    return other
 
 
 def _untied(number: Any) -> Any:

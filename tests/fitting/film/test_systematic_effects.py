@@ -9,7 +9,7 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
-from pellicle.fitting.film.systematic_effects import systematic_effects
+from pellicle.fitting.film.systematic_effects import simulations_of, systematic_effects
 from pellicle.fitting.linear_system import HALF_NORMAL
 from pellicle.fitting.progress import quiet
 from pellicle.scene.layers import Interface
@@ -232,3 +232,21 @@ def test_a_wide_cone_takes_few_rays():
     truth = [pl.simulate(flake(60.0, **x), nm).values for x in ({"index": 1.58 * 1.02}, {"angle": 1.0})]
     # the error of the rays of both, 1e-6 of a fringe, divided by a reference of some percent
     np.testing.assert_allclose(signals, truth, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("angle", "cone"),
+    [(55.0, {"numerical_aperture": pl.Free(0.05, 0.4)}), (80.0, {"angle_spread": pl.Free(0.0, 6.0)})],
+)
+def test_a_free_cone_at_oblique_incidence(angle, cone):
+    """Its bounds are checked as given, and not those that the prepared scene has; it replaces an effect."""
+    instrument, light = pl.Instrument(**cone), pl.Light(signal="R", angle=angle)
+    scene = pl.Scene(pl.Layer(1.6, FREE), 3.9, instrument=instrument, light=light)
+    [view] = make(*measurements(spectrum(angle=angle), scene)).views
+    free = extended(view, np.array([THICKNESS, 3.0]))
+    effects = simulations_of(view, np.array([THICKNESS, 3.0]), scene)
+    assert free.angle is not None
+    assert effects is not None
+    assert "angle spread" not in [row.name for row in effects[1]]
+    with pytest.raises(ValueError, match="reaches beyond 90 degrees"):
+        pl.Scene(pl.Layer(1.6, FREE), 3.9, instrument=pl.Instrument(angle_spread=40.0), light=light)

@@ -22,7 +22,7 @@ from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.expressions import value
-from pellicle.scene.film import Reference, Scene, thickness_spread
+from pellicle.scene.film import Reference, Scene, thickness_spread, unchecked
 from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, remembered
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
@@ -202,7 +202,7 @@ class ExtendedScene:
         if judged.substrate:
             self.substrate_index, change = self._number(0.0, -0.5)
             below = _scaled(below, change)
-        self._plain = replace(
+        self._plain = unchecked(
             opened,
             layers=tuple(layers),
             substrate=replace(opened.substrate, material=below),
@@ -358,7 +358,7 @@ class ExtendedScene:
         return {None: self._program_of(_PLAIN), **faces}
 
     def _program(self, layers: tuple[Any, ...]) -> Program:
-        scene = replace(self._plain, layers=layers, reference=self._on_reference(layers))
+        scene = unchecked(self._plain, layers=layers, reference=self._on_reference(layers))
         # the order of a pytree is that of its fields
         order = [next(i for i, own in enumerate(self._free) if own is x) for _, x in free_leaves(scene)]
         form = self._form.with_plan(exact(scene, _rows_of_fit(self._form.plan)).static_key)

@@ -20,7 +20,7 @@ from pellicle.errors import UsageError
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.scene.expressions import replaced
-from pellicle.scene.film import Scene
+from pellicle.scene.film import Scene, unchecked
 from pellicle.scene.free import Free, free_leaves, insert, is_free, remembered, without_bounds
 from pellicle.scene.layers import Layer
 from pellicle.scene.names import WIDTHS, location_of, name_in_fit, unit_of
@@ -167,7 +167,7 @@ def anonymous(scene: Scene) -> Scene:
         for layer in scene.layers
     )
     substrate = replace(scene.substrate, index_uncertainty=None)
-    return replace(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty(), sample=None)
+    return unchecked(scene, layers=layers, substrate=substrate, uncertainty=Uncertainty(), sample=None)
 
 
 @remembered
