@@ -1,8 +1,9 @@
 """Series of simulated films: orders, errors and coverage of thickness and rate, with flaws of real runs.
 
-Run: `python benchmarks/series.py [--draws 10] [--only NAME] [--narrow]`. Spectra by the Airy formula in NumPy, of a
-film that grows to 3 µm on an absorbing substrate, at 500 times, with noise of 1 % of the values. Each draw has
-another film, noise and flaws. `single` are the fits of each spectrum alone. Coverage is that of 1.96 standard errors.
+Run: `python benchmarks/series.py [--draws 10] [--only NAME] [--narrow]`. Spectra by the Airy formula in
+NumPy, of a film that grows to 3 µm on an absorbing substrate, at 500 times, with noise of 1 % of the values.
+Each draw has another film, noise and flaws. `single` are the fits of each spectrum alone. Coverage is that of
+1.96 standard errors.
 """
 
 import argparse
@@ -84,7 +85,8 @@ def main():
     scale = float(given.scale) if str(given.scale)[0].isdigit() or given.scale == 1.0 else given.scale
     scene = pl.Scene(pl.Layer(1.46, pl.Free(0, 4000)), SUBSTRATE, instrument=pl.Instrument(scale=scale))
     print(
-        "flaw        single: wrong %, open %, rms | wrong %  open %  rms nm  z noise  95 %  | rate rms  z noise  95 %  | s"
+        "flaw        single: wrong %, open %, rms | wrong %  open %  rms nm  z noise  95 %  |"
+        " rate rms  z noise  95 %  | s"
     )
     for name in [given.only] if given.only else FLAWS:
         rows = []
