@@ -73,8 +73,8 @@ plt.show()
 # - **`spline`**: no physics except smoothness. n and k are free at each of six wavelengths, twelve
 #   parameters in total.
 #
-# `pl.compare` fits each of them to the same data and ranks them by BIC, which is the misfit plus a penalty
-# for each free parameter.
+# `pl.compare` fits each of them to the same data and ranks them by their evidence Z: the likelihood, averaged
+# over the bounds of the free parameters, so that a model pays for numbers that it does not need.
 
 # %%
 thickness = pl.Free(10, 1000)

@@ -114,9 +114,9 @@ assert fit.parts[0].effective_points < len(thin)
 #
 # ## Try another model
 #
-# Is it the index? `pl.compare` fits both models and compares them by BIC (Bayesian information criterion:
-# misfit plus a penalty for every free parameter; a difference below 2 is no evidence, one above 6 is
-# strong).
+# Is it the index? `pl.compare` fits both models and compares them by their evidence Z (the likelihood with the
+# usual errors of instruments and samples integrated out, averaged over the bounds of the free parameters; a
+# difference of ln Z below 1 is no evidence, one above 5 is strong).
 
 # %%
 free_index = pl.Free(1.3, 1.7)

@@ -14,7 +14,7 @@ def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_
     flags = ("--recipe", a, "--recipe", b, "--json", "--out", tmp_path / "out")
     [again] = pellicle("compare", film, *flags, code=0).objects
     assert (again["schema"], again["best"]) == ("pellicle.compare/1", "b.toml")
-    assert again["verdict"].startswith("b.toml is better than a.toml by ΔBIC")
+    assert again["verdict"].startswith("b.toml is better than a.toml by Δ ln Z")
     assert again["verdict"].endswith("the data strongly favour A.")
     first, second = again["recipes"]
     # the price of each free number
@@ -24,13 +24,15 @@ def test_data_that_call_for_one_more_parameter(pellicle, scene_recipe, spectrum_
         # of the points those count that effects leave, and at least e², the price in AIC
         assert -1e-9 < found["bic"] - found["aic"] <= free * (math.log(points) - 2) + 1e-9
     assert 0.5 * size < points <= size
-    assert second["delta_bic"] == 0
+    assert second["delta_bic"] == second["delta_log_evidence"] == 0
+    assert first["delta_log_evidence"] < -5
+    assert first["probability"] < 0.01
     assert first["delta_bic"] > 6  # an index of 4 % more is eight uncertainties of it
     assert (tmp_path / "out" / "a" / "result.json").exists()
     text = (tmp_path / "out" / "report.txt").read_text()
     assert text.startswith("[[Verdict]]\n    b.toml is better")
     row, _ = [line for line in text.splitlines() if line.strip().startswith("* ")]
-    assert row.split()[:4] == ["*", "b.toml", "0.0", "0.0"]
+    assert row.split()[:5] == ["*", "b.toml", "0.0", "0.0", "0.0"]
 
 
 @pytest.mark.slow  # compiles a film of Cauchy

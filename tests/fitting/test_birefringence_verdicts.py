@@ -14,7 +14,10 @@ from tests.made_fits import made_fit
 
 
 def candidate(
-    name: str, bic: float, delta: tuple[float, float] | None = None, angles: tuple[str, ...] | None = None
+    name: str,
+    evidence: float,
+    delta: tuple[float, float] | None = None,
+    angles: tuple[str, ...] | None = None,
 ) -> Candidate:
     """A candidate with a birefringence and its error, or isotropic; `angles` are those of a tilted axis."""
     nm, zero = np.array([400.0, 500.0]), np.zeros(2)
@@ -30,17 +33,19 @@ def candidate(
     curve = Curve(nm, zero, zero + 1, zero, zero, zero, zero, zero, principal=principal)
     part = Part("", pl.Spectrum(nm, zero + 0.2, "R"), curve, plan, 0.0, 1.0, 2.0)
     parameters = (Estimate(word, 1.0, 0.1, "", 0.0, 9.0, True) for word in ("thickness", *free))
-    return Candidate(name, made_fit(part, parameters=parameters), 1 + len(free), 0.0, 0.0, bic)
+    return Candidate(
+        name, made_fit(part, parameters=parameters), 1 + len(free), 0.0, 0.0, -2 * evidence, evidence
+    )
 
 
 @pytest.mark.parametrize(
     ("difference", "delta", "expected"),
     [
-        (100.0, (0.03, 0.007), "the data strongly favour birefringence, 0.03 ± 0.007 at 500 nm."),
-        (76.0, (0.002, 0.007), "usual errors of instruments and samples would imitate it."),
-        (-4.1, (0.0, 0.007), "birefringence is not needed."),
-        (-4.1, (0.0, 0.5), "birefringence is not needed, and these data would not show it."),
-        (-1.0, (0.0, 0.007), "prefer isotropic, which has fewer free parameters."),
+        (-50.0, (0.03, 0.007), "the data strongly favour birefringence, 0.03 ± 0.007 at 500 nm."),
+        (-38.0, (0.002, 0.007), "usual errors of instruments and samples would imitate it."),
+        (2.1, (0.0, 0.007), "birefringence is not needed."),
+        (2.1, (0.0, 0.5), "birefringence is not needed, and these data would not show it."),
+        (0.5, (0.0, 0.007), "prefer isotropic, which has fewer free parameters."),
     ],
 )
 def test_birefringence_is_called_what_it_is(difference, delta, expected):
@@ -51,7 +56,7 @@ def test_birefringence_is_called_what_it_is(difference, delta, expected):
 @pytest.mark.parametrize("angles", [(), ("axis_theta",), ("film.axis_theta", "film.axis_phi")])
 @pytest.mark.parametrize(
     ("difference", "expected"),
-    [(9.0, "the data strongly favour a tilted optic axis."), (-9.0, "a tilted optic axis is not needed.")],
+    [(-6.0, "the data strongly favour a tilted optic axis."), (6.0, "a tilted optic axis is not needed.")],
 )
 def test_tilt_is_called_what_it_is(difference, expected, angles):
     """Against an axis along the normal, whether its angles are free or given."""
@@ -63,8 +68,8 @@ def test_tilt_is_called_what_it_is(difference, expected, angles):
     ("error", "words"), [(0.4, "the data favour native.k"), (0.2, "the data strongly favour native.k")]
 )
 def test_evidence_is_strong_where_the_number_is_beyond_its_total_error(error, words):
-    """A BIC counts noise alone: that of an oxide of 3.2 ± 1.2 nm may be 50 lower."""
-    plain, more = candidate("plain", 50.0), candidate("more", 0.0)
+    """ln Z of a number within its total error may be higher where a model is wrong in another way."""
+    plain, more = candidate("plain", -25.0), candidate("more", 0.0)
     native = Estimate("native.k", 1.0, error, "", 0.0, 9.0, True, stderr_noise=0.01)
     fit = dataclasses.replace(more.fit, parameters=more.fit.parameters | {"native.k": native})
     assert words in Comparison((plain, dataclasses.replace(more, fit=fit, free=3)), 100.0).verdict

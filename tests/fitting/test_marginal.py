@@ -82,6 +82,40 @@ def test_shares_of_orders_are_those_of_the_posterior():
         assert share == pytest.approx(density[np.abs(grid - thickness) < 100].sum(), abs=0.05)
 
 
+def test_evidence_is_the_likelihood_averaged_over_the_bounds():
+    """One film of known noise, no effects: against the integral over the thickness, by Airy's formula."""
+    clean = pl.simulate(pl.Scene(pl.Layer(1.48, 3000.0), "SiO2"), wavelength=NM, noise=NOISE, seed=3)
+    data = pl.Spectrum(NM, clean.values, "R", sigma=np.full(NM.shape, NOISE))
+    scenes = {
+        name: pl.Scene(pl.Layer(1.48, bounds), "SiO2", uncertainty=pl.Uncertainty.none())
+        for name, bounds in (("wide", pl.Free(2950, 3050)), ("narrow", pl.Free(2990, 3010)))
+    }
+    fits = {name: pl.fit(data, scene) for name, scene in scenes.items()}
+    n, grid = np.asarray(pl.material("SiO2").index(NM)), np.arange(2990, 3010, 0.01)
+    apart = np.array([data.values - airy(1.48, n, NM, d) for d in grid]) / NOISE
+    log = -0.5 * np.sum(apart**2, axis=1) - len(NM) * np.log(NOISE * np.sqrt(2 * np.pi))
+    integral = np.log(np.sum(np.exp(log - log.max())) * 0.01) + log.max()
+    for fit, width in ((fits["wide"], 100.0), (fits["narrow"], 20.0)):
+        assert fit.log_evidence == pytest.approx(integral - np.log(width), abs=0.02)
+    compared = pl.compare(fits)
+    assert compared.best.name == "narrow"
+    assert compared.probabilities["narrow"] == pytest.approx(5 / 6, abs=0.01)
+
+
+def test_effects_are_changes_of_the_data_by_their_sizes(known):
+    """The scale multiplies the model; the index of the film is off by half a per cent."""
+    fit, _ = known
+    (effects,) = fit.effects
+    rows = {effect.name: effect for effect in effects}
+    model = fit.curve.model
+    np.testing.assert_allclose(rows["scale"].change[:, 0], rows["scale"].size * model, rtol=1e-6)
+    n, size = np.asarray(pl.material("SiO2").index(NM)), rows["index of the layer"].size
+    more, less = (airy(1.48 * (1 + x * size), n, NM, fit["thickness"].value) for x in (0.01, -0.01))
+    np.testing.assert_allclose(
+        rows["index of the layer"].change[:, 0], 50 * (more - less), atol=1e-3 * np.ptp(model)
+    )
+
+
 def airy(film: float, substrate: np.ndarray, nm: np.ndarray, thickness: float) -> np.ndarray:
     """Reflectance of one layer at normal incidence by the Airy formula."""
     first, second = (1 - film) / (1 + film), (film - substrate) / (film + substrate)

@@ -145,28 +145,36 @@ def sample(
 
 
 def compare(
-    data: Measurement,
-    scenes: Mapping[str, Scene | Surface | Sequence[Scene | Surface]],
+    data: Measurement | Mapping[str, Fit],
+    scenes: Mapping[str, Scene | Surface | Sequence[Scene | Surface]] | None = None,
     *,
     shared: Sequence[str] | None = None,
     tolerance: float = 0.0,
     residual: str | None = None,
     progress: Progress = quiet,
 ) -> Comparison:
-    """Fit several scenes to the same data and compare them by AIC and BIC.
+    """Fit several scenes to the same data, or take fits of the same data, and compare them by their evidence.
+
+    The evidence Z is the likelihood with the systematic effects integrated out, averaged over the bounds of
+    the free parameters; AIC and BIC are given too.
 
     **Arguments:**
 
-    - `data`: as in `pellicle.fit`.
+    - `data`: as in `pellicle.fit`; or fits already made, by name, and no scenes.
     - `scenes`: two or more descriptions by name, each as `pellicle.fit` takes it.
     - `shared`: names of free numbers that the samples have in common, as in `pellicle.fit`. A description
       that lacks some of them shares the others.
     - `tolerance`, `residual`, `progress`: as in `pellicle.fit`.
 
-    **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, and a verdict.
+    **Returns:** `Comparison`: each candidate with its fit and criteria, the `best`, `probabilities`, and a
+    verdict.
 
-    **Raises:** UsageError for fewer than two scenes, and as `pellicle.fit` does.
+    **Raises:** UsageError for fewer than two scenes, for fits of different data, and as `pellicle.fit` does.
     """
+    if isinstance(data, Mapping):
+        if scenes is not None or not all(isinstance(own, Fit) for own in data.values()):
+            raise UsageError("give data and scenes, or fits by name alone: compare({'oxide': fit, ...})")
+        return compare_fits(data)
     if not isinstance(scenes, Mapping):
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}

@@ -1,7 +1,8 @@
-"""Comparison of fits of the same data by information criteria.
+"""Comparison of fits of the same data by their evidence, and by information criteria.
 
-With L the likelihood, in which scale, offset and systematic effects are integrated out (`fitting.marginal`),
-k the free numbers and n the points that count,
+The evidence Z is the likelihood L averaged over the priors of all free numbers, by Laplace's approximation;
+in L, scale, offset and systematic effects are integrated out, and all fits have one noise
+(`fitting.marginal`). With k the free numbers and n the points that count,
 AIC = −2 ln L + 2 k (H. Akaike 1974, IEEE Trans. Automat. Contr. 19, 716) and
 BIC = −2 ln L + k ln n (G. Schwarz 1978, Ann. Stat. 6, 461).
 
@@ -32,14 +33,13 @@ from pellicle.scene.film import Scene
 
 log = getLogger(__name__)
 
-UNDECIDED, STRONG = 2.0, 6.0
-"""ΔBIC below which two descriptions cannot be distinguished, and from which the evidence is strong (R. Kass
-and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
+UNDECIDED, STRONG = 1.0, 5.0
+"""Δ ln Z below which two descriptions cannot be distinguished, and from which the evidence is very strong (R.
+Kass and A. Raftery 1995, J. Am. Stat. Assoc. 90, 773)."""
 
 
 _CLEAR = 3.5
-"""Total errors by which one of the further numbers differs from 0 where the evidence for them is strong: a
-BIC counts noise alone, which the usual errors of instruments exceed."""
+"""Total errors by which one of the further numbers differs from 0 where the evidence for them is strong."""
 _COMPATIBLE = 1.96
 """Standard errors within which a number is compatible with 0, at 95 %."""
 
@@ -58,7 +58,8 @@ _UNSEEN_BIREFRINGENCE = 0.1
 
 @dataclass(frozen=True)
 class Candidate:
-    """One description and its fit; `free` counts what was fitted, `deviance` is −2 ln L."""
+    """One description and its fit; `free` counts what was fitted, `deviance` is −2 ln L, and `log_evidence`
+    is ln Z with the noise that all candidates have here."""
 
     name: str
     fit: Fit
@@ -66,6 +67,7 @@ class Candidate:
     deviance: float
     aic: float
     bic: float
+    log_evidence: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -77,14 +79,21 @@ class Comparison(ReportMixin):
 
     @property
     def best(self) -> Candidate:
-        """The one of least BIC."""
-        return min(self.candidates, key=lambda c: c.bic)
+        """The one of most evidence."""
+        return max(self.candidates, key=lambda c: c.log_evidence)
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Posterior probability of each candidate by name, where all are as probable beforehand."""
+        best = self.best.log_evidence
+        odds = {c.name: math.exp(c.log_evidence - best) for c in self.candidates}
+        return {name: own / sum(odds.values()) for name, own in odds.items()}
 
     @property
     def verdict(self) -> str:
         """Verdict on the two best candidates, and the parameters or effects in which they differ."""
-        best, second, *_ = sorted(self.candidates, key=lambda c: c.bic)
-        apart = second.bic - best.bic
+        best, second, *_ = sorted(self.candidates, key=lambda c: -c.log_evidence)
+        apart = best.log_evidence - second.log_evidence
         more, less = _extra(best.fit, second.fit), _extra(second.fit, best.fit)
         birefringent = [_matrices(one.fit) > 0 for one in (best, second)]
         if birefringent[0] != birefringent[1]:
@@ -97,12 +106,12 @@ class Comparison(ReportMixin):
             ]
         verb = "strongly favour" if apart >= STRONG and _beyond_errors(best.fit, second.fit) else "favour"
         if apart < UNDECIDED:
-            sentence = f"The data do not distinguish {best.name} from {second.name} (ΔBIC {apart:.1f})"
+            sentence = f"The data do not distinguish {best.name} from {second.name} (Δ ln Z {apart:.1f})"
             if best.free != second.free:
                 simpler = min((best, second), key=lambda c: c.free)
                 sentence += f": prefer {simpler.name}, which has fewer free parameters"
         else:
-            sentence = f"{best.name} is better than {second.name} by ΔBIC {apart:.3g}: "
+            sentence = f"{best.name} is better than {second.name} by Δ ln Z {apart:.3g}: "
             if less and not more:
                 sentence += f"{' and '.join(less)} {'is' if len(less) == 1 else 'are'} not needed"
             else:
@@ -121,7 +130,8 @@ class Comparison(ReportMixin):
         return f"{sentence}."
 
     def __str__(self) -> str:
-        rows = [f"  {c.name}: BIC {c.bic - self.best.bic:+.1f}, {c.fit.status}" for c in self.candidates]
+        best = self.best.log_evidence
+        rows = [f"  {c.name}: ln Z {c.log_evidence - best:+.1f}, {c.fit.status}" for c in self.candidates]
         return "\n".join([self.verdict, *rows])
 
     __repr__ = __str__
@@ -137,16 +147,19 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
         nearest = max(explained.values(), key=lambda one: one.information)
         points, weights = nearest.points, nearest.weights
         wider = float(student(nearest.best.ranked.freedom, STRONG)) ** 2
-        deviances = {name: one.deviance(weights, fits[name].parts) / wider for name, one in explained.items()}
+        both = {name: one.likelihood(weights, fits[name].parts) for name, one in explained.items()}
+    # where few residuals set the noise, differences in χ² count less
+    deviances = {name: deviance / wider for name, (deviance, _) in both.items()}
     candidates = []
     for name, fit in fits.items():
         free, deviance = len(fit.free), deviances[name]
         bic = deviance + sum(math.log(max(points * _share(p), _FEWEST)) for p in fit.free)
+        evidence = both[name][1] + 0.5 * (both[name][0] - deviance)
         log.info(
-            "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: BIC %.6g",
-            *(name, free, deviance, points, bic),
+            "comparison: %s has %d free parameters and -2 ln L %.6g on %.4g points: ln Z %.6g, BIC %.6g",
+            *(name, free, deviance, points, evidence, bic),
         )
-        candidates.append(Candidate(name, fit, free, deviance, deviance + 2 * free, bic))
+        candidates.append(Candidate(name, fit, free, deviance, deviance + 2 * free, bic, evidence))
     return Comparison(tuple(candidates), points)
 
 
@@ -201,8 +214,8 @@ class _Explained(NamedTuple):
         pairs = zip(ranked.problem.views, ranked.fits, strict=True)
         return sum(view.independent / max(fit.variance, 1.0) for view, fit in pairs)
 
-    def deviance(self, weights: Sequence[np.ndarray], parts: Sequence[Part]) -> float:
-        """−2 ln of the marginal likelihood up to a constant, with these weights of the points.
+    def likelihood(self, weights: Sequence[np.ndarray], parts: Sequence[Part]) -> tuple[float, float]:
+        """−2 ln of the marginal likelihood and ln of the evidence, up to a constant, with these weights.
 
         A depolarisation that the scene has not is a residual as a whole.
         """
@@ -213,7 +226,8 @@ class _Explained(NamedTuple):
                 missed += float(np.sum((own[:, known:] * share.measured(part.spectrum)[:, None]) ** 2))
         known = [own[:, : view.residual.shape[-1]] for view, own in zip(self.evidence, weights, strict=True)]
         about = self.evidence, best.jacobian, best.ranked.minima.units[0], known, best.discrepancy.total
-        return missed + float(marginal(*about).deviance)
+        found = marginal(*about)
+        return missed + float(found.deviance), float(found.log_evidence) - 0.5 * missed
 
 
 def _explained(every: Sequence[Ranking]) -> list[_Explained]:

@@ -7,15 +7,17 @@ that which the discrepancy of the best leaves.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from pellicle.fitting.covariance import Errors, Scaled
 from pellicle.fitting.discrepancy import Discrepancy, discrepancy
-from pellicle.fitting.linear_system import Evidence, System
+from pellicle.fitting.linear_system import Effect, Evidence, System
 from pellicle.fitting.noise import student
 from pellicle.fitting.normal_equations import held_within, times
 from pellicle.fitting.reweighting import RankedMinima, at_minimum, led_by, linearised
@@ -28,6 +30,8 @@ _UNIFORM = 12.0
 """Inverse variance of a parameter of which the data see nothing, in units of its range."""
 _LINEAR = 4.0
 """Factor by which effects may explain more at a rival than at the best minimum."""
+_HALF_LOG_2PI = 0.5 * math.log(2 * math.pi)
+_erf = np.frompyfunc(math.erf, 1, 1)
 CLEAR = 20.0
 """Δχ² by which another minimum than the best by noise must be better to take its place."""
 _MUCH = 4.0
@@ -36,11 +40,16 @@ _MUCH = 4.0
 
 class Marginal(NamedTuple):
     """−2 ln of the marginal likelihood of minima (...), each at its best parameters, and ln of their shares
-    of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there."""
+    of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there.
+
+    `log_evidence` (...) is ln of the evidence: the likelihood integrated over effects, nuisances and, with a
+    uniform prior between their bounds, the parameters.
+    """
 
     deviance: Any
     log_share: Any
     stderr: np.ndarray
+    log_evidence: Any
 
 
 def marginal(
@@ -56,7 +65,8 @@ def marginal(
     leave at the best minimum, whose noise counts; `total` are its errors.
 
     **Source:** C. Bishop, 2006, Pattern Recognition and Machine Learning, section 3.5; shares by the normal
-    approximation of D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5.
+    approximation of D. MacKay, 2003, Information Theory, Inference and Learning Algorithms, eq. 27.5, as is
+    the evidence (eq. 28.6), of which a parameter near a bound has the part within.
     """
     pairs = zip(evidence, weights, strict=True)
     raised = [view._replace(sigma=view.unit / own, least=1.0) for view, own in pairs]
@@ -80,9 +90,17 @@ def marginal(
     covariance = np.linalg.inv(information + _UNIFORM * np.eye(count))
     slope = stretch[:, :count, :count]
     area = np.linalg.slogdet(slope)[1]  # none in the middle of a disc of directions
-    log_share = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1] + np.where(area > -np.inf, area, 0.0)
+    by_range = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1]
+    log_share = by_range + np.where(area > -np.inf, area, 0.0)
     stderr = np.sqrt(np.maximum(np.einsum("pij,pjk,pik->pi", slope, covariance, slope), 0.0))
-    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr)))
+    wide, at = np.sqrt(2 * np.einsum("pii->pi", covariance)), np.reshape(unit, (fits, count))
+    inside = 0.5 * (_erf((1 - at) / wide) + _erf(at / wide)).astype(float)
+    gaussian = np.abs(np.einsum("pii->pi", system.priors)[:, :count])  # 1/σ of a prior that is not uniform
+    density = np.where(gaussian > 0, np.log(np.maximum(gaussian, 1e-300)), _HALF_LOG_2PI)
+    logs = [np.log(np.maximum(own, 1e-300)).reshape(fits, -1) - _HALF_LOG_2PI for own in weights]
+    log_evidence = by_range + sum(np.sum(own, axis=1) for own in logs)
+    log_evidence += np.sum(density + np.log(np.maximum(inside, 1e-300)), axis=1)
+    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr, log_evidence)))
 
 
 class Ranking(NamedTuple):
@@ -91,6 +109,7 @@ class Ranking(NamedTuple):
     `delta_chi2` (minima,) is twice the fall of the marginal likelihood's logarithm, `share` (minima,) that of
     the posterior, and `stderr` (minima, parameters) are the standard errors at each. Of a minimum that
     effects of ordinary size cannot turn the first is that of the noise, the others are 0 and NaN.
+    `log_evidence` is that of the best.
     """
 
     data: Any
@@ -100,6 +119,13 @@ class Ranking(NamedTuple):
     delta_chi2: np.ndarray
     share: np.ndarray
     stderr: np.ndarray
+    log_evidence: float
+
+    def effects(self) -> tuple[tuple[Effect, ...], ...]:
+        """Systematic effects of each view at the best minimum, with their changes in the unit of the data."""
+        with jax.enable_x64(True):
+            views = self.evidence()
+        return tuple(tuple(replace(e, change=e.change / view.unit) for e in view.effects) for view in views)
 
     def evidence(self) -> list[Evidence]:
         """Residuals of each view at the best minimum and what may explain them."""
@@ -143,7 +169,8 @@ def _ranking(make: Callable[[RankedMinima], Any], ranked: RankedMinima) -> Ranki
         delta[i] = (there.deviance - best.deviance) / np.asarray(student(ranked.freedom, RIVAL)) ** 2
         log_share[i], stderr[i] = there.log_share, there.stderr
     share = np.exp(log_share - log_share.max())
-    return Ranking(data, ranked, jacobian, allowed, delta, share / share.sum(), stderr)
+    shares = share / share.sum()
+    return Ranking(data, ranked, jacobian, allowed, delta, shares, stderr, float(best.log_evidence))
 
 
 def left_weights(evidence: Sequence[Evidence], allowed: Discrepancy) -> list[np.ndarray]:

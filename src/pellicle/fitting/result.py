@@ -32,6 +32,8 @@ from pellicle.scene.surface import Surface
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from pellicle.fitting.linear_system import Effect
+
 _PRESENT = "pellicle.reporting.present"
 
 
@@ -63,11 +65,7 @@ class PlotMixin(ReportMixin):
 
 LEVEL = 0.95
 """Level of confidence of expanded uncertainties."""
-_FITTED = {
-    Spectrum: "a spectrum was fitted",
-    Colours: "colours were fitted",
-    BrdfSamples: "BRDF samples were fitted",
-}
+_FITTED = {Spectrum: "a spectrum was", Colours: "colours were", BrdfSamples: "BRDF samples were"}
 
 
 class Status(StrEnum):
@@ -214,21 +212,21 @@ class Part:
     def spectrum(self) -> Spectrum:
         """The spectrum. Raises TypeError for colours and BRDF samples."""
         if not isinstance(self.data, Spectrum):
-            raise TypeError(f"{_FITTED[type(self.data)]}, not a spectrum: see data")
+            raise TypeError(f"{_FITTED[type(self.data)]} fitted, not a spectrum: see data")
         return self.data
 
     @property
     def samples(self) -> BrdfSamples:
         """The BRDF samples. Raises TypeError for other data."""
         if not isinstance(self.data, BrdfSamples):
-            raise TypeError(f"{_FITTED[type(self.data)]}, not BRDF samples: see data")
+            raise TypeError(f"{_FITTED[type(self.data)]} fitted, not BRDF samples: see data")
         return self.data
 
     @property
     def spectral(self) -> Curve:
         """Data and model of the spectrum. Raises TypeError for colours and BRDF samples."""
         if not isinstance(self.curve, Curve):
-            raise TypeError(f"{_FITTED[type(self.data)]}, not a spectrum: see curve")
+            raise TypeError(f"{_FITTED[type(self.data)]} fitted, not a spectrum: see curve")
         return self.curve
 
 
@@ -292,6 +290,17 @@ class Fit(PlotMixin):
         return in_short(self.status, self.verdict, self.free)
 
     __repr__ = __str__
+
+    @property
+    def log_evidence(self) -> float:
+        """ln of the evidence: the likelihood, effects integrated out, averaged over the priors of the free
+        parameters. `pellicle.compare` gives fits one noise first."""
+        return self.ranking.log_evidence
+
+    @property
+    def effects(self) -> tuple[tuple[Effect, ...], ...]:
+        """Systematic effects of each part, with the `change` (points, channels) of the data by each."""
+        return self.ranking.effects()
 
     @property
     def free(self) -> tuple[Estimate, ...]:

@@ -29,12 +29,12 @@ def report(comparison: Comparison) -> str:
     points = sum(part.curve.model.size for part in parts)
     names = ", ".join(part.data.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for part in parts)
     data = f"{names}: {points} points, worth {comparison.effective_points:.3g} independent ones"
-    rows = [("", "recipe", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status")]
+    rows = [("", "recipe", "Δ ln Z", "ΔBIC", "ΔAIC", "free", "chi-square", "rms", "status")]
     rows += [
         ("*" if c is best else "", c.name, *_criteria(c, best, 3), c.fit.status)
         for c in comparison.candidates
     ]
-    note = f"{INDENT}* the recipe of least BIC; ΔBIC and ΔAIC are relative to it"
+    note = f"{INDENT}* the recipe of most evidence Z; differences are relative to it"
     fits = []
     for c in comparison.candidates:
         values, more = _leading(c, _SHOWN)
@@ -45,10 +45,11 @@ def report(comparison: Comparison) -> str:
 
 
 def _criteria(c: Candidate, best: Candidate, digits: int) -> tuple[str, ...]:
-    """Texts of ΔBIC, ΔAIC, number of free parameters, reduced χ² and rms."""
+    """Texts of Δ ln Z, ΔBIC, ΔAIC, number of free parameters, reduced χ² and rms."""
     rms = "" if c.fit.rms is None else f"{c.fit.rms:.{digits}g}"
     chi2 = f"{c.fit.chi2_reduced:.{digits}g}"
-    return f"{c.bic - best.bic:.1f}", f"{c.aic - best.aic:.1f}", str(c.free), chi2, rms
+    less = (c.log_evidence - best.log_evidence, c.bic - best.bic, c.aic - best.aic)
+    return *(f"{x + 0.0:.1f}" for x in less), str(c.free), chi2, rms
 
 
 def _leading(c: Candidate, most: int) -> tuple[str, int]:
@@ -64,6 +65,9 @@ def to_json(comparison: Comparison) -> dict[str, Any]:
     for c in comparison.candidates:
         record = fit_to_json(c.fit)
         criteria = {"delta_aic": c.aic - best.aic, "delta_bic": c.bic - best.bic}
+        criteria |= taken(c, "log_evidence")
+        criteria["delta_log_evidence"] = c.log_evidence - best.log_evidence
+        criteria["probability"] = comparison.probabilities[c.name]
         recipes.append({"recipe": c.name, **taken(c, "free", "aic", "bic"), **criteria})
         recipes[-1] |= {key: record[key] for key in keys}
     return {
@@ -112,7 +116,9 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
     parts = range(min(len(best.fit.parts), MOST_FIGURES))
     drawn = [figures.of_candidates(best.fit, curves, i) for i in parts]
     rows = []
-    for c, link in sorted(zip(comparison.candidates, pages, strict=True), key=lambda pair: pair[0].bic):
+    for c, link in sorted(
+        zip(comparison.candidates, pages, strict=True), key=lambda pair: -pair[0].log_evidence
+    ):
         values, more = _leading(c, _MOST_PARAMETERS)
         row = {
             "name": c.name,
