@@ -94,7 +94,7 @@ def marginal(
     log_share = by_range + np.where(area > -np.inf, area, 0.0)
     stderr = np.sqrt(np.maximum(np.einsum("pij,pjk,pik->pi", slope, covariance, slope), 0.0))
     wide, at = np.sqrt(2 * np.einsum("pii->pi", covariance)), np.reshape(unit, (fits, count))
-    inside = 0.5 * (_erf((1 - at) / wide) + _erf(at / wide)).astype(float)
+    inside = 0.5 * np.asarray(_erf((1 - at) / wide) + _erf(at / wide), float)
     gaussian = np.abs(np.einsum("pii->pi", system.priors)[:, :count])  # 1/σ of a prior that is not uniform
     density = np.where(gaussian > 0, np.log(np.maximum(gaussian, 1e-300)), _HALF_LOG_2PI)
     logs = [np.log(np.maximum(own, 1e-300)).reshape(fits, -1) - _HALF_LOG_2PI for own in weights]

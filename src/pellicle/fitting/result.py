@@ -293,8 +293,7 @@ class Fit(PlotMixin):
 
     @property
     def log_evidence(self) -> float:
-        """ln of the evidence: the likelihood, effects integrated out, averaged over the priors of the free
-        parameters. `pellicle.compare` gives fits one noise first."""
+        """ln of the likelihood, effects integrated out, averaged over the priors of the parameters."""
         return self.ranking.log_evidence
 
     @property
