@@ -114,9 +114,9 @@ assert fit.parts[0].effective_points < len(thin)
 #
 # ## Try another model
 #
-# Is it the index? `pl.compare` fits both models and compares them by their evidence Z (the likelihood with the
-# usual errors of instruments and samples integrated out, averaged over the bounds of the free parameters; a
-# difference of ln Z below 1 is no evidence, one above 5 is strong).
+# Is it the index? `pl.compare` fits both models and compares them by their evidence Z (the likelihood with
+# the usual errors of instruments and samples integrated out, averaged over the bounds of the free parameters;
+# a difference of ln Z below 1 is no evidence, one above 5 is strong).
 
 # %%
 free_index = pl.Free(1.3, 1.7)
@@ -134,7 +134,7 @@ for estimate in either:
     print(f"  ± {estimate.stderr:.2f} nm, of which ± {estimate.stderr_noise:.2f} nm by noise alone")
 
 # %% [markdown]
-# BIC clearly prefers the free index, and with it a thinner brush. But an index above 1.6 is implausible for
+# The evidence prefers the free index, and with it a thinner brush. But an index above 1.6 is implausible for
 # this polymer. The two results agree within their errors, which allow for an angle or an oxide that is not
 # quite as stated; the errors by noise alone do not. A criterion selects among the models that we offer, and
 # the correct one may not be among them.
