@@ -32,8 +32,6 @@ from pellicle.scene.surface import Surface
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pellicle.fitting.linear_system import Effect
-
 _PRESENT = "pellicle.reporting.present"
 
 
@@ -297,8 +295,8 @@ class Fit(PlotMixin):
         return self.ranking.log_evidence
 
     @property
-    def effects(self) -> tuple[tuple[Effect, ...], ...]:
-        """Systematic effects of each part, with the `change` (points, channels) of the data by each."""
+    def effects(self) -> tuple[tuple[Any, ...], ...]:
+        """Systematic effects (`fitting.linear_system.Effect`) of each part: `change` is that of the data."""
         return self.ranking.effects()
 
     @property
