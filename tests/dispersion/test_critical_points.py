@@ -31,6 +31,9 @@ MODELS = {
     "psemi": d.Psemi(5.0, 3.4, 0.2, 1.5, 0.8, 0.4, 0.6, 0.3, 0.2, 0.5, -0.4),
     "new-amorphous": d.NewAmorphous(1.6, 1.9, (0.1, 0.05), (4.2, 6.5), (1.1, 0.8)),
     "forouhi-bloomer": d.ForouhiBloomer(1.6, 1.9, (0.1, 0.05), (8.4, 13.0), (18.85, 42.89)),
+    "harmonic-oscillators": d.HarmonicOscillators(
+        *((120.0, 2.0), (10.5, 3.3), (2.0, 0.9), (0.3333, 0.2), (-10.0, 40.0))
+    ),
     # sapphire-like: two phonons
     "gervais": d.Gervais(3.08, (0.0545, 0.0706), (0.0004, 0.0007), (0.0596, 0.1112), (0.00045, 0.0012)),
 }
@@ -204,6 +207,16 @@ def test_forouhi_and_bloomer_in_both_sets_of_parameters():
         np.testing.assert_allclose(value.im, np.where(m.Eg < E, k, 0), rtol=1e-12)
 
 
+def test_the_local_field_is_that_of_lorentz_and_lorenz():
+    """(ε − 1)/(ε + 2) of a gas of electrons, by ħ²e²/(ε₀m) of CODATA 2018 in SI units."""
+    model = d.HarmonicOscillators((200.0,), (9.5,), (0.4,), (1 / 3,), (0.0,))
+    value = known_index(model, HC / ENERGY)
+    epsilon = (value.re + 1j * value.im) ** 2
+    strength = 200e27 * (1.054571817e-34**2 / (8.8541878128e-12 * 9.1093837015e-31))
+    polarised = strength / (9.5**2 - ENERGY**2 - 0.4j * ENERGY)
+    np.testing.assert_allclose((epsilon - 1) / (epsilon + 2), polarised / 3, rtol=1e-9)
+
+
 def test_one_phonon_with_equal_dampings_is_a_lorentz_oscillator():
     wavelength = np.array([5e3, 9e3, 12e3, 30e3])
     one = d.Gervais(2.4, (0.1,), (0.004,), (0.13,), (0.004,))
@@ -280,6 +293,7 @@ def test_finite_at_hard_values():
         (lambda: d.Psemi(1.0, 3.0, 0.1, 1.0, 1.0, PL=1.0), "PL must be below 1"),
         (lambda: d.Gervais(1.0, (0.1,), (0.01,), (0.1, 0.2), (0.01,)), "one number for each phonon"),
         (lambda: d.NewAmorphous(1.0, 2.0, (), (), ()), "one number for each resonance"),
+        (lambda: d.HarmonicOscillators((), (), (), (), ()), "one number for each, at least one"),
     ],
 )
 def test_impossible_parameters(make, said, refuses):

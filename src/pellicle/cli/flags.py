@@ -126,8 +126,8 @@ class SceneFlags(Flags):
             "Layer: a material (SiO2), an index (1.46, 2.9+0.1j), a file of n and k, or a dispersion "
             "model: constant, cauchy, cauchy-urbach, sellmeier, lorentz, gaussian, brendel-bormann, drude, "
             "drude-smith, tauc-lorentz, cody-lorentz, new-amorphous, forouhi-bloomer, critical-point, cppb, "
-            "adachi-m0, adachi-m1, psemi, tanguy, gervais, uv-pole, ir-pole, spline or spline-kk, with free "
-            "parameters; cauchy(1.46,3000) fixes them. "
+            "adachi-m0, adachi-m1, psemi, tanguy, gervais, harmonic-oscillators, uv-pole, ir-pole, spline or "
+            "spline-kk, with free parameters; cauchy(1.46,3000) fixes them. "
             "Recipes can also mix and add models.",
         ),
     ] = None

@@ -26,6 +26,7 @@ from pellicle.dispersion.empirical import Table as Table
 from pellicle.dispersion.empirical import WithExtinction as WithExtinction
 from pellicle.dispersion.forouhi_bloomer import ForouhiBloomer as ForouhiBloomer
 from pellicle.dispersion.forouhi_bloomer import NewAmorphous as NewAmorphous
+from pellicle.dispersion.local_field import HarmonicOscillators as HarmonicOscillators
 from pellicle.dispersion.oscillators import AbstractOscillator as AbstractOscillator
 from pellicle.dispersion.oscillators import CodyLorentz as CodyLorentz
 from pellicle.dispersion.oscillators import Drude as Drude

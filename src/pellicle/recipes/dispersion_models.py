@@ -9,6 +9,7 @@ from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
 from pellicle.dispersion.empirical import Cauchy, CauchyUrbach, Constant, Sellmeier
 from pellicle.dispersion.forouhi_bloomer import ForouhiBloomer, NewAmorphous
+from pellicle.dispersion.local_field import HarmonicOscillators
 from pellicle.dispersion.phonons import Gervais
 from pellicle.dispersion.psemi import Psemi
 from pellicle.dispersion.spline import KramersKronigSpline, Spline
@@ -223,6 +224,18 @@ MODELS: dict[str, dict[str, ParameterSpec]] = {
             {"LO": 0.1, "gamma_LO": 0.002},
         ),
     },
+    # a density is that of the valence electrons: silicon has 200 per nm³, diamond 705
+    "harmonic-oscillators": _numbered(
+        8,
+        {
+            "N": ParameterSpec(0.0, 500.0, 150.0, (0.0, 3000.0)),
+            "E": ParameterSpec(1.0, 20.0, 12.0, (0.0, 50.0)),
+            "gamma": ParameterSpec(0.0, 5.0, 0.5, (0.0, 1000.0)),
+            "nu": ParameterSpec(0.0, 1.0, 0.333333, (0.0, 1.0), False),
+            "phase": ParameterSpec(-180.0, 180.0, 0.0, (-180.0, 180.0), False),
+        },
+        {"N": 0.0},
+    ),
     **{name: {**specs, "eps_inf": _EPS_INF} for name, specs in TERMS.items()},
     "spline": _INDEX,
     "spline-kk": {
@@ -243,6 +256,7 @@ SERIES = {
     "new-amorphous": ("f", "E", "gamma"),
     "forouhi-bloomer": ("A", "B", "C"),
     "gervais": ("TO", "gamma_TO", "LO", "gamma_LO"),
+    "harmonic-oscillators": ("N", "E", "gamma", "nu", "phase"),
 }
 """Fields with one number for each part of a model, whose parameters are `B1`, `C1`, `B2` and so on."""
 
@@ -367,5 +381,6 @@ KINDS: dict[str, type[Any]] = {
     "new-amorphous": NewAmorphous,
     "forouhi-bloomer": ForouhiBloomer,
     "gervais": Gervais,
+    "harmonic-oscillators": HarmonicOscillators,
 }
 """The class of each model, and of each oscillator in `TERMS`."""

@@ -20,7 +20,7 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import UnknownMaterial, material
-from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
+from pellicle.materials.formats.detect import names_file
 from pellicle.recipes import dispersion_models as models
 from pellicle.recipes import medium_schema
 from pellicle.recipes.free_numbers import free_numbers
@@ -91,7 +91,7 @@ def medium(
         dispersion = _model(value.model, dict(value.model_extra or {}), folder)
     else:
         word = str(value).strip()
-        if folder is not None and Path(word).suffix.lower() in MATERIAL_SUFFIXES:
+        if folder is not None and names_file(word):
             word = str(folder / word)
         dispersion = _index_model_or_material(word, name)
     return free_numbers(dispersion, free)

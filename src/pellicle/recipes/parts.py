@@ -27,6 +27,7 @@ from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.materials import Material, UnknownMaterial, material
+from pellicle.materials.formats.detect import file_of
 from pellicle.recipes import schema
 from pellicle.recipes.dispersion_models import KINDS, MODELS, SERIES, SPLINES, fixed_model, free_model
 from pellicle.recipes.free_numbers import free_numbers
@@ -100,7 +101,7 @@ def written_medium(dispersion: Any, name: str, folder: Path) -> Any:
             return f"{spline}({','.join(repr(x) for x in dispersion.knots)})"
     if isinstance(dispersion, Material):
         # the name of the catalogue, the page, or the path of the file
-        if os.path.exists(dispersion.page):
+        if os.path.exists(file_of(dispersion.page)):
             return Path(os.path.relpath(dispersion.page, folder)).as_posix()
         try:
             if same(material(dispersion.name), dispersion):
@@ -166,7 +167,7 @@ def _plain(tree: Any) -> Any:
 
     def plain(node: Any) -> Any:
         if isinstance(node, Material):
-            page = os.path.abspath(node.page) if os.path.exists(node.page) else node.page
+            page = os.path.abspath(node.page) if os.path.exists(file_of(node.page)) else node.page
             return page, node.clear, node.dispersion
         if isinstance(node, Constant):
             k = node.k

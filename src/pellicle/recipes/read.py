@@ -20,7 +20,9 @@ from pellicle.data.cameras import Camera, Sight, band_sensor, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.data.read_brdf import read_brdf_samples
 from pellicle.errors import DataError, UsageError, did_you_mean
-from pellicle.recipes import parts, schema
+from pellicle.materials.formats import complete_ease as complete_ease_text
+from pellicle.materials.formats import regress_pro as regress_pro_text
+from pellicle.recipes import complete_ease, parts, regress_pro, schema
 from pellicle.recipes.media import medium, number
 from pellicle.recipes.samples import of_sample, scene_table
 from pellicle.scene.film import Light, Scene
@@ -30,17 +32,19 @@ from pellicle.scene.uncertainty import Uncertainty
 
 
 def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
-    """Read and check a recipe, a TOML file.
+    """Read and check a recipe: TOML, a model of CompleteEASE (`.mod`, `.SEsnap`), or of Regress Pro (`.rcp`).
 
     **Arguments:** `path` of the recipe. Data files and tables of n and k that it names are relative to it.
 
     **Returns:** a `FilmRecipe`, or a `SurfaceRecipe` where the recipe has `[scene.surface]` or the signal
     "brdf". Both have `path`, `files` and `scene()`, which builds the `Scene` or the `Surface`.
 
-    **Raises:** DataError in one sentence: which key, what was expected, the nearest known key.
+    **Raises:** DataError in one sentence: which key, what was expected, the nearest known key; or which layer
+    of another program's model a scene cannot express.
     """
     try:
-        loaded = tomllib.loads(Path(path).read_bytes().decode("utf-8-sig"))
+        content = Path(path).read_bytes()
+        loaded = _of_other_program(content, Path(path)) or tomllib.loads(content.decode("utf-8-sig"))
         return checked(loaded, str(path))
     except IsADirectoryError:
         raise DataError(f"{path}: is a folder; give the recipe's TOML file") from None
@@ -56,6 +60,15 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
     except ValueError as error:
         raise DataError(f"{path}: {error}") from None
+
+
+def _of_other_program(content: bytes, path: Path) -> dict[str, Any] | None:
+    """The tables of a model of another program; None for a recipe in TOML."""
+    if (model := complete_ease_text.model(content)) is not None:
+        return complete_ease.tables(model, path.name)
+    if (words := regress_pro_text.words(content)) is not None:
+        return regress_pro.tables(words, path.name)
+    return None
 
 
 def checked(loaded: dict[str, Any], path: str) -> FilmRecipe | SurfaceRecipe:

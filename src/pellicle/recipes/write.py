@@ -16,7 +16,7 @@ from pellicle.data.cameras import SRGB, band_sensor
 from pellicle.data.options import CameraOptions, FileOptions
 from pellicle.errors import UsageError
 from pellicle.files import write_text
-from pellicle.materials.formats.detect import SUFFIXES as MATERIAL_SUFFIXES
+from pellicle.materials.formats.detect import names_file
 from pellicle.recipes import parts
 from pellicle.recipes.parts import same, written_medium, written_number
 from pellicle.recipes.read import FilmRecipe, checked
@@ -125,7 +125,7 @@ def samples_text(
             return {name: adapted(x, name) for name, x in thing.items() if x is not None}
         if isinstance(thing, list | tuple):
             return [adapted(x, key) for x in thing]
-        of_medium = isinstance(thing, str) and Path(thing).suffix.lower() in MATERIAL_SUFFIXES
+        of_medium = isinstance(thing, str) and names_file(thing)
         if key in (*files, "files", "path") or (of_medium and key != "name"):
             return _relative(source / thing, folder)
         return thing

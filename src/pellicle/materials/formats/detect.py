@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from pellicle.data.tabular.columns import recognise_all
-from pellicle.data.tabular.text import Line, in_file
+from pellicle.data.tabular.text import Line, in_file, read_bytes
 from pellicle.data.tabular.units import wavelength_unit
 from pellicle.errors import DataError
+from pellicle.materials.formats import complete_ease, plain_table, refractiveindex_info, regress_pro
 from pellicle.materials.formats import optical_constants as optical
-from pellicle.materials.formats import plain_table, refractiveindex_info
 
 _SPECTRARAY_AXES = {"wavelength": "nm", "energy": "eV", "photon energy": "eV", "wavenumber": "cm-1"}
 
@@ -181,6 +181,21 @@ def _unit_and_kind(words: list[str]) -> tuple[str | None, bool | None] | None:
 SUFFIXES = {".csv", ".txt", ".tsv", ".dat", ".nk", ".mat", ".yml", ".yaml"}
 """Suffixes of files of optical constants: a name with one of them is a path."""
 
+_MODELS = {".mod": complete_ease.table, ".sesnap": complete_ease.table, ".rcp": regress_pro.table}
+"""Suffixes of models of other programs, of which `FILE#NAME` is the table of one medium."""
+
+
+def file_of(word: str) -> str:
+    """The path that a word names if it names a file: without `#NAME`, a medium in a model file."""
+    path, mark, _ = word.partition("#")
+    return path if mark and Path(path).suffix.lower() in _MODELS else word
+
+
+def names_file(word: str) -> bool:
+    """True for a word that is a path of optical constants, by its suffix."""
+    return file_of(word) != word or Path(word).suffix.lower() in SUFFIXES
+
+
 READERS: tuple[Callable[[optical.MaterialText], optical.MaterialFile | None], ...] = (
     *(refractiveindex_info.read_yaml, refractiveindex_info.read_table, spectraray),
     *(sopra_records, sopra_grid, imd, woollam),
@@ -191,12 +206,17 @@ def read_material_file(path: str | Path) -> optical.MaterialFile:
     """Read n and k, or a dielectric function, from a file.
 
     **Arguments**: `path`, a file of WVASE, CompleteEASE, SpectraRay, SOPRA or IMD, a download of
-    refractiveindex.info, or a plain table; see `docs/reference/materials.md`.
+    refractiveindex.info, a plain table, or `MODEL.mod#NAME`, the table of a medium in a model of CompleteEASE
+    or Regress Pro; see `docs/reference/materials.md`.
 
     **Returns** the dispersion with its range (nm), and what was understood of the file.
 
     **Raises** DataError, one sentence with file, line, column and remedy.
     """
+    if (model := file_of(str(path))) != str(path):
+        content, _ = read_bytes(model)
+        with in_file(model):
+            return _MODELS[Path(model).suffix.lower()](content, str(path)[len(model) + 1 :])
     text = optical.read_text(path)
     with in_file(path):
         return next((file for reader in READERS if (file := reader(text))), None) or plain_table.read(text)
