@@ -111,6 +111,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python benchmarks/fit.py
 	$(BIN)/python benchmarks/cold_start.py
 	$(BIN)/python benchmarks/read.py
+	$(BIN)/python benchmarks/watch.py
 
 # verdicts on simulated measurements with the flaws of real ones; a list of those that should be others
 verdicts: $(VENV)/.dev

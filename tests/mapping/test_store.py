@@ -148,7 +148,7 @@ def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
     """The run is within its first block; the other one would remove its store."""
 
     def meanwhile(model, cube, where):
-        with pytest.raises(UsageError, match="another run is writing this map"):
+        with pytest.raises(UsageError, match="another run is writing there"):
             mapped(fit=fake_fits.refusing, overwrite=True)
         return fake_fits.fit(model, cube, where)
 

@@ -18,6 +18,7 @@ from pellicle.cli.read import materials, read
 from pellicle.cli.series import series
 from pellicle.cli.session import BAD_DATA, INTERRUPTED, WRONG_USAGE, interruptible
 from pellicle.cli.simulate import demo, simulate
+from pellicle.cli.watch import watch
 from pellicle.errors import UsageError
 
 app = App(
@@ -42,6 +43,7 @@ COMMANDS = (
     explore,
     map,
     series,
+    watch,
     materials,
     demo,
 )

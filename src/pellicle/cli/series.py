@@ -12,6 +12,15 @@ from pellicle.cli.map import MOST_DECIDED, StoreFlags, film_recipe, fitted
 from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.session import GOOD, INTERRUPTED, UNCLEAR, check_folder, start
 
+TimeFrom = Annotated[
+    str | None,
+    flag(
+        READING,
+        "Times of files: name (the number that differs), mtime, header, or a table of file, time (s).",
+    ),
+]
+"""The flag --time-from."""
+
 
 def series(
     *data: Annotated[
@@ -19,13 +28,7 @@ def series(
         Parameter(help="Files of all times, a table with a column for each, or a cube with an axis time."),
     ],
     recipe: Annotated[str, Parameter(help="TOML file that describes the film, with a free thickness.")],
-    time_from: Annotated[
-        str | None,
-        flag(
-            READING,
-            "Times of files: name (the number that differs), mtime, header, or a table of file, time (s).",
-        ),
-    ] = None,
+    time_from: TimeFrom = None,
     run: Annotated[StoreFlags | None, Parameter(name="*")] = None,
     cube: Annotated[CubeFlags | None, Parameter(name="*")] = None,
     out: Annotated[str | None, flag(OUTPUT, "Folder for the series, report and figure.")] = None,

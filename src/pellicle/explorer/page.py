@@ -27,13 +27,15 @@ def document(nonce: str) -> str:
     )
 
 
-def policy(nonce: str) -> str:
-    """Content-Security-Policy of the page: scripts with the nonce, requests to the same server, no more.
+def policy(nonce: str = "") -> str:
+    """Content-Security-Policy of the page: scripts with the nonce, or those in the page without one, requests
+    to the same server, no more.
 
     Plotly sets styles of elements, hence 'unsafe-inline' for styles.
     """
+    scripts = f"nonce-{nonce}" if nonce else "unsafe-inline"
     return (
-        f"default-src 'none'; script-src 'nonce-{nonce}'; style-src 'unsafe-inline'; img-src data: blob:; "
+        f"default-src 'none'; script-src '{scripts}'; style-src 'unsafe-inline'; img-src data: blob:; "
         "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 

@@ -1,4 +1,4 @@
-"""Local server of the explorer: one page and the requests of its session, for this machine only.
+"""Local server: one page and the requests of its session, for this machine only.
 
 Every request must name this machine as its host, so that no other site can reach the server by rebinding its
 name, and bear a random token, which only the address that was printed has.
@@ -9,17 +9,19 @@ from __future__ import annotations
 import json
 import secrets
 import socket
+import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from pellicle.errors import UsageError, needs
 from pellicle.explorer.page import document, policy
-from pellicle.explorer.session import Session
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
     from starlette.requests import Request
     from starlette.responses import Response
+
+    from pellicle.explorer.session import Session
 
 HOST = "127.0.0.1"
 LARGEST_BODY = 32_000_000
@@ -34,8 +36,26 @@ _HEADERS = {
 }
 
 
-def application(session: Session, token: str, port: int) -> Starlette:
-    """Return the application of a session: `GET /?token=...` and `POST /api/NAME`.
+Page = Callable[[str], tuple[str, str]]
+"""Document and Content-Security-Policy of a page, for a random text."""
+
+
+@runtime_checkable
+class Answering(Protocol):
+    """A session, which answers the requests of its page."""
+
+    def answer(self, request: str, body: Any) -> dict[str, Any]:
+        """The answer to the request of this name, for JSON."""
+        ...
+
+
+def explorer_page(nonce: str) -> tuple[str, str]:
+    """The page of the explorer."""
+    return document(nonce), policy(nonce)
+
+
+def application(session: Answering, token: str, port: int, made: Page = explorer_page) -> Starlette:
+    """Return the application of a session: `GET /?token=...` for its page, and `POST /api/NAME`.
 
     **Raises:** UsageError without Starlette.
     """
@@ -50,16 +70,15 @@ def application(session: Session, token: str, port: int) -> Starlette:
         if request.headers.get("host", "") not in hosts:
             return PlainTextResponse("this server answers on this machine only\n", 421, _HEADERS)
         if not secrets.compare_digest(given.encode(), token.encode()):
-            sentence = "the token is missing or wrong: open the address that pellicle explore has printed\n"
+            sentence = "the token is missing or wrong: open the address that pellicle has printed\n"
             return PlainTextResponse(sentence, 403, _HEADERS)
         return None
 
     async def page(request: Request) -> Response:
         if refusal := refused(request, request.query_params.get("token", "")):
             return refusal
-        nonce = secrets.token_urlsafe(16)
-        headers = {**_HEADERS, "Content-Security-Policy": policy(nonce)}
-        return HTMLResponse(document(nonce), headers=headers)
+        content, allowed = made(secrets.token_urlsafe(16))
+        return HTMLResponse(content, headers={**_HEADERS, "Content-Security-Policy": allowed})
 
     async def api(request: Request) -> Response:
         if refusal := refused(request, request.headers.get(_TOKEN, "")):
@@ -88,7 +107,22 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
 
     **Raises:** UsageError without the packages of the extra, and where the port cannot be opened.
     """
-    with needs("explore", "the explorer needs"):
+    run, address = _server(session, port)
+    session.prepare()
+    ready(address)
+    run()
+
+
+def serve_beside(session: Answering, made: Page, port: int = 0) -> str:
+    """Serve a page in a thread that ends with the process; returns its address. Raises as `serve` does."""
+    run, address = _server(session, port, made)
+    threading.Thread(target=run, name="page", daemon=True).start()
+    return address
+
+
+def _server(session: Answering, port: int, made: Page = explorer_page) -> tuple[Callable[[], None], str]:
+    """The function that serves a session, and the address of its page."""
+    with needs("explore", "the page needs"):
         import uvicorn
     # the protocol is named, or asyncio sends with delay: answers would wait 40 ms for an acknowledgement
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
@@ -103,9 +137,11 @@ def serve(session: Session, port: int = 0, ready: Callable[[str], Any] = lambda 
         ) from None
     opened, token = listener.getsockname()[1], secrets.token_urlsafe(24)
     how: Any = {"log_level": "error", "access_log": False, "lifespan": "off", "server_header": False}
-    settings = uvicorn.Config(application(session, token, opened), timeout_graceful_shutdown=1, **how)
-    with listener:
-        listener.listen(64)
-        session.prepare()
-        ready(f"http://{HOST}:{opened}/?token={token}")
-        uvicorn.Server(settings).run(sockets=[listener])
+    settings = uvicorn.Config(application(session, token, opened, made), timeout_graceful_shutdown=1, **how)
+    listener.listen(64)
+
+    def run() -> None:
+        with listener:
+            uvicorn.Server(settings).run(sockets=[listener])
+
+    return run, f"http://{HOST}:{opened}/?token={token}"

@@ -178,10 +178,15 @@ def expanded(p: Estimate) -> str:
 
 def describe(p: Estimate) -> str:
     """`thickness 751.66 ± 0.12 nm`: the value with its standard error."""
-    if not math.isfinite(p.stderr):
-        return f"{p.name} {p.value:.6g}{_unit(p)}"
-    digits = 2 if p.stderr == 0 else max(0, min(12, 1 - math.floor(math.log10(p.stderr))))
-    return f"{p.name} {p.value:.{digits}f} ± {p.stderr:.{digits}f}{_unit(p)}"
+    return f"{p.name} {with_error(p.value, p.stderr)}{_unit(p)}"
+
+
+def with_error(value: float, stderr: float) -> str:
+    """`751.66 ± 0.12`, or the value alone where the error is not finite."""
+    if not math.isfinite(stderr):
+        return f"{value:.6g}"
+    digits = 2 if stderr == 0 else max(0, min(12, 1 - math.floor(math.log10(stderr))))
+    return f"{value:.{digits}f} ± {stderr:.{digits}f}"
 
 
 def _unit(p: Estimate) -> str:

@@ -13,6 +13,7 @@ from pellicle.errors import DataError
 from pellicle.fitting.batch.candidates import BatchSearch, prepared
 from pellicle.fitting.batch.data import ORDERS, BatchFits, batch_data
 from pellicle.fitting.batch.errors import BatchErrors
+from pellicle.fitting.batch.polish import ROWS
 from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import Measured, make
@@ -46,10 +47,11 @@ class PixelModel:
         return self.problem.parameters
 
 
-def prepare(cube: Cube, scene: Scene, orders: int = ORDERS) -> PixelModel:
+def prepare(cube: Cube, scene: Scene, orders: int = ORDERS, rows: int = ROWS) -> PixelModel:
     """Prepare the fits of the pixels of a cube: media, effects, bounds and the table of the search.
 
-    `orders` is the number of minima of each pixel that are kept.
+    `orders` is the number of minima of each pixel that are kept, `rows` the most spectra of one call of a
+    program, which takes as long for fewer.
 
     **Raises:** as `pellicle.fit` does; DataError where no pixel has data.
     """
@@ -58,7 +60,7 @@ def prepare(cube: Cube, scene: Scene, orders: int = ORDERS) -> PixelModel:
     with jax.enable_x64(True):
         [target] = measurements(example, scene)
         problem = make(target)
-        search = prepared(problem, batch_data(sample, problem.views[0].noise), orders)
+        search = prepared(problem, batch_data(sample, problem.views[0].noise), orders, rows)
         assert isinstance(target, Measured)
         errors = BatchErrors(problem, target, cube.calibrated, search)
     return PixelModel(scene, problem, example, search, errors)

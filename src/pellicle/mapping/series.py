@@ -95,8 +95,9 @@ def _check_times(cube: Cube) -> None:
         )
     time = np.asarray(cube.coords[TIME])
     if time.size < 3:
+        held = "is one spectrum" if time.size == 1 else f"has {time.size} times"
         raise UsageError(
-            f"{cube.path or 'series'}: has {time.size} times, and a series needs three times at least"
+            f"{cube.path or 'series'}: {held}, and a series needs three times at least: name the other files"
         )
     back = np.flatnonzero(time[1:] <= time[:-1])
     if back.size:

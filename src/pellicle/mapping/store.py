@@ -295,7 +295,7 @@ def held(path: Path) -> Iterator[None]:
             fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise UsageError(
-                f"{path}: another run is writing this map; wait for it, or choose another `out`"
+                f"{path}: another run is writing there; wait for it, or choose another `out`"
             ) from None
         except OSError:  # a file system without locks
             pass

@@ -33,25 +33,29 @@ _GRID = 1e-6
 def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> RawCube:
     """Read the spectra of several files, or of one with a column for each time, by increasing time.
 
+    The file of a single spectrum has the time of its name, or by the clock. Files without a time in the table
+    `time_from` are left out.
+
     **Raises:** DataError or UsageError, one sentence with the file and the remedy.
     """
     read = partial(read_spectra, signal=asked.signal, wavelength_unit=asked.unit)
-    if len(paths) == 1:
+    spectra = read(paths[0], spectrum="all") if len(paths) == 1 else []
+    if len(spectra) > 1:
         [path] = paths
-        spectra, files = read(path, spectrum="all"), [path]
-        if len(spectra) < 2:
-            raise DataError(f"{path}: is one spectrum, and a series needs several: name the other files, too")
         names = [one.name for one in spectra]
         where = f"the head of {path.name}"
         time, unit = _stated(names, time_from, path) if time_from else _numbers(names, str(path), "columns")
     else:
-        files, spectra, names = list(paths), [], [path.name for path in paths]
-        for path in paths:
+        time, unit, where = _times(list(paths), time_from or BY_NAME)
+        known = np.flatnonzero(np.isfinite(time))
+        where += f", {len(paths) - known.size} files without one left out" * (known.size < len(paths))
+        time, paths = np.asarray(time)[known], [paths[int(i)] for i in known]
+        names = [path.name for path in paths]
+        for path in [] if spectra else paths:
             found = read(path)
             if len(found) != 1:
                 raise DataError(f"{path}: holds {len(found)} spectra, and a series of files has one in each")
             spectra.append(found[0])
-        time, unit, where = _times(files, time_from or BY_NAME)
     order = np.argsort(time, kind="stable")
     twice = np.flatnonzero(np.diff(np.asarray(time)[order]) == 0)
     if twice.size:
@@ -78,30 +82,36 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
 
 
 def _times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
-    """Times of files, their unit, and where they are from."""
+    """Times of files, their unit, their source; by dates since the first, of one file since 1970."""
     if time_from == BY_NAME:
         return *_numbers(
             [file.stem for file in files], str(files[0].parent), "files"
         ), "the names of the files"
     if time_from == BY_DATE:
         stamps = np.array([file.stat().st_mtime for file in files])
-        return stamps - stamps.min(), "s", "the dates of the files"
+        return _since_first(stamps), "s", "the dates of the files"
     if time_from == BY_HEADER:
         stamps = np.array([_date(file) for file in files])
-        return stamps - stamps.min(), "s", "the dates in the files"
+        return _since_first(stamps), "s", "the dates in the files"
     table = Path(time_from)
     if not table.is_file():
         raise UsageError(f"--time-from {time_from}: is no file, and not name, mtime or header")
     return *_stated([file.name for file in files], time_from, files[0]), table.name
 
 
+def _since_first(stamps: np.ndarray) -> np.ndarray:
+    return stamps - stamps.min() if stamps.size > 1 else stamps
+
+
 def _numbers(names: Sequence[str], path: str, what: str) -> tuple[Any, str]:
-    """The number in which names differ, with its unit."""
+    """The number in which names differ, with its unit; of a single name the one that has a unit."""
     found = [_NUMBER.findall(name) for name in names]
     if any(len(one) != len(found[0]) for one in found) or not found[0]:
         raise DataError(f"{path}: the names of its {what} state no times: give a table with --time-from FILE")
     columns = [[one[i] for one in found] for i in range(len(found[0]))]
     differ = [i for i, column in enumerate(columns) if len({number for number, _ in column}) > 1]
+    if len(names) == 1:
+        differ = [i for i, [(_, unit)] in enumerate(columns) if unit]
     if len(differ) != 1:
         told = "differ in several numbers" if differ else "do not differ in a number"
         raise DataError(
@@ -143,7 +153,7 @@ def _stated(names: Sequence[str], table: str, path: Path) -> tuple[Any, str]:
     known = {}
     for number, row in enumerate(rows[1:], 2):
         try:
-            known[row[0].strip()] = float(row[1])
+            known[row[0].strip()] = float(row[1]) if row[1].strip() else np.nan
         except (ValueError, IndexError):
             raise DataError(f"{table}: row {number} is no name and time: correct {','.join(row)!r}") from None
     if absent := [name for name in names if name not in known]:
@@ -170,12 +180,15 @@ def _arrays(spectra: Sequence[Spectrum]) -> tuple[dict[str, Stored], np.ndarray,
             continue
         rows = np.full((len(spectra), nm.size), np.nan)
         for row, one in zip(rows, spectra, strict=True):
-            at = np.clip(np.searchsorted(nm, one.wavelength * (1 - _GRID)), 0, nm.size - 1)
-            if not np.allclose(nm[at], one.wavelength, _GRID, 0):
-                raise DataError(
-                    f"{one.path}: its wavelengths differ from those of {longest.path}: use one grid"
-                )
-            row[at] = getattr(one, name)
+            row[rows_on_grid(one.wavelength, nm, one.path, longest.path)] = getattr(one, name)
         arrays[name] = Stored(rows, (TIME, WAVELENGTH))
     angles = None if longest.angle is None else np.unique(longest.angle)
     return arrays, nm, angles
+
+
+def rows_on_grid(wavelength: np.ndarray, grid: np.ndarray, path: str, of: str) -> np.ndarray:
+    """Positions of wavelengths on the grid of the file `of`. Raises DataError for one that it lacks."""
+    at = np.clip(np.searchsorted(grid, wavelength * (1 - _GRID)), 0, grid.size - 1)
+    if not np.allclose(grid[at], wavelength, _GRID, 0):
+        raise DataError(f"{path}: its wavelengths differ from those of {of}: use one grid")
+    return at

@@ -33,10 +33,11 @@ class BatchSearch(NamedTuple):
     thickness: np.ndarray
     dark: float  # known offset
     orders: int  # minima of each spectrum that are kept
+    rows: int  # spectra, or starts, of one call
 
     @property
     def static(self) -> polish.Static:
-        return self.view.form, self.problem.coordinates
+        return self.view.form, self.problem.coordinates, self.rows
 
     def noise(self, deviance: np.ndarray) -> np.ndarray:
         """Size of the noise in the unit of a deviance: where the weights are right, 1."""
@@ -54,11 +55,15 @@ class BatchSearch(NamedTuple):
     def block(self) -> int:
         """Spectra that are scanned together."""
         width = self.lookup.columns.shape[1]
-        return int(np.clip(2 ** int(np.log2(_MOST_PRODUCTS / width)), _FEWEST_PIXELS, _MOST_PIXELS))
+        block = int(np.clip(2 ** int(np.log2(_MOST_PRODUCTS / width)), _FEWEST_PIXELS, _MOST_PIXELS))
+        return self.rows if self.rows < polish.ROWS else block
 
 
-def prepared(problem: Problem, sample: BatchData, orders: int = ORDERS) -> BatchSearch:
-    """The search for so many minima of spectra by a problem of one; `sample` are a few, as all are."""
+def prepared(
+    problem: Problem, sample: BatchData, orders: int = ORDERS, rows: int = polish.ROWS
+) -> BatchSearch:
+    """The search for so many minima of spectra by a problem of one; `sample` are a few, as all are, and `rows`
+    the most that are fitted in one call."""
     view: SpectrumView = problem.views[0].unpadded()
     view = replace(view, data=view.data._replace(frame=None))
     instrument, level = view.scene.instrument, float(np.median(sample.level))
@@ -69,7 +74,7 @@ def prepared(problem: Problem, sample: BatchData, orders: int = ORDERS) -> Batch
     lookup, layout, thickness = table(problem, view, weight, level, orders)
     common = polish.Common(view.scene, view.data, problem.box)
     dark = 0.0 if isinstance(instrument.offset, Drift) else float(instrument.offset)
-    return BatchSearch(problem, view, common, lookup, layout, thickness, dark, orders)
+    return BatchSearch(problem, view, common, lookup, layout, thickness, dark, orders, rows)
 
 
 def _even_weight(data: BatchData, channels: int) -> np.ndarray:

@@ -20,7 +20,7 @@ from pellicle.scene.film import Scene
 _NODES = 96
 """Nodes in a fringe. With 48 the error of the interpolation tells an overlayer and an index from a thickness:
 a standard error was 15 % too small (110 nm of oxide on silicon, Ψ and Δ)."""
-_LANES = 64
+LANES = 64
 """Spectra that one call of the compiled program takes: a few tens of signals each."""
 
 
@@ -37,13 +37,19 @@ class BatchEffects:
 
     Which effects there are, and their sizes but for a spread of the thickness, are those at `example`, values
     of the parameters (parameters,). Where a thickness is the only parameter, they are interpolated between
-    `nodes` (nodes,) of it, each of which is simulated when a spectrum first needs it.
+    `nodes` (nodes,) of it, each of which is simulated when a spectrum first needs it. `lanes` are the most
+    that one call of a program simulates.
     """
 
     def __init__(
-        self, view: SpectrumView, example: np.ndarray, scene: Scene, nodes: np.ndarray | None = None
+        self,
+        view: SpectrumView,
+        example: np.ndarray,
+        scene: Scene,
+        nodes: np.ndarray | None = None,
+        lanes: int = LANES,
     ):
-        self._view, self._scene, self._nodes = view, scene, nodes
+        self._view, self._scene, self._nodes, self._lanes = view, scene, nodes, lanes
         self._simulations, self._start, self._rows = list[_Simulation](), np.zeros(0), list[SimulatedEffect]()
         simulations = simulations_of(view, example, scene)
         if simulations is None:
@@ -112,7 +118,7 @@ class BatchEffects:
                 signal = simulated_side_by_side(form, scene, self._view.data, *rows).signal
                 return weights @ np.asarray(signal)[..., : self._view.points]
 
-            changes += in_chunks(changed, (frame, candidates), _LANES)
+            changes += in_chunks(changed, (frame, candidates), self._lanes)
         return changes
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from pellicle.fitting.batch import polish
 from pellicle.fitting.batch.candidates import BatchSearch
 from pellicle.fitting.batch.data import CODES, NO_DATA, BatchData, BatchFits, BatchMinima
-from pellicle.fitting.batch.effects import BatchEffects, nodes
+from pellicle.fitting.batch.effects import LANES, BatchEffects, nodes
 from pellicle.fitting.batch.local_models import LocalModels, thickness_nodes
 from pellicle.fitting.conclusion import verdicts
 from pellicle.fitting.covariance import Scaled
@@ -101,7 +101,8 @@ class BatchErrors:
         self.grid = np.zeros(0) if depth is None else thickness_nodes(problem)
         if len(lower) == 1 and depth is not None:
             table = nodes(lower[0], upper[0], shortest_wavelength(problem))
-        self.effects = BatchEffects(self.view, 0.5 * (lower + upper), self.scene, table)
+        middle, lanes = 0.5 * (lower + upper), min(search.rows, LANES)
+        self.effects = BatchEffects(self.view, middle, self.scene, table, lanes)
 
     def fits(self, data: BatchData, minima: BatchMinima) -> BatchFits:
         """Errors and status of spectra by their data and minima."""

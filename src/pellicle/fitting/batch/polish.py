@@ -18,16 +18,16 @@ from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
 
-ROWS = 256
-"""Starts, or spectra, of one call: all calls share a program."""
+ROWS, FEW = 256, 4
+"""Starts, or spectra, of one call: all calls share a program. The second is for single spectra."""
 EVALUATIONS = 2
 """Evaluations of one call: for most starts of a scan, two bring the solver so near that the next, which is
 done in any case for the model and its slopes, ends it."""
 COARSE = 1e-3
 """Fall of the deviance that may be left in a rival, as a share of its distance to the best."""
 
-Static = tuple[SpectrumForm, Coordinates]
-"""The static part of a program."""
+Static = tuple[SpectrumForm, Coordinates, int]
+"""The static part of a program, and the most rows of one call."""
 
 
 class Common(NamedTuple):
@@ -86,7 +86,7 @@ def _of(common: Common, row: BatchData) -> Data:
 
 def _residual(static: Static, common: Common, row: BatchData, unit: Any) -> tuple[Any, Any]:
     """Weighted residuals at a point of the unit cube; deviance and misfit."""
-    form, coordinates = static
+    form, coordinates, _ = static
     data = _of(common, row)
     values = coordinates.values(common.box, unit)
     explained = form.explain((common.scene, data), list(values))
@@ -166,7 +166,7 @@ def at_best(static: Static, common: Common, rows: BatchData, units: Any) -> Best
 
     The step is so small that the curves are those of the points before it.
     """
-    form, coordinates = static
+    form, coordinates, _ = static
 
     def one(row, unit):
         data = _of(common, row)
@@ -197,8 +197,9 @@ def at_best(static: Static, common: Common, rows: BatchData, units: Any) -> Best
 
 
 def in_rows(program: Any, static: Static, common: Common, rows: BatchData, *points: np.ndarray) -> Any:
-    """Outputs of a `program` of starts, `ROWS` of them at a time; `rows` are the data of each."""
-    return in_chunks(lambda own: program(static, common, *own), (rows, *points), ROWS)
+    """Outputs of a `program` of starts, at most as many at a time as `static` says; `rows` are the data of
+    each."""
+    return in_chunks(lambda own: program(static, common, *own), (rows, *points), static[-1])
 
 
 def settle(

@@ -212,6 +212,16 @@
     status.addEventListener("change", filter);
   }
 
+  // ---- a page that is redrawn: new figures in place of those of the same names ----
+  document.addEventListener("figures", (event) => {
+    for (const figure of event.detail) {
+      figures.splice(figures.findIndex((each) => each.id === figure.id), 1, figure);
+      if (!drawn.has(figure.id)) continue;
+      drawn.set(figure.id, figure);
+      draw(figure);
+    }
+  });
+
   // ---- start: each figure is drawn when it comes near the window ----
   async function start() {
     if (!figures.length) return;
