@@ -51,22 +51,13 @@ def watch(
     Example: pellicle watch measured --recipe film.toml --time-from mtime --out growth
     """
     described = film_recipe(recipe, "describes a surface, and a watch needs the recipe of a film")
-    cube, source = cube or CubeFlags(), Path(folder)
-    if not source.is_dir():
-        raise DataError(f"{folder}: is no folder; name the one in which the instrument writes its files")
-    if idle is not None and not idle > 0:
-        raise UsageError(f"--idle must be above zero, got {idle:g}")
-    if out is not None:
-        check_folder(out)
-        if Path(out).resolve() == source.resolve():
-            raise UsageError("--out must be another folder than the one of the data")
-    scene = described.scene(fitted=True)
+    source, scene = _checked(folder, idle, out), described.scene(fitted=True)
     start()
     from pellicle.data.arrivals import Arrivals
     from pellicle.mapping.live_series import LiveSeries
     from pellicle.mapping.store import held
 
-    live = LiveSeries(scene, time_from, **cube.arguments(described))
+    live = LiveSeries(scene, time_from, **(cube or CubeFlags()).arguments(described))
     table = None if out is None else _Table(Path(out), source, live)
     with nullcontext() if table is None else held(table.folder):
         if table is not None:
@@ -85,6 +76,20 @@ def watch(
             say("")
         say(f"{live.done} files fitted" + (f"; the same command goes on with {out}" if out else ""))
     return GOOD
+
+
+def _checked(folder: str, idle: float | None, out: str | None) -> Path:
+    """The folder to watch. Raises DataError or UsageError for what cannot be watched."""
+    source = Path(folder)
+    if not source.is_dir():
+        raise DataError(f"{folder}: is no folder; name the one in which the instrument writes its files")
+    if idle is not None and not idle > 0:
+        raise UsageError(f"--idle must be above zero, got {idle:g}")
+    if out is not None:
+        check_folder(out)
+        if Path(out).resolve() == source.resolve():
+            raise UsageError("--out must be another folder than the one of the data")
+    return source
 
 
 def _follow(
