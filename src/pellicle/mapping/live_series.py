@@ -139,7 +139,7 @@ class LiveSeries:
         if twice := next((fit.file for fit in self.fits.values() if fit.time == time), ""):
             raise DataError(f"{path}: has the time of {twice}, {time:g} {unit}: leave one of them out")
         if self._model is None:
-            self._model, self._grid = prepare(cube, self.scene, FEW), cube
+            self._model, self._grid = prepare(cube, self.scene, rows=FEW), cube
         else:
             assert self._grid is not None
             cube = _on_grid(cube, self._grid)
