@@ -62,8 +62,8 @@ class BatchSearch(NamedTuple):
 def prepared(
     problem: Problem, sample: BatchData, orders: int = ORDERS, rows: int = polish.ROWS
 ) -> BatchSearch:
-    """The search for so many minima of spectra by a problem of one; `sample` are a few, as all are, and `rows`
-    the most that are fitted in one call."""
+    """The search for so many minima of spectra by a problem of one; `sample` are a few, as all are, and
+    `rows` the most that are fitted in one call."""
     view: SpectrumView = problem.views[0].unpadded()
     view = replace(view, data=view.data._replace(frame=None))
     instrument, level = view.scene.instrument, float(np.median(sample.level))
