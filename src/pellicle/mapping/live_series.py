@@ -23,14 +23,12 @@ from pellicle.fitting.batch.polish import FEW
 from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME
-from pellicle.mapping.order_path import order_path
+from pellicle.mapping.order_path import SHORT, order_path
 from pellicle.mapping.pixels import PixelModel, fit_pixels, prepare
 from pellicle.mapping.series_result import SURE
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
-_LATEST = 16
-"""Times before one by which its order is chosen."""
 _USABLE = str(Status.CONVERGED), BY_NEIGHBOURS
 
 
@@ -108,7 +106,7 @@ class LiveSeries:
                 thickness[0], delta[:] = fit.values[depth], np.inf
                 delta[0] = 0.0
                 insort(self._latest, _Minima(fit.time, thickness, delta, fit.stderr_noise[depth]), key=_time)
-        del self._latest[:-_LATEST]
+        del self._latest[:-SHORT]
 
     def fit(self, path: Path) -> LiveFit:
         """Fit a file; one that cannot be read or fitted has the status `failed`, and an `error`."""
@@ -180,7 +178,7 @@ class LiveSeries:
         """The minimum of a time that continues the times before it best, the Δχ² of the best path through
         another one, and whether the film jumped before it."""
         insort(self._latest, minima, key=_time)
-        del self._latest[:-_LATEST]
+        del self._latest[:-SHORT]
         at = next((i for i, one in enumerate(self._latest) if one is minima), -1)
         if at < 0 or len(self._latest) < 3:
             return 0, 0.0, False

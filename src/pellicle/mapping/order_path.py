@@ -22,6 +22,8 @@ _STEP = 0.3
 """Share of the distance of minima above which a step is one between them."""
 _FEWEST, _MOST = 5, 2000
 """Times that show how evenly a thickness changes."""
+SHORT = 16
+"""Times of the shortest program: fewer are filled up, so that a live series needs no other for each time."""
 
 
 class OrderPath(NamedTuple):
@@ -105,14 +107,20 @@ def _best(
     cost = weight * np.where(np.isnan(thickness), np.inf, delta)
     # leaving a path for one time and coming back pays for three departures
     cost = np.where(cost - cost.min(axis=1, keepdims=True) > 3 * BREAK, np.inf, cost)
-    kept = np.argsort(cost, axis=1, kind="stable")[:, : int(np.isfinite(cost).sum(axis=1).max())]
+    most = int(np.isfinite(cost).sum(axis=1).max()) if len(time) > SHORT else cost.shape[1]
+    kept = np.argsort(cost, axis=1, kind="stable")[:, :most]
     cost, there = (np.take_along_axis(x, kept, axis=1) for x in (cost, np.nan_to_num(thickness, nan=1e9)))
     rows, steps = np.arange(len(time)), np.diff(time)
     ratio = np.concatenate([[0.0, 0.0], steps[1:] / steps[:-1]])
     known = stderr**2 + ((1 + ratio) * np.roll(stderr, 1)) ** 2 + (ratio * np.roll(stderr, 2)) ** 2
     bend = 0.5 * uneven * np.concatenate([[0.0, 0.0], steps[1:] * (steps[1:] + steps[:-1])])
+    more = max(SHORT - len(time), 0)  # times with one minimum that cost nothing
+    one = np.where(np.arange(most) == 0, 0.0, np.inf)
+    there, cost = np.vstack([there, np.zeros((more, most))]), np.vstack([cost, np.tile(one, (more, 1))])
+    ratio, variance = np.append(ratio, np.ones(more)), np.append(known + bend**2, np.full(more, np.inf))
     with jax.enable_x64(True):
-        chosen, least, paid = map(np.asarray, _viterbi(there, cost, ratio, known + bend**2))
+        found = map(np.asarray, _viterbi(there, cost, ratio, variance))
+    chosen, least, paid = (x[: len(time)] for x in found)
     left = least - least[rows, chosen][:, None]
     left[rows, chosen] = np.inf
     breaks = _breaks(paid[2:] >= BREAK, len(time))
