@@ -95,9 +95,8 @@ def _check_times(cube: Cube) -> None:
         )
     time = np.asarray(cube.coords[TIME])
     if time.size < 3:
-        held = "is one spectrum" if time.size == 1 else f"has {time.size} times"
         raise UsageError(
-            f"{cube.path or 'series'}: {held}, and a series needs three times at least: name the other files"
+            f"{cube.path or 'series'}: has {time.size} times, and a series needs three times at least"
         )
     back = np.flatnonzero(time[1:] <= time[:-1])
     if back.size:
