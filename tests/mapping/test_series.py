@@ -64,6 +64,14 @@ def test_a_jump_and_a_gap_are_told_and_nothing_after_them_is_wrong():
     decided = np.isfinite(found["thickness"])
     assert decided.sum() == 70
     assert (np.abs(found["thickness"] - true)[decided] < 5).all()
+    left = found.dataset.residual
+    assert np.isnan(left[20:30]).all()
+    np.testing.assert_allclose(found.dataset.residual_rms[60], np.sqrt(np.mean(left[60] ** 2)), rtol=1e-5)
+    assert 0.008 < float(left.std()) < 0.012
+    index = np.searchsorted(found.times, found.dataset.time_worst)
+    np.testing.assert_allclose(found.dataset.worst_data, data.R.values[index])
+    np.testing.assert_allclose(found.dataset.worst_data - found.dataset.worst_fit, left[index], atol=1e-6)
+    assert set(index) == set(np.argsort(-found.dataset.residual_rms.fillna(0).values)[:3])
 
 
 def test_an_index_that_all_times_share_is_known_by_all():

@@ -8,6 +8,7 @@ again after each pass.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from inspect import signature
 from logging import getLogger
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,6 +29,7 @@ from pellicle.mapping.map_result import Map
 from pellicle.mapping.order_path import order_path
 from pellicle.mapping.pixels import PixelModel, prepare
 from pellicle.mapping.run import map_cube
+from pellicle.mapping.series_residuals import residuals
 from pellicle.mapping.series_result import SURE, Joined, Series, series_of
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.store import variable_name
@@ -84,7 +86,9 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map) -> Series:
     kinds = _kinds(model.parameters)
     with jax.enable_x64(True):
         joined = _joined(model, cube, dataset, time, kinds)
-    return series_of(made, dataset, model.parameters, (time, unit), joined)
+        left = residuals(model, cube, time, joined.used, joined.smoothed.mean)
+    found = series_of(made, dataset, model.parameters, (time, unit), joined)
+    return replace(found, dataset=found.dataset.assign(left))
 
 
 def _check_times(cube: Cube) -> None:

@@ -64,6 +64,21 @@ class Band:
 
 
 @dataclass(frozen=True, eq=False)
+class Raster:
+    """Values (ordinate, abscissa) in colours, symmetric around 0, above `x` and `y`."""
+
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+
+    @property
+    def limit(self) -> float:
+        """The size of the values at the ends of the colours, which few exceed."""
+        known = np.abs(self.values[np.isfinite(self.values)])
+        return float(np.percentile(known, 99)) if known.size else 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class Panel:
     """Lines and bands on one pair of axes; `label` names the ordinate with its unit.
 
@@ -71,8 +86,8 @@ class Panel:
     at 0, `height` is in inches. `scale` "symlog" is linear below `threshold`. `limits` are those of the
     ordinate, `span` those of the abscissa. `ticks` are words at 1, 2, ... of the abscissa, `notes` texts
     (x, y, text) above points, which a `key` beside the panel explains. `spans` are ranges (left, right, name,
-    shade) of the abscissa. An `image` (2, n, 3) shows patches of data above those of the fit, with `captions`
-    on these.
+    shade) of the abscissa. A `raster` fills the panel. An `image` (2, n, 3) shows patches of data above those
+    of the fit, with `captions` on these.
     """
 
     label: str
@@ -93,11 +108,12 @@ class Panel:
     image: np.ndarray | None = None
     captions: Sequence[str] = ()
     key: Sequence[str] = ()
+    raster: Raster | None = None
 
     @property
     def empty(self) -> bool:
         """True where nothing is drawn."""
-        return not self.lines and not self.bands and self.image is None
+        return not self.lines and not self.bands and self.image is None and self.raster is None
 
 
 @dataclass(frozen=True, eq=False)

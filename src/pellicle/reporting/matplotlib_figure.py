@@ -142,6 +142,11 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
     """Draw one panel into axes."""
     if panel.image is not None:
         _patches(axes, panel)
+    if panel.raster is not None:
+        at, limit = panel.raster, panel.raster.limit
+        style = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, "shading": "nearest", "rasterized": True}
+        axes.pcolormesh(at.x, at.y, at.values, **style)
+        axes.set_ylabel(panel.label)
     points = max((line.x.size for line in panel.lines), default=0)
     listed: set[str] = set()
     for band in panel.bands:

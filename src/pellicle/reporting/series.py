@@ -12,16 +12,17 @@ import numpy as np
 from pellicle.files import replacing, write_text
 from pellicle.fitting.batch.data import STATUSES
 from pellicle.mapping.growth import TIME
+from pellicle.mapping.series_residuals import SHOWN, WAVELENGTH, WORST
 from pellicle.mapping.series_result import Series
 from pellicle.reporting import matplotlib_figure
-from pellicle.reporting.drawable import Band, Line, Panel, Section, Table, labelled
+from pellicle.reporting.drawable import Band, Line, Panel, Raster, Section, Table, labelled
 from pellicle.reporting.folders import PAGE, REPORT
 from pellicle.reporting.json_record import strict, versions, write_result
 from pellicle.reporting.map_summary import is_decided, summarise
 from pellicle.reporting.map_text import ADVICE, plan_rows
 from pellicle.reporting.page.document import Table as PageTable
 from pellicle.reporting.page.document import page, picture
-from pellicle.reporting.plain_text import blocks_of, csv_text, facts, wrapped, written_by
+from pellicle.reporting.plain_text import blocks_of, csv_text, facts, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,8 +115,34 @@ def draw(series: Series) -> Figure:
     chi = np.asarray(data["chi2_reduced"].values, float)
     if np.any(np.abs(chi[np.isfinite(chi)] - 1) > 1e-6):  # else the noise is that of the residuals
         panels.append(Panel("reduced χ²", [Line(time, chi, "", "data", "point")], height=1.2))
-    section = Section(labelled("time", _unit(series)), [[panel] for panel in panels])
-    return matplotlib_figure.draw([section], f"{Path(series.map.input).name}\n{_sentence(series)}")
+    panels.append(Panel("rms of residuals", [Line(time, np.asarray(data.residual_rms), "", "data", "point")]))
+    left = Raster(np.asarray(data[SHOWN]), np.asarray(data[WAVELENGTH]), np.asarray(data.residual).T)
+    told = f"data − fit: blue −{left.limit:.2g}, red {left.limit:.2g}"
+    panels.append(Panel("wavelength (nm)", height=1.8, title=told, raster=left))
+    sections = [Section(labelled("time", _unit(series)), [[panel] for panel in panels])]
+    if WORST in data.coords:
+        sections.append(Section("wavelength (nm)", [_worst(series)]))
+    return matplotlib_figure.draw(sections, f"{Path(series.map.input).name}\n{_sentence(series)}")
+
+
+def _worst(series: Series) -> list[Panel]:
+    """The spectra of the largest residuals with the fit of all times together."""
+    data, nm, panels = series.dataset, np.asarray(series.dataset[WAVELENGTH]), []
+    for i, at in enumerate(np.asarray(data[WORST])):
+        rms = float(data.residual_rms[np.searchsorted(series.times, at)])
+        lines = [
+            Line(nm, np.asarray(data.worst_data[i]), "data", "data", "point"),
+            Line(nm, np.asarray(data.worst_fit[i]), "fit", "fit"),
+        ]
+        panels.append(
+            Panel(
+                "",
+                lines,
+                title=f"{'' if i else 'worst: '}{at:.5g} {_unit(series)}, rms {rms:.2g}",
+                height=1.6,
+            )
+        )
+    return panels
 
 
 def _unit(series: Series) -> str:
@@ -169,10 +196,10 @@ def _table(series: Series) -> Table:
     for name in map(str, data.data_vars):
         if name == "status":
             columns[name] = [STATUSES[code] for code in data[name].values]
-        elif data[name].dims:
+        elif data[name].dims == (TIME,):
             unit = str(data[name].attrs.get("units", "1")).replace("/", "_per_").removesuffix("1")
             columns[f"{name}_{unit}" if unit else name] = np.asarray(data[name].values, float)
-    return Table(columns, [written_by(), *series.warnings])
+    return Table(columns)  # spreadsheets take the first line for the names of columns
 
 
 def _page(series: Series, image: bytes) -> str:

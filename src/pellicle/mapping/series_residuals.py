@@ -1,0 +1,63 @@
+"""Residuals of a series: what the fit of all times leaves of each spectrum, and the worst spectra."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.cube import Cube
+from pellicle.fitting.batch import polish
+from pellicle.fitting.batch.data import batch_data
+from pellicle.mapping.growth import TIME
+from pellicle.mapping.pixels import PixelModel
+
+SHOWN, WORST, WAVELENGTH = "time_shown", "time_worst", "wavelength"
+_MOST, _WORST, _BLOCK = 400, 3, 4096
+"""Times of the image at most, spectra that are kept as the worst, and times that are computed at once."""
+
+
+def residuals(
+    model: PixelModel, cube: Cube, time: np.ndarray, used: np.ndarray, units: np.ndarray
+) -> dict[str, tuple[Any, ...]]:
+    """Variables of the residuals of a series, as `xarray.Dataset.assign` takes them, with coordinates.
+
+    `residual_rms` (times,), that of all points of a time; `residual` (times shown, wavelengths), data − fit
+    at evenly spaced times; `worst_data` and `worst_fit` (worst times, wavelengths), the spectra of the
+    largest rms. Of Ψ and Δ the residuals are the sizes of those of N, C, S, and there are no worst spectra.
+
+    **Arguments:** `time` of the cube, the positions `used` of times with data, and the parameters of these in
+    the `units` of the unit cube (times, parameters).
+    """
+    search, view = model.search, model.problem.views[0]
+    step, single, worst = max(-(-len(time) // _MOST), 1), search.view.channels == 1, []
+    rms, image = np.full(len(time), np.nan), np.full((len(time[::step]), cube.wavelength.size), np.nan)
+    for first in range(0, len(used), _BLOCK):
+        which = used[first : first + _BLOCK]
+        block = cube.pixels((slice(int(which[0]), int(which[-1]) + 1),))
+        data = batch_data({name: rows[which - which[0]] for name, rows in block.items()}, view.noise)
+        at = np.clip(units[first : first + _BLOCK], 0.0, 1.0)
+        fit = polish.in_rows(polish.at_best, search.static, search.common, data, at).model
+        known = data.weight > 0
+        left = np.where(known, data.values - fit, np.nan).reshape(len(which), -1, search.view.channels)
+        rms[which] = np.sqrt(np.nanmean(left**2, axis=(1, 2)))
+        shown = which % step == 0
+        size = left[shown, :, 0] if single else np.sqrt(np.mean(left[shown] ** 2, axis=2))
+        image[which[shown] // step] = size
+        if single:
+            order = np.argsort(-rms[which])[:_WORST]
+            rows = zip(which[order], np.where(known, data.values, np.nan)[order], fit[order], strict=True)
+            worst = sorted([*worst, *rows], key=lambda row: -rms[row[0]])[:_WORST]
+    about = {"units": "1", "long_name": "data - fit"}
+    found = {
+        WAVELENGTH: (WAVELENGTH, cube.wavelength, {"units": "nm"}),
+        SHOWN: (SHOWN, time[::step]),
+        "residual": ((SHOWN, WAVELENGTH), image.astype("float32"), about),
+        "residual_rms": (TIME, rms, about | {"long_name": "root mean square of data - fit"}),
+    }
+    if worst:
+        at, data, fit = (np.array(column) for column in zip(*worst, strict=True))
+        found[WORST] = WORST, time[at]
+        found["worst_data"] = (WORST, WAVELENGTH), data, {"units": "1"}
+        found["worst_fit"] = (WORST, WAVELENGTH), fit, {"units": "1"}
+    return found
