@@ -52,12 +52,20 @@ class LiveFit:
 
 
 class _Minima(NamedTuple):
-    """Thicknesses of the minima of one time, their Δχ² (minima,), and the error by the noise."""
+    """Thicknesses of the minima of one time, their Δχ² (minima,), the error by the noise, and the systematic
+    one."""
 
     time: float
     thickness: np.ndarray
     delta: np.ndarray
     known: float
+    systematic: float
+
+
+def _systematic(stderr: float, noise: float) -> float:
+    """The systematic part of a standard error, 0 where that is not known."""
+    square = stderr**2 - noise**2
+    return float(np.sqrt(max(square, 0.0))) if np.isfinite(square) else 0.0
 
 
 def _time(minima: _Minima) -> float:
@@ -105,7 +113,9 @@ class LiveSeries:
                 thickness, delta = np.full((2, ORDERS), np.nan)
                 thickness[0], delta[:] = fit.values[depth], np.inf
                 delta[0] = 0.0
-                insort(self._latest, _Minima(fit.time, thickness, delta, fit.stderr_noise[depth]), key=_time)
+                known, whole = fit.stderr_noise[depth], fit.stderr[depth]
+                minima = _Minima(fit.time, thickness, delta, known, _systematic(whole, known))
+                insort(self._latest, minima, key=_time)
         del self._latest[:-SHORT]
 
     def fit(self, path: Path) -> LiveFit:
@@ -157,7 +167,8 @@ class LiveSeries:
             known = noise if np.isfinite(noise) else thickness[0]
             if status == str(Status.NOT_IDENTIFIABLE):  # there is only a limit
                 known = max(known, thickness[0])
-            order, sure, jump = self._order(_Minima(made.time, thickness, delta, known))
+            systematic = _systematic(float(fits.stderr[0, depth]), noise)
+            order, sure, jump = self._order(_Minima(made.time, thickness, delta, known, systematic))
             if status == str(Status.AMBIGUOUS) and sure > SURE:
                 status, rival = BY_NEIGHBOURS, sure
             else:
@@ -182,8 +193,7 @@ class LiveSeries:
         at = next((i for i, one in enumerate(self._latest) if one is minima), -1)
         if at < 0 or len(self._latest) < 3:
             return 0, 0.0, False
-        time, thickness, delta, known = map(np.array, zip(*self._latest, strict=True))
-        path = order_path(time, thickness, delta, known)
+        path = order_path(*map(np.array, zip(*self._latest, strict=True)))
         sure = path.rival > SURE
         jump = path.breaks[at] and sure[at] and sure[at - 1]
         return int(path.chosen[at]), float(path.rival[at]), bool(jump)
