@@ -85,9 +85,6 @@ SLOW = (
 CI = ("make fit", "make test", "make notebooks", "make docs", "make dist")
 ELSEWHERE = (
     *CI,  # .ci/run
-    # cli/test_watch.py, mapping/test_series.py
-    "pellicle watch measured --recipe film.toml --time-from mtime --out growth",
-    "pellicle series measured --recipe film.toml --time-from growth/watch.csv --out grown",
     "make browser-tests",  # needs Chromium; reporting/test_page_in_browser.py, explorer
     "make dist-check",  # installs the wheel for every Python found; .ci/run: make dist
     "make fits",  # test_fits.py: all of them in make slow
