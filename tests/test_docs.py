@@ -114,6 +114,7 @@ ELSEWHERE = (
     *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
     *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
     "python benchmarks/sample_coverage.py",  # fits 120 times; fitting/film/test_samples.py: errors by noise
+    "python benchmarks/series.py",  # fits for minutes; mapping/test_series.py: a few films
     "python benchmarks/shared_index.py",  # fits for minutes; fitting/film/test_samples.py: two samples
     "python benchmarks/dispersion_models.py",  # fits for minutes; dispersion: the values of each model
     "python scripts/render_blade.py",  # rendering/test_mitsuba.py: its materials
