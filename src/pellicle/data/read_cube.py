@@ -19,6 +19,7 @@ from pellicle.data.cubes import (
     spectra_folder,
     tiff_stacks,
     time_series,
+    traces,
     xarray_cubes,
 )
 from pellicle.data.cubes.frames import camera_frames, read_mask
@@ -40,6 +41,7 @@ READERS: dict[Callable[[Path], bool], Callable[[Path, raw_cube.Asked], raw_cube.
     numpy_files.is_numpy: numpy_files.read_numpy,
     tiff_stacks.is_tiff: tiff_stacks.read_tiff,
     envi.is_envi: envi.read_envi,
+    traces.is_trace: traces.read_trace,
     spectra_folder.is_table: spectra_folder.read_folder,
 }
 """Readers of cubes by the test of a file or folder that they read; the first that holds is taken."""

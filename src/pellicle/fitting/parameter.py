@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.scene.priors import Prior
+from pellicle.scene.priors import Normal, Prior
 
 _SHARE, _RELATIVE = 0.02, 0.002
 """Two minima, not one: parameters differ by this share of their range, or by this share of their value."""
@@ -23,7 +23,8 @@ class Parameter:
     one-sided limit, not a warning. The ends of a `periodic` parameter are one. Minima closer than
     `resolution` (in its unit, at least 0.2 % of the value; 2 % of the range if None) are one.
 
-    `varies`: how it changes in a series, None for the usual way.
+    `varies`: how it changes in a series, None for the usual way; `first` and `last`: what is known of it at
+    the first and at the last time.
 
     `limits` marks default bounds, and is how far they may be widened; None for bounds that the user set.
 
@@ -41,6 +42,8 @@ class Parameter:
     prior: Prior | None = None
     limits: tuple[float, float] | None = None
     varies: str | None = None
+    first: Normal | float | None = None
+    last: Normal | float | None = None
     natural: tuple[bool, bool] = (False, False)
     periodic: bool = False
     resolution: float | None = None

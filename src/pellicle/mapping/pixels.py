@@ -15,8 +15,8 @@ from pellicle.fitting.batch.data import ORDERS, BatchFits, batch_data
 from pellicle.fitting.batch.errors import BatchErrors
 from pellicle.fitting.batch.polish import ROWS
 from pellicle.fitting.batch.search import minima
-from pellicle.fitting.film.fit import measurements
-from pellicle.fitting.film.problem import Measured, make
+from pellicle.fitting.film.fit import check_free
+from pellicle.fitting.film.problem import make, measured
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.scene.film import Scene
@@ -58,10 +58,10 @@ def prepare(cube: Cube, scene: Scene, orders: int = ORDERS, rows: int = ROWS) ->
     sample = _sample(cube)
     example = spectrum(cube, {name: _complete(rows[0]) for name, rows in sample.items()})
     with jax.enable_x64(True):
-        [target] = measurements(example, scene)
+        target = measured(example, scene)
+        check_free(target.scene)
         problem = make(target)
         search = prepared(problem, batch_data(sample, problem.views[0].noise), orders, rows)
-        assert isinstance(target, Measured)
         errors = BatchErrors(problem, target, cube.calibrated, search)
     return PixelModel(scene, problem, example, search, errors)
 
@@ -76,7 +76,7 @@ def _sample(cube: Cube) -> dict[str, np.ndarray]:
         blocks = [cube.pixels(own) for own in chosen]
         sample = {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
         known = np.sum(np.all([np.isfinite(x) for x in sample.values()], axis=0), axis=1)
-        order = np.argsort(-known, kind="stable")[: np.sum(known > 1)][:_SAMPLE]
+        order = np.argsort(-known, kind="stable")[: np.sum(known > 0)][:_SAMPLE]
         if len(order):
             return {name: values[order] for name, values in sample.items()}
     raise DataError(f"{cube.path or 'cube'}: no pixel has data")

@@ -17,7 +17,7 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.data.fingerprint import fingerprint
 from pellicle.data.read_cube import read_cube
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.batch.data import ORDERS
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
@@ -54,9 +54,10 @@ def map_cube(
     model: PixelModel | None = None,
     recipe: str = "",
     progress: Progress = quiet,
+    fit: Fitter | None = None,
     **reading: Any,
 ) -> Map:
-    """Fit every pixel of a cube; arguments as of `pellicle.map`."""
+    """Fit every pixel of a cube; arguments as of `pellicle.map`, and `fit` as of `run_map`."""
     if isinstance(scene.instrument.scale, Drift):  # values may have any level
         reading = {"calibrated": False} | reading
     cube = read_cube(data, **reading)
@@ -82,6 +83,7 @@ def map_cube(
         "preview": factor,
         "progress": progress,
         "model": model,
+        "fit": fit,
     }
     made = run_map(cube, scene, out, **options)
     if neighbours:
@@ -124,6 +126,8 @@ def run_map(
     """
     if workers is not None and workers < 1:
         raise UsageError(f"`workers` must be at least 1, got {workers}")
+    if fit is None and cube.points < 2:
+        raise DataError(f"{cube.path or 'cube'}: has one band, and a fit needs a spectrum at each pixel")
     began = time.monotonic()
     model = prepare(cube, scene) if model is None else model
     orders = model.search.orders

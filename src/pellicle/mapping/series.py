@@ -7,7 +7,7 @@ again after each pass.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from inspect import signature
 from logging import getLogger
@@ -33,14 +33,18 @@ from pellicle.mapping.series_residuals import residuals
 from pellicle.mapping.series_result import SURE, Joined, Series, series_of
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.store import variable_name
+from pellicle.mapping.trace import is_trace, trace_of, undecided
 from pellicle.scene.film import Scene
-from pellicle.scene.free import FREELY, SHARED, SLOWLY
+from pellicle.scene.free import FREELY, MONOTONIC, SHARED, SLOWLY
 from pellicle.scene.instrument import Drift
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 log = getLogger(__name__)
+
+Join = Callable[[PixelModel, Cube, "Dataset", np.ndarray, tuple[str, ...]], Joined]
+"""Fit of all times together: of the model, the cube, the map's variables, the times and kinds of change."""
 
 _PASSES, _SETTLED = 8, 0.05
 """Most passes of the smoother, and the change of all values, in standard errors, that ends them."""
@@ -68,14 +72,19 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
             f" {', '.join(cube.dims)}: choose one position, or use pellicle map"
         )
     _check_times(cube)
+    if is_trace(cube):
+        trace = trace_of(cube, scene)
+        model = prepare(trace.cube, trace.scene)
+        made = map_cube(trace.cube, trace.scene, fit=undecided, model=model, **options)
+        return smoothed_series(trace.cube, model, made, trace.joined)
     if (lamp := options.pop("lamp_curve", None)) is not None:
         cube = lamp_curve_of(lamp, cube, scene).correct(cube)
     model = prepare(cube, scene, _ORDERS)
     return smoothed_series(cube, model, map_cube(cube, scene, model=model, **options))
 
 
-def smoothed_series(cube: Cube, model: PixelModel, made: Map) -> Series:
-    """Join the fits of a map of one spectrum at each time, by the model that made it.
+def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None = None) -> Series:
+    """Join the fits of a map of one spectrum at each time, by the model that made it, as `join` does it.
 
     A thickness varies slowly, and all times share the other parameters, where their `varies` is None.
 
@@ -84,9 +93,11 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map) -> Series:
     dataset = made.dataset.load()
     time, unit = elapsed(dataset[TIME], None)
     kinds = _kinds(model.parameters)
+    if join is None and MONOTONIC in kinds:
+        raise UsageError('varies = "monotonic" is of the thickness of a trace: write "slowly" for spectra')
     with jax.enable_x64(True):
-        joined = _joined(model, cube, dataset, time, kinds)
-        left = residuals(model, cube, time, joined.used, joined.smoothed.mean)
+        joined = (join or _joined)(model, cube, dataset, time, kinds)
+        left = residuals(model, cube, time, joined.used, joined.smoothed.mean) if join is None else {}
     found = series_of(made, dataset, model.parameters, (time, unit), joined)
     return replace(found, dataset=found.dataset.assign(left))
 
@@ -114,7 +125,7 @@ def _check_times(cube: Cube) -> None:
 def _kinds(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
     """Kinds of change of the parameters. Raises UsageError where none changes."""
     kinds = tuple(p.varies or (SLOWLY if p.key == "thickness" else SHARED) for p in parameters)
-    if SLOWLY not in kinds and FREELY not in kinds:
+    if not {SLOWLY, MONOTONIC, FREELY} & {*kinds}:
         raise UsageError("nothing varies in this series: free a thickness")
     return kinds
 

@@ -16,7 +16,7 @@ from pellicle.mapping.map_result import Map
 from pellicle.mapping.order_path import OrderPath
 from pellicle.mapping.state_space import Smoothed
 from pellicle.mapping.store import variable_name
-from pellicle.scene.free import SHARED, SLOWLY
+from pellicle.scene.free import MONOTONIC, SHARED, SLOWLY
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -138,11 +138,11 @@ def _variables(
     found: dict[str, Any] = {
         f"{name}{key}": (TIME, x, about) for key, x in zip(_ERRORS, columns, strict=True)
     }
-    if kinds[i] == SLOWLY:
+    if kinds[i] in (SLOWLY, MONOTONIC):
         rate, error = span * smoothed.rate[:, i], span * np.sqrt(smoothed.rate_variance[:, i])
         common = span * np.sqrt(smoothed.rate_systematic[:, i])
         about = {"long_name": f"rate of change of {parameter.name}", "units": f"{own_unit}/{unit}"}
-        before = "" if kinds.count(SLOWLY) == 1 else f"{name}_"
+        before = "" if sum(kind in (SLOWLY, MONOTONIC) for kind in kinds) == 1 else f"{name}_"
         columns = rate, np.hypot(error, common), error
         found |= {f"{before}rate{key}": (TIME, x, about) for key, x in zip(_ERRORS, columns, strict=True)}
     return found

@@ -50,7 +50,7 @@ class Smoothed(NamedTuple):
     `mean` and `variance` (times, parameters); `rate` and `rate_variance` (times, parameters), per unit of
     time, NaN for the others; the variances are those of the noise, and `systematic` and `rate_systematic`
     those of the effects together; `derivatives`: states of each of these, and `stiffness` (slow,) the
-    logarithms of their process noise.
+    logarithms of their process noise; `deviance`: −2 ln of the marginal likelihood, up to a constant.
     """
 
     mean: np.ndarray
@@ -61,6 +61,7 @@ class Smoothed(NamedTuple):
     rate_systematic: np.ndarray
     derivatives: int
     stiffness: np.ndarray
+    deviance: float = np.nan
 
 
 class _Chain(NamedTuple):
@@ -98,9 +99,8 @@ def smooth(
         else:
             states, best = like.derivatives, like.stiffness
         arrays = series.arrays(states)
-        states_mean, spread, answer, certainty = map(
-            np.asarray, _smoothed(series.chain(best, states), *arrays)
-        )
+        found = _smoothed(series.chain(best, states), *arrays)
+        states_mean, spread, answer, certainty, deviance = map(np.asarray, found)
     varying = states_mean[..., 0], spread, np.sum(states_mean[..., 1:] ** 2, axis=2)
     common = answer[:, 0], certainty, np.sum(answer[:, 1:] ** 2, axis=1)
     values, rates = np.empty((3, len(time), len(kinds))), np.full((3, len(time), len(kinds)), np.nan)
@@ -109,7 +109,7 @@ def smooth(
         values[i][:, shared], values[i][:, ~shared] = common[i], varying[i][:, : len(own)]
         rates[i][:, at] = varying[i][:, first] / unit**power
     (mean, variance, systematic), (rate, rate_variance, of_rate) = values, rates
-    return Smoothed(mean, variance, rate, rate_variance, systematic, of_rate, states, best)
+    return Smoothed(mean, variance, rate, rate_variance, systematic, of_rate, states, best, float(deviance))
 
 
 def _best(series: _Times) -> tuple[int, np.ndarray]:
@@ -268,9 +268,9 @@ def _deviance(chain: _Chain, vectors: Any, information: Any, rest: Any) -> Any:
 def _smoothed(chain: _Chain, vectors: Any, information: Any, rest: Any) -> tuple[Any, ...]:
     """Means (times, states, 1 + effects), with changes by the effects, and variances (times, states) of all
     times by all times, by the adjoint of the filter, which inverts no covariance; the same of the shared
-    parameters (shared, 1 + effects) and (shared,)."""
-    mean, root, predicted, misfit, _ = _forward(chain, vectors, information)
-    answer, spread, _ = _shared(misfit, rest)
+    parameters (shared, 1 + effects) and (shared,); the marginal deviance."""
+    mean, root, predicted, misfit, logarithm = _forward(chain, vectors, information)
+    answer, spread, deviance = _shared(misfit, rest)
     count, effects = len(rest), vectors.shape[2] - 1 - len(rest)
     each = jnp.eye(1 + effects)
     weights = jnp.concatenate([each[:1], answer, each[1:]])
@@ -294,4 +294,4 @@ def _smoothed(chain: _Chain, vectors: Any, information: Any, rest: Any) -> tuple
     nothing = jnp.zeros((states, columns)), jnp.zeros((states, states))
     every = mean, root, chain.transition, predicted, vectors, information
     _, (means, variances) = jax.lax.scan(step, nothing, every, reverse=True)
-    return means, variances, answer, jnp.sum(spread**2, axis=1)
+    return means, variances, answer, jnp.sum(spread**2, axis=1), deviance + jnp.sum(logarithm)

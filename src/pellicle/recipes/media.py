@@ -26,6 +26,7 @@ from pellicle.recipes import medium_schema
 from pellicle.recipes.free_numbers import free_numbers
 from pellicle.scene.free import Free
 from pellicle.scene.graded import Graded
+from pellicle.scene.priors import Normal
 from pellicle.scene.ties import Tied
 
 _MEDIUM: TypeAdapter[Any] = TypeAdapter(medium_schema.Medium)
@@ -305,7 +306,11 @@ def number(value: medium_schema.Number, name: str, minimum: float | None = None)
     else:
         with models.usage_errors(f"{name}: "):
             prior = None if value.prior is None else value.prior.prior()
-            about = {"prior": prior, "limits": value.limits, "varies": value.varies}
+            ends = {
+                name: Normal(x.mean, x.sd) if isinstance(x, medium_schema.KnownTable) else x
+                for name, x in (("first", value.first), ("last", value.last))
+            }
+            about = {"prior": prior, "limits": value.limits, "varies": value.varies, **ends}
             result = Free(value.lower, value.upper, start=value.value, **about)
         lowest = value.lower
     if not math.isfinite(lowest):

@@ -113,11 +113,19 @@ class PriorTable(BaseModel):
         return Normal(self.mean, self.sd)
 
 
+class KnownTable(BaseModel):
+    """A number that is known, with its standard deviation."""
+
+    model_config = ConfigDict(extra="forbid")
+    mean: float
+    sd: float
+
+
 class FreeTable(BaseModel):
     """A free number by its bounds, with optional start value and prior; or a fixed one by its value.
 
     `limits` mark default bounds, which a fit of spectra may widen up to them. `varies`: how the number
-    changes in a series of spectra.
+    changes in a series of spectra; `first`, `last`: what is known of it at the ends of the series.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -126,7 +134,9 @@ class FreeTable(BaseModel):
     upper: float | None = None
     limits: tuple[float, float] | None = None
     prior: PriorTable | None = None
-    varies: Literal["slowly", "freely", "shared"] | None = None
+    varies: Literal["slowly", "freely", "shared", "monotonic"] | None = None
+    first: float | KnownTable | None = None
+    last: float | KnownTable | None = None
 
 
 Number = float | FreeTable | str

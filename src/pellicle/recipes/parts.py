@@ -56,6 +56,12 @@ def written_number(thing: Any, name: str) -> float | str | dict[str, Any]:
         limits = {} if thing.limits is None else {"limits": [*thing.limits]}
         start = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"value": thing.start}
         varies = {} if thing.varies is None else {"varies": thing.varies}
+        ends = {"first": thing.first, "last": thing.last}
+        varies |= {
+            key: {"mean": x.mean, "sd": x.sd} if isinstance(x, Normal) else x
+            for key, x in ends.items()
+            if x is not None
+        }
         bounds, prior = {**start, "lower": thing.lower, "upper": thing.upper, **limits, **varies}, thing.prior
         if prior is None:
             return bounds

@@ -65,7 +65,8 @@ def python_text(thing: Any) -> str:
         return _call("pl.Tied", [thing.tie.text], {})
     if isinstance(thing, Free):
         about = {} if thing.start == 0.5 * (thing.lower + thing.upper) else {"start": thing.start}
-        about |= {key: x for key in ("prior", "limits", "varies") if (x := getattr(thing, key)) is not None}
+        kept = "prior", "limits", "varies", "first", "last"
+        about |= {key: x for key in kept if (x := getattr(thing, key)) is not None}
         return _call("pl.Free", [thing.lower, thing.upper], about)
     if isinstance(thing, Anisotropic):
         return _call("pl.Anisotropic", [], thing.arguments)

@@ -104,7 +104,7 @@ def draw(series: Series) -> Figure:
         lines = [
             Line(np.insert(time, cut, np.nan), np.insert(value, cut, np.nan), "all times together", "fit")
         ]
-        if name in series.map.dataset:
+        if name in series.map.dataset and "residual" in data:
             alone = np.where(decided, np.asarray(series.map[name], float), np.nan)
             other = np.where(decided, np.nan, value)
             lines = [Line(time, alone, "each time alone", "data", "point"), *lines]
@@ -115,10 +115,13 @@ def draw(series: Series) -> Figure:
     chi = np.asarray(data["chi2_reduced"].values, float)
     if np.any(np.abs(chi[np.isfinite(chi)] - 1) > 1e-6):  # else the noise is that of the residuals
         panels.append(Panel("reduced χ²", [Line(time, chi, "", "data", "point")], height=1.2))
-    panels.append(Panel("rms of residuals", [Line(time, np.asarray(data.residual_rms), "", "data", "point")]))
-    left = Raster(np.asarray(data[SHOWN]), np.asarray(data[WAVELENGTH]), np.asarray(data.residual).T)
-    told = f"data − fit: blue −{left.limit:.2g}, red {left.limit:.2g}"
-    panels.append(Panel("wavelength (nm)", height=1.8, title=told, raster=left))
+    if "residual" in data:  # of spectra
+        panels.append(
+            Panel("rms of residuals", [Line(time, np.asarray(data.residual_rms), "", "data", "point")])
+        )
+        left = Raster(np.asarray(data[SHOWN]), np.asarray(data[WAVELENGTH]), np.asarray(data.residual).T)
+        told = f"data − fit: blue −{left.limit:.2g}, red {left.limit:.2g}"
+        panels.append(Panel("wavelength (nm)", height=1.8, title=told, raster=left))
     sections = [Section(labelled("time", _unit(series)), [[panel] for panel in panels])]
     if WORST in data.coords:
         sections.append(Section("wavelength (nm)", [_worst(series)]))

@@ -13,13 +13,13 @@ from jaxtyping import Float
 
 from pellicle.errors import UsageError
 from pellicle.scene import expressions
-from pellicle.scene.priors import Prior
+from pellicle.scene.priors import Normal, Prior
 
 MOST_FREE = 64
 """Most parameters a fit may have free: 21 took 30 s and 121 did not end within 5 minutes (two cores)."""
 
-VARIES = SLOWLY, FREELY, SHARED = "slowly", "freely", "shared"
-"""Changes of a parameter in a series: steadily, from time to time, or not at all."""
+VARIES = SLOWLY, FREELY, SHARED, MONOTONIC = "slowly", "freely", "shared", "monotonic"
+"""Changes of a parameter in a series: steadily, from time to time, not at all, steadily in one direction."""
 
 
 class Tie(NamedTuple):
@@ -42,7 +42,9 @@ class Free(eqx.Module):
     (uniform between the bounds if None), all in the parameter's own unit. `limits` marks default bounds,
     which nobody chose for this sample: a fit of spectra may widen them up to these limits (lower, upper) of
     physics, and a best value on one of them is a remark, not the status `at-bound`. `varies`: how the
-    parameter changes in a series, one of `VARIES`; None for the usual way.
+    parameter changes in a series, one of `VARIES`; None for the usual way. `first`, `last`: what is known of
+    it at the first and at the last time of a series: a number, which only selects the order of interference
+    nearest to it, or a `Normal`, which also counts as a measurement.
 
     **Raises:** ValueError where bounds are reversed or infinite, or the start or the prior is outside them,
     or they are outside the limits, or for another word of `varies`.
@@ -57,6 +59,8 @@ class Free(eqx.Module):
     limits: tuple[float, float] | None = eqx.field(static=True)
     prior: Prior | None
     varies: str | None = eqx.field(static=True)
+    first: Normal | float | None = eqx.field(static=True)
+    last: Normal | float | None = eqx.field(static=True)
     label: Any = eqx.field(static=True)
     """By which ties know it; None where none does."""
     tie: Tie | None = eqx.field(static=True)
@@ -71,6 +75,8 @@ class Free(eqx.Module):
         prior: Prior | None = None,
         limits: tuple[float, float] | None = None,
         varies: str | None = None,
+        first: Normal | float | None = None,
+        last: Normal | float | None = None,
     ):
         given = {"lower": lower, "upper": upper, "start": start}
         for name, value in given.items():
@@ -90,7 +96,12 @@ class Free(eqx.Module):
         self.lower, self.upper, self.start, self.prior = float(lower), float(upper), float(start), prior
         if varies is not None and varies not in VARIES:
             raise ValueError(f"`varies` must be one of {', '.join(VARIES)}, not {varies!r}")
+        for name, end in (("first", first), ("last", last)):
+            mean = end.mean if isinstance(end, Normal) else end
+            if mean is not None and not lower <= mean <= upper:
+                raise ValueError(f"`{name}` is {mean:g}, outside the bounds {lower:g} to {upper:g}")
         self.limits, self.varies, self.label, self.tie = limits, varies, None, None
+        self.first, self.last = first, last
 
 
 def labelled(free: Free, label: Any) -> Free:
@@ -105,7 +116,7 @@ def tied(lower: float, upper: float, start: float, tie: Tie) -> Free:
     """Return a tied number, whose bounds may be one. Raises UsageError for bounds that are not finite."""
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise UsageError("is not finite within its bounds")
-    given: dict[str, Any] = dict.fromkeys(("prior", "limits", "varies", "label"))
+    given: dict[str, Any] = dict.fromkeys(("prior", "limits", "varies", "first", "last", "label"))
     given["tie"], other = tie, object.__new__(Free)
     for name, own in {"lower": lower, "upper": upper, "start": start, **given}.items():
         object.__setattr__(other, name, own)

@@ -11,7 +11,7 @@ import jax
 
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.assembly import Assembly, assemble
 from pellicle.fitting.budget import budget, likely_cause
@@ -133,6 +133,9 @@ def measurements(
     spectra = listed(data)
     if not spectra:
         raise UsageError("there is no spectrum to fit: give one, or a list of some")
+    for own in spectra:
+        if isinstance(own, Spectrum) and not own.ellipsometric and len(own) < 2:
+            raise DataError(f"{own.path}: holds one point of {own.signal}; a fit needs a spectrum")
     scenes = [scene] * len(spectra) if isinstance(scene, Scene) else list(scene)
     if not all(isinstance(each, Scene) for each in scenes):
         raise UsageError(f"`scene` must be a Scene, a Surface or a list of scenes, not {scene!r}")

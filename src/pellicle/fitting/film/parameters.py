@@ -126,6 +126,8 @@ def _parameter(scene: Scene, path: tuple, free: Free, name: str) -> Parameter:
         prior=free.prior,
         limits=free.limits,
         varies=free.varies,
+        first=free.first,
+        last=free.last,
         natural=(
             (strength or (field or key) in _NATURAL_ZERO) and free.lower == 0,
             key in _NATURAL_ONE and free.upper == 1,
@@ -152,8 +154,15 @@ def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
 def with_bounds(scene: Scene, parameters: Sequence[Parameter]) -> Scene:
     """The scene with the bounds of these parameters, which are its own in their order."""
     pairs = zip(free_leaves(scene), parameters, strict=True)
+    kept = "prior", "varies", "first", "last"
     free = [
-        Free(p.lower, p.upper, start=free.start, prior=free.prior, limits=free.limits, varies=free.varies)
+        Free(
+            p.lower,
+            p.upper,
+            start=free.start,
+            limits=free.limits,
+            **{key: getattr(free, key) for key in kept},
+        )
         for (_, free), p in pairs
     ]
     return insert(scene, free)

@@ -10,7 +10,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.differences import largest_index
 from pellicle.effects.film_plan import exact, plan
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 from pellicle.fitting import noise
 from pellicle.fitting.coordinates import box
 from pellicle.fitting.film.colour_measurements import MeasuredColours, colours_view
@@ -149,8 +149,6 @@ def drifts(scene: Scene) -> bool:
 
 
 def _check(data: Spectrum, scene: Scene) -> None:
-    if not data.ellipsometric and len(data) < 2:
-        raise DataError(f"{data.path}: holds one point of {data.signal}; a fit needs a spectrum")
     drifting = [x for x in (scene.instrument.scale, scene.instrument.offset) if isinstance(x, Drift)]
     if data.kind.has_scale and not data.calibrated and scene.instrument.scale not in drifting:
         raise UsageError(

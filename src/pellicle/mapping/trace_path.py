@@ -1,0 +1,115 @@
+"""Path of a film's thickness through the branches of a trace of one or a few wavelengths.
+
+One value of one wavelength belongs to two thicknesses in each fringe, one on each side of an extremum, so
+that each window of time has many candidates. A path pays for the misfit of its candidates and for changes
+of its rate. At an extremum of the light it goes on as before, or turns: its rate tells which.
+
+**Source:** Viterbi 1967, IEEE Trans. Inf. Theory 13, 260; min-marginals as in `order_path`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+KINK = 20.0
+"""Price of an abrupt change of the rate, as Δχ²."""
+_BEND = 0.3
+"""Usual change of a step from one window to the next, as its share."""
+_NEAR = 6
+"""Candidates of the window before from which a path may come: the nearest."""
+
+
+_SAME = 4.0
+"""Distance in standard errors within which two candidates are one."""
+
+
+class Candidates(NamedTuple):
+    """Local minima of the misfit in each window: `thickness`, `delta` (above the best of the window) and
+    `stderr`, (windows, candidates), by increasing thickness, NaN where there are fewer."""
+
+    thickness: np.ndarray
+    delta: np.ndarray
+    stderr: np.ndarray
+
+    def same(self, chosen: np.ndarray) -> np.ndarray:
+        """True (windows, candidates) where one is the `chosen` of its window (windows,): at an extremum two
+        branches meet."""
+        own = np.arange(len(chosen)), chosen
+        away = np.abs(self.thickness - self.thickness[own][:, None])
+        return away <= _SAME * np.hypot(self.stderr, self.stderr[own][:, None])
+
+
+class TracePath(NamedTuple):
+    """Chosen candidate of each window (windows,), the Δχ² of the best path through another one (windows,),
+    and the price of the path."""
+
+    chosen: np.ndarray
+    rival: np.ndarray
+    price: float
+
+
+def trace_path(time: np.ndarray, candidates: Candidates, *, monotonic: bool = False) -> TracePath:
+    """Find the path through the candidates of all windows, three at least, at the times (windows,).
+
+    A `monotonic` film only grows or only thins: whichever fits better, and the other one is a rival.
+    """
+    if not monotonic:
+        return _path(time, candidates, 0)
+    best, other = sorted((_path(time, candidates, way) for way in (1, -1)), key=lambda path: path.price)
+    with np.errstate(invalid="ignore"):
+        above = np.nan_to_num(other.price - best.price, nan=0.0, posinf=np.inf)
+    same = other.chosen == best.chosen
+    return best._replace(rival=np.minimum(best.rival, np.where(same, np.inf, above)))
+
+
+def _path(time: np.ndarray, candidates: Candidates, way: int) -> TracePath:
+    """The cheapest path that changes in this `way`: 1 grows, −1 thins, 0 does either."""
+    thickness, delta, stderr = candidates
+    there = np.isfinite(thickness)
+    cost, sigma = np.where(there, delta, np.inf), np.where(there, stderr, 1.0)
+    place, steps = np.where(there, thickness, 1e9), np.diff(time)
+    count, size = thickness.shape
+    near = min(_NEAR, size)
+    # states: a candidate, and one of those nearest to it in the window before
+    before = np.argsort(np.abs(place[1:, :, None] - place[:-1, None, :]), axis=2, kind="stable")[..., :near]
+
+    def price(t: int) -> np.ndarray:
+        """Prices (candidates at t, those before, those before these) of changes of the rate."""
+        i, ratio = before[t - 1], steps[t - 1] / steps[t - 2]
+        j = before[t - 2][i]
+        step = place[t][:, None, None] - place[t - 1][i][..., None]
+        last = ratio * (place[t - 1][i][..., None] - place[t - 2][j])
+        bend = 0.5 * _BEND * (np.abs(step) + np.abs(last))
+        noise = [sigma[t][:, None, None], (1 + ratio) * sigma[t - 1][i][..., None], ratio * sigma[t - 2][j]]
+        return np.minimum((step - last) ** 2 / (bend**2 + sum(x**2 for x in noise)), KINK)
+
+    def forbidden(t: int) -> np.ndarray:
+        """Infinity for steps (candidates at t, those before) in the wrong way by more than the noise."""
+        i = before[t - 1]
+        away = way * (place[t][:, None] - place[t - 1][i])
+        return np.where(away < -3 * np.hypot(sigma[t][:, None], sigma[t - 1][i]), np.inf, 0.0)
+
+    forward, origin = np.empty((count, size, near)), np.zeros((count, size, near), int)
+    forward[1] = cost[0][before[0]] + cost[1][:, None] + forbidden(1)
+    for t in range(2, count):
+        total = forward[t - 1][before[t - 1]] + price(t)
+        origin[t] = np.argmin(total, axis=2)
+        forward[t] = np.min(total, axis=2) + cost[t][:, None] + forbidden(t)
+    backward, least = np.zeros((size, near)), np.full((count, size), np.inf)
+    least[-1] = forward[-1].min(axis=1)
+    for t in range(count - 1, 1, -1):
+        ahead = price(t) + (cost[t][:, None] + forbidden(t) + backward)[..., None]
+        backward = np.full((size, near), np.inf)
+        np.minimum.at(backward, before[t - 1], ahead)
+        least[t - 1] = np.min(forward[t - 1] + backward, axis=1)
+    np.minimum.at(least[0], before[0], forward[1] + backward)
+    chosen, k = np.empty(count, int), int(np.argmin(forward[-1]))
+    chosen[-1], p = divmod(k, near)
+    for t in range(count - 1, 0, -1):
+        chosen[t - 1] = before[t - 1][chosen[t], p]
+        p = origin[t][chosen[t], p]
+    best = float(forward[-1].min())
+    with np.errstate(invalid="ignore"):
+        left = np.nan_to_num(least - best, nan=np.inf, posinf=np.inf)
+    left[candidates.same(chosen)] = np.inf
+    return TracePath(chosen, left.min(axis=1), best)
