@@ -46,6 +46,7 @@ EXIT_4 = (
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = (
     # compile for 4 to 30 s; what the test that is named covers
+    "pellicle fit docs/examples/oxide_um_percent.csv --recipe docs/examples/oxide.rcp",  # recipes
     "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml",  # fitting/film/test_generalised.py
     "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv",  # forward_model
     "pellicle simulate docs/examples/mica.toml --out flake.csv --seed 1",  # signals/test_mica.py

@@ -291,7 +291,7 @@ class Fit(PlotMixin):
 
     @property
     def log_evidence(self) -> float:
-        """ln of the likelihood, effects integrated out, averaged over the priors of the parameters."""
+        """ln of the evidence by the fit's own noise; `pellicle.compare` gives several fits the same noise."""
         return self.ranking.log_evidence
 
     @property

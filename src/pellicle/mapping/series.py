@@ -111,7 +111,7 @@ def _check_times(cube: Cube) -> None:
     time = np.asarray(cube.coords[TIME])
     if time.size < 3:
         raise UsageError(
-            f"{cube.path or 'series'}: has {time.size} times, and a series needs three times at least"
+            f"{cube.path or 'series'}: a series needs three times at least, and this has {time.size}"
         )
     back = np.flatnonzero(time[1:] <= time[:-1])
     if back.size:

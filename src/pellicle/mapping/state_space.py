@@ -101,7 +101,8 @@ def smooth(
         arrays = series.arrays(states)
         found = _smoothed(series.chain(best, states), *arrays)
         states_mean, spread, answer, certainty, deviance = map(np.asarray, found)
-    varying = states_mean[..., 0], spread, np.sum(states_mean[..., 1:] ** 2, axis=2)
+    # where the data have no noise, a variance of zero may round below it
+    varying = states_mean[..., 0], np.maximum(spread, 0.0), np.sum(states_mean[..., 1:] ** 2, axis=2)
     common = answer[:, 0], certainty, np.sum(answer[:, 1:] ** 2, axis=1)
     values, rates = np.empty((3, len(time), len(kinds))), np.full((3, len(time), len(kinds)), np.nan)
     at, first = np.flatnonzero(~shared)[slow], len(own) + (states - 1) * np.arange(len(slow))
