@@ -10,6 +10,8 @@ import xarray
 import pellicle as pl
 from pellicle.cli import app
 from pellicle.errors import DataError, UsageError
+from pellicle.mapping.trace import lost
+from pellicle.mapping.trace_light import Light
 from pellicle.mapping.trace_path import KINK, Candidates, trace_path
 
 LASER, INDEX = 633.0, 1.46
@@ -156,3 +158,14 @@ def test_the_path_is_the_cheapest_of_all():
     monotonic = min(min(price(np.array(path), way) for path in every) for way in (1, -1))
     assert trace_path(t, candidates, monotonic=True).price == pytest.approx(monotonic)
     assert monotonic > min(costs)
+
+
+def test_a_path_that_does_not_follow_the_light_is_told():
+    time = np.arange(400.0)
+    noise = 0.01 * np.random.default_rng(0).standard_normal((400, 1))
+    about = Light(noise, time, np.array([0.01]), np.ones(1), (None, None))
+    assert not lost(noise + 0.03 * np.sin(time / 30)[:, None], about).any()  # a laser that drifts
+    away = noise.copy()
+    away[200:230] += 0.2
+    assert lost(away, about)[205:225].all()
+    assert not lost(away, about)[:180].any()

@@ -179,5 +179,5 @@ def compare(
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     options = {"tolerance": tolerance, "residual": residual, "progress": progress}
     own = shared_by_each(scenes, shared)
-    data, _ = _covered(data, *scenes.values())
-    return compare_fits({n: fit(data, scene, shared=own[n], **options) for n, scene in scenes.items()})
+    measured, _ = _covered(data, *scenes.values())
+    return compare_fits({n: fit(measured, scene, shared=own[n], **options) for n, scene in scenes.items()})

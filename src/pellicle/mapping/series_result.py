@@ -182,4 +182,6 @@ def _warnings(
         sentences.append(
             f"the order of {100 * share:.3g} % of the times is not decided, by continuity neither"
         )
+    if share := np.mean(codes[used] == CODES[str(Status.MISFIT)]):
+        sentences.append(f"the model does not follow the data at {100 * share:.3g} % of the times")
     return tuple(sentences)

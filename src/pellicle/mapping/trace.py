@@ -51,6 +51,9 @@ _APART = 3.0
 """Distance in standard errors below which the thicknesses of two fits are the same."""
 _OTHERS, _FAR = 16, 40.0
 """Most other paths whose likelihood is computed, and the Δχ² of the path from which none is."""
+_STRETCH, _LOST = 16, 0.1
+"""Fewest times over which residuals are averaged, and their size, beyond noise and as a share of the range of
+the light, at which a path has lost it: a laser that drifts by 3 % leaves less."""
 _STEP = 0.125
 """Largest change of a thickness in a pass, in wavelengths in the film."""
 
@@ -82,10 +85,19 @@ class Trace(NamedTuple):
         reduced[used] = np.mean((joined.residual / light.noise) ** 2, axis=1)
         dataset["chi2_reduced"] = dataset["status"].dims, reduced
         status = np.full(len(time), CODES[NO_DATA], np.uint8)
-        status[used] = CODES[str(Status.AMBIGUOUS)]
+        astray = lost(joined.residual, light)
+        status[used] = CODES[str(Status.MISFIT if astray.any() else Status.AMBIGUOUS)]
         dataset["status"] = dataset["status"].copy(data=status)
         order = OrderPath(np.zeros(len(used), int), rival[nearest][used], np.zeros(len(used), bool))
         return Joined(order, _with_effects(light.part(used), fit, joined), kinds, used)
+
+
+def lost(residual: np.ndarray, light: Light) -> np.ndarray:
+    """True at times (times,) around which the best path does not follow the light (times, wavelengths)."""
+    size = max(_STRETCH, len(residual) // 40)
+    square = np.array([np.convolve(x**2, np.full(size, 1 / size), "same") for x in residual.T]).T
+    beyond = np.sqrt(np.maximum(square - light.noise**2, 0.0)) / light.span
+    return np.any((square > 2 * light.noise**2) & (beyond > _LOST), axis=1)
 
 
 def is_trace(cube: Cube) -> bool:
