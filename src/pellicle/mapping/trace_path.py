@@ -103,13 +103,19 @@ def _path(time: np.ndarray, candidates: Candidates, way: int) -> TracePath:
         np.minimum.at(backward, before[t - 1], ahead)
         least[t - 1] = np.min(forward[t - 1] + backward, axis=1)
     np.minimum.at(least[0], before[0], forward[1] + backward)
-    chosen, k = np.empty(count, int), int(np.argmin(forward[-1]))
-    chosen[-1], p = divmod(k, near)
-    for t in range(count - 1, 0, -1):
-        chosen[t - 1] = before[t - 1][chosen[t], p]
-        p = origin[t][chosen[t], p]
+    chosen = _traced(forward[-1], origin, before)
     best = float(forward[-1].min())
     with np.errstate(invalid="ignore"):
         left = np.nan_to_num(least - best, nan=np.inf, posinf=np.inf)
     left[candidates.same(chosen)] = np.inf
     return TracePath(chosen, left.min(axis=1), best)
+
+
+def _traced(last: np.ndarray, origin: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """The best path (windows,) back from the prices (candidates, those before) at the `last` window."""
+    chosen = np.empty(len(origin), int)
+    chosen[-1], pair = divmod(int(np.argmin(last)), last.shape[1])
+    for t in range(len(origin) - 1, 0, -1):
+        chosen[t - 1] = before[t - 1][chosen[t], pair]
+        pair = origin[t][chosen[t], pair]
+    return chosen
