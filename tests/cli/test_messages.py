@@ -62,7 +62,7 @@ def test_every_flag_of_a_command_can_be_named_and_every_name_is_a_flag():
     arguments = [argument for name in commands for argument in app[name].assemble_argument_collection()]
     flags = {argument.name for argument in arguments if argument.name.startswith("--")}
     assert set(flag_names().values()) <= flags
-    positional = {"--film", "--data", "--name"}
+    positional = {"--film", "--data", "--folder", "--name"}
     assert flags - set(flag_names().values()) == positional
 
 

@@ -86,7 +86,7 @@ def test_a_comparison_reports_and_saves_itself(fit, with_part, tmp_path):
     worse = with_part(fit, curve=replace(fit.curve, model=fit.curve.model + 0.01))
     pairs = (("one", fit, 0.0), ("two", worse, 30.0))
     comparison = fits.Comparison(
-        tuple(fits.Candidate(name, x, 1, d, d + 2, d + 3) for name, x, d in pairs), 20.0
+        tuple(fits.Candidate(name, x, 1, d, d + 2, d + 3, -d / 2) for name, x, d in pairs), 20.0
     )
     assert comparison.report() == pl.report(comparison)
     assert comparison._repr_html_().startswith("<pre>[[Verdict]]")

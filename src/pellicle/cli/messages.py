@@ -33,7 +33,7 @@ _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
 _COMMAND_ARGUMENTS = (
     *("depth", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats", "strip"),
-    *("family", "thickness_map", "time_from", "to"),
+    *("family", "idle", "no_page", "thickness_map", "time_from", "to"),
 )
 """Flags that one command has outside the groups of `pellicle.cli.flags`."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}
