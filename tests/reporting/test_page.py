@@ -240,7 +240,8 @@ def test_the_best_of_a_comparison_is_first_and_the_others_curves_can_be_shown(fi
     missing = replace(fit.curve, model=fit.curve.model + 0.02)
     worse = replace(with_part(fit, curve=missing), rivals=())
     pairs = (("<b>a.toml", worse, 30.0), ("b c.toml", fit, 0.0))
-    comparison = Comparison(tuple(Candidate(name, x, 1, d, d + 2, d + 3, -d / 2) for name, x, d in pairs), 20.0)
+    every = tuple(Candidate(name, x, 1, d, d + 2, d + 3, -d / 2) for name, x, d in pairs)
+    comparison = Comparison(every, 20.0)
     page = Page(comparison_page(comparison, ["a/report.html", None]))
     assert not page.open
     figure = page.figures["data-0"]
