@@ -354,7 +354,8 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
-    helps, names = [], "fit sample simulate plan compare cost chart explore export map series watch materials read"
+    names = "fit sample simulate plan compare cost chart explore export map series watch materials read"
+    helps = []
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])
         main()
