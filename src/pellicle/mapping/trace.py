@@ -197,7 +197,7 @@ class _Fitter(NamedTuple):
         `rival`, or those of their own size and correlation."""
         depth, own, bands = self.depth, len(self.kinds), light.values.shape[1]
         lower, upper = bounds(self.model.parameters)
-        free = [i for i in range(2) if light.known[i] is None]
+        free = light.free
         every = (
             *(SLOWLY if kind == MONOTONIC else kind for kind in self.kinds),
             *[SHARED] * (bands * len(free)),
@@ -212,16 +212,8 @@ class _Fitter(NamedTuple):
         like, breaks = None if rival is None else rival.smoothed, np.zeros(len(light.time), bool)
         fit, moved, settled = None, np.inf, False
         for number in range(_PASSES):
-            there = signals_at(self.model, np.clip(rest, 0.0, 1.0))
-            slope = np.zeros((*light.values.shape, len(every)))
-            slope[..., :own] = gain[:, 0, None] * np.asarray(there.slope) * (upper - lower)
-            signal, columns = np.asarray(there.signal), [rest]
-            for k, i in enumerate(free):
-                at = own + k * bands + np.arange(bands)
-                slope[:, np.arange(bands), at] = scales[:, i] * (signal if i == 0 else 1.0)
-                columns.append(np.tile(gain[:, i] / scales[:, i] + (0.5 if i else 0.0), (len(rest), 1)))
-            point, known = np.concatenate(columns, axis=1), np.isfinite(light.values)
-            residual = np.where(known, light.values - gain[:, 0] * signal - gain[:, 1], 0.0)
+            slope, residual, point = self._linear(light, rest, gain, scales)
+            known = np.isfinite(light.values)
             weights = _weights(residual, known, light, number > 1) if rival is None else rival.weight
             quadratics = self._quadratics(slope, weights, residual, point)
             again = moved < _NEARLY and not settled  # the stiffness of the right path
@@ -242,6 +234,25 @@ class _Fitter(NamedTuple):
                 break
         assert fit is not None
         return fit
+
+    def _linear(
+        self, light: Light, rest: np.ndarray, gain: np.ndarray, scales: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Slopes (times, wavelengths, parameters) of the light, residuals (times, wavelengths), 0 where it
+        is absent, and the point (times, parameters) of the scene's parameters `rest` and of the gains and
+        offsets `gain` (wavelengths, 2), in their `scales`."""
+        lower, upper = bounds(self.model.parameters)
+        own, bands = len(self.kinds), light.values.shape[1]
+        there = signals_at(self.model, np.clip(rest, 0.0, 1.0))
+        signal, columns = np.asarray(there.signal), [rest]
+        slope = np.zeros((*light.values.shape, own + bands * len(light.free)))
+        slope[..., :own] = gain[:, 0, None] * np.asarray(there.slope) * (upper - lower)
+        for k, i in enumerate(light.free):
+            at = own + k * bands + np.arange(bands)
+            slope[:, np.arange(bands), at] = scales[:, i] * (signal if i == 0 else 1.0)
+            columns.append(np.tile(gain[:, i] / scales[:, i] + (0.5 if i else 0.0), (len(rest), 1)))
+        residual = light.values - gain[:, 0] * signal - gain[:, 1]
+        return slope, np.where(np.isfinite(residual), residual, 0.0), np.concatenate(columns, axis=1)
 
     def _quadratics(
         self, slope: np.ndarray, weight: np.ndarray, residual: np.ndarray, point: np.ndarray

@@ -30,6 +30,11 @@ class Light(NamedTuple):
     span: np.ndarray
     known: tuple[float | None, float | None]
 
+    @property
+    def free(self) -> list[int]:
+        """0 and 1, as far as the gain and the offset are free."""
+        return [i for i, number in enumerate(self.known) if number is None]
+
     def part(self, which: np.ndarray) -> Light:
         """The light at some of the times."""
         return self._replace(values=self.values[which], time=self.time[which])
