@@ -48,7 +48,7 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
     else:
         time, unit, where = _times(list(paths), time_from or BY_NAME)
         known = np.flatnonzero(np.isfinite(time))
-        where += f", {len(paths) - known.size} files without one left out" * (known.size < len(paths))
+        where += f", files without one left out: {len(paths) - known.size}" * (known.size < len(paths))
         time, paths = np.asarray(time)[known], [paths[int(i)] for i in known]
         names = [path.name for path in paths]
         for path in [] if spectra else paths:

@@ -65,7 +65,7 @@ def read_trace(path: Path, asked: Asked) -> RawCube:
     calibrated = reflected or passed
     note = "" if calibrated else "values in an arbitrary unit: no head names a reflectance R"
     left = [heads[i] for i in range(1, len(heads)) if i not in [at for at, _ in columns]]
-    notes = [f"trace: {len(time)} times, a column for each of {len(nm)} wavelengths", note, *table.notes]
+    notes = [f"trace: {len(time)} times, wavelengths: {len(nm)}, a column for each", note, *table.notes]
     notes += [f"columns left out, whose heads name no wavelength: {', '.join(left)}"] if left else []
     rows = np.stack(values, axis=1)[:, order]
     return RawCube(
