@@ -7,7 +7,6 @@ whose number does not count; wavelengths in nm.
 import re
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from pellicle.data.tabular.text import decoded
 from pellicle.errors import DataError
@@ -100,6 +99,8 @@ def table(content: bytes, name: str) -> optical.MaterialFile:
         if np.any(np.diff(nm) <= 0):
             raise DataError(f"the wavelengths of the table {name!r} do not rise; sort them in Regress Pro")
         fine = np.union1d(nm, np.arange(np.ceil(nm[0]), nm[-1], _STEP))
+        from scipy.interpolate import CubicSpline  # imports half of SciPy, which few files need
+
         n, k = (CubicSpline(nm, x, bc_type="natural")(fine) for x in values)
         return optical.table(fine, n, np.maximum(k, 0.0))._replace(format="table of a Regress Pro recipe")
     raise DataError(f"has no table of a medium {name!r}; its tables: {', '.join(known) or 'none'}")
