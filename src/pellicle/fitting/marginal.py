@@ -93,7 +93,9 @@ def marginal(
     by_range = -0.5 * deviance + 0.5 * np.linalg.slogdet(covariance)[1]
     log_share = by_range + np.where(area > -np.inf, area, 0.0)
     stderr = np.sqrt(np.maximum(np.einsum("pij,pjk,pik->pi", slope, covariance, slope), 0.0))
-    wide, at = np.sqrt(2 * np.einsum("pii->pi", covariance)), np.reshape(unit, (fits, count))
+    # where noise is all but absent, a variance may round below zero
+    variance, at = np.maximum(np.einsum("pii->pi", covariance), 1e-200), np.reshape(unit, (fits, count))
+    wide = np.sqrt(2 * variance)
     inside = 0.5 * np.asarray(_erf((1 - at) / wide) + _erf(at / wide), float)
     gaussian = np.abs(np.einsum("pii->pi", system.priors)[:, :count])  # 1/σ of a prior that is not uniform
     density = np.where(gaussian > 0, np.log(np.maximum(gaussian, 1e-300)), _HALF_LOG_2PI)
