@@ -28,7 +28,7 @@ class LivePage:
         return report.live_page(*self._state(), title=self.title, count=self.live.done), policy()
 
     def answer(self, request: str, body: Any) -> dict[str, Any]:
-        """What is new since so many fits as the page has `seen`."""
+        """Parts of the page that changed since so many fits as it has `seen`."""
         if request != "news":
             return {"error": f"there is no request {request!r}"}
         done = self.live.done

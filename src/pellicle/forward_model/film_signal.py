@@ -26,7 +26,7 @@ from pellicle.optics import ellipsometry, plate
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
-from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned
+from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
 from pellicle.scene.free import free_leaves
 from pellicle.scene.layers import Interface, Layer
 
@@ -172,7 +172,7 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
         pairs: Any = zip(reference.layers, known.layers, strict=False)
         layers = [x if isinstance(x, Interface) else replace(x, material=y.material) for x, y in pairs]
         substrate = replace(reference.substrate, material=known.substrate.material)
-        scene = replace(scene, reference=reference.of(substrate, layers))
+        scene = replace(scene, reference=unchecked(reference, substrate=substrate, layers=tuple(layers)))
     check_common_range(media(scene), wavelength)
     return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
 

@@ -7,11 +7,11 @@ again after each pass.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from inspect import signature
 from logging import getLogger
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -20,7 +20,7 @@ from pellicle.data.cube import Cube
 from pellicle.data.read_cube import read_cube, series_files
 from pellicle.errors import UsageError
 from pellicle.fitting.batch import polish
-from pellicle.fitting.batch.data import CODES, BatchData, batch_data
+from pellicle.fitting.batch.data import CODES
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME, elapsed
@@ -31,6 +31,7 @@ from pellicle.mapping.pixels import PixelModel, prepare
 from pellicle.mapping.run import map_cube
 from pellicle.mapping.series_residuals import residuals
 from pellicle.mapping.series_result import SURE, Joined, Series, series_of
+from pellicle.mapping.series_spectra import Spectra
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.store import variable_name
 from pellicle.mapping.trace import is_trace, trace_of, undecided
@@ -53,10 +54,6 @@ _ORDERS = 12
 _DRIFT = 1.0
 """Standard deviation of how much of its size a systematic effect drifts from the middle of the series to an
 end: with 0.5 an index that drifts by 0.003 left 6 % of the true rates outside two errors."""
-_MOST_RESPONSES = 8192
-"""Times whose changes by systematic effects are computed."""
-_BLOCK = 4096
-"""Times that are linearised at once."""
 
 
 def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
@@ -97,7 +94,8 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None 
         raise UsageError('varies = "monotonic" is of the thickness of a trace: write "slowly" for spectra')
     with jax.enable_x64(True):
         joined = (join or _joined)(model, cube, dataset, time, kinds)
-        left = residuals(model, cube, time, joined.used, joined.smoothed.mean) if join is None else {}
+        spectra = Spectra(model, cube, joined.used)
+        left = residuals(spectra, time, joined.smoothed.mean) if join is None else {}
     found = series_of(made, dataset, model.parameters, (time, unit), joined)
     return replace(found, dataset=found.dataset.assign(left))
 
@@ -130,44 +128,6 @@ def _kinds(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
     return kinds
 
 
-class _Spectra(NamedTuple):
-    """The spectra of the times with data `used` (times,), and their model."""
-
-    model: PixelModel
-    cube: Cube
-    used: np.ndarray
-
-    def blocks(self) -> Iterator[tuple[slice, BatchData]]:
-        """Some of the times, and their data."""
-        for first in range(0, len(self.used), _BLOCK):
-            which = self.used[first : first + _BLOCK]
-            block = self.cube.pixels((slice(int(which[0]), int(which[-1]) + 1),))
-            own = {name: rows[which - which[0]] for name, rows in block.items()}
-            yield slice(first, first + _BLOCK), batch_data(own, self.model.problem.views[0].noise)
-
-    def quadratic(self, units: np.ndarray) -> polish.Curved:
-        """Slopes and curvatures of the misfits at points (times, parameters) of the unit cube."""
-        static, common = self.model.search.static, self.model.search.common
-        parts = [
-            polish.in_rows(polish.curved, static, common, data, units[own]) for own, data in self.blocks()
-        ]
-        return polish.Curved(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    def responses(self, units: np.ndarray) -> np.ndarray:
-        """Changes (times, effects, parameters) by systematic effects, of the fits of each time alone.
-
-        Those of a long series are interpolated between some of its times.
-        """
-        every = np.arange(len(self.used))
-        at = every[:: -(-len(every) // _MOST_RESPONSES)]
-        some = self._replace(used=self.used[at])
-        changes = np.concatenate(
-            [self.model.errors.responses(data, units[at][own]) for own, data in some.blocks()]
-        )
-        columns = [np.interp(every, at, column) for column in changes.reshape(len(at), -1).T]
-        return np.array(columns).T.reshape(len(every), *changes.shape[1:])
-
-
 def _joined(
     model: PixelModel, cube: Cube, dataset: Dataset, time: np.ndarray, kinds: tuple[str, ...]
 ) -> Joined:
@@ -183,7 +143,7 @@ def _joined(
     used = np.flatnonzero(np.isfinite(delta).any(axis=1))
     if used.size < 3:
         raise UsageError(f"a series needs spectra at three times at least, and {used.size} have data")
-    time, minima, noise, spectra = time[used], minima[used], noise[used], _Spectra(model, cube, used)
+    time, minima, noise, spectra = time[used], minima[used], noise[used], Spectra(model, cube, used)
     limits = np.asarray(dataset["status"])[used] == CODES[str(Status.NOT_IDENTIFIABLE)]
     systematic = _systematic(dataset, names[depth], used)
     known = _known_error(noise[:, depth], np.maximum(minima[:, 0, depth], systematic), limits)
@@ -209,7 +169,7 @@ def _joined(
 
 
 def _settled(
-    spectra: _Spectra,
+    spectra: Spectra,
     about: tuple[np.ndarray, tuple[str, ...], np.ndarray, float],
     units: np.ndarray,
     factor: np.ndarray,

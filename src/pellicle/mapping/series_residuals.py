@@ -6,37 +6,30 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cube import Cube
 from pellicle.fitting.batch import polish
-from pellicle.fitting.batch.data import batch_data
 from pellicle.mapping.growth import TIME
-from pellicle.mapping.pixels import PixelModel
+from pellicle.mapping.series_spectra import Spectra
 
 SHOWN, WORST, WAVELENGTH = "time_shown", "time_worst", "wavelength"
-_MOST, _WORST, _BLOCK = 400, 3, 4096
-"""Times of the image at most, spectra that are kept as the worst, and times that are computed at once."""
+_MOST, _WORST = 400, 3
+"""Times of the image at most, and spectra that are kept as the worst."""
 
 
-def residuals(
-    model: PixelModel, cube: Cube, time: np.ndarray, used: np.ndarray, units: np.ndarray
-) -> dict[str, tuple[Any, ...]]:
+def residuals(spectra: Spectra, time: np.ndarray, units: np.ndarray) -> dict[str, tuple[Any, ...]]:
     """Variables of the residuals of a series, as `xarray.Dataset.assign` takes them, with coordinates.
 
     `residual_rms` (times,), that of all points of a time; `residual` (times shown, wavelengths), data − fit
     at evenly spaced times; `worst_data` and `worst_fit` (worst times, wavelengths), the spectra of the
     largest rms. Of Ψ and Δ the residuals are the sizes of those of N, C, S, and there are no worst spectra.
 
-    **Arguments:** `time` of the cube, the positions `used` of times with data, and the parameters of these in
-    the `units` of the unit cube (times, parameters).
+    **Arguments:** `time` of the cube, and the parameters of the `spectra` in the `units` of the unit cube
+    (times, parameters).
     """
-    search, view = model.search, model.problem.views[0]
+    search, cube, used = spectra.model.search, spectra.cube, spectra.used
     step, single, worst = max(-(-len(time) // _MOST), 1), search.view.channels == 1, []
     rms, image = np.full(len(time), np.nan), np.full((len(time[::step]), cube.wavelength.size), np.nan)
-    for first in range(0, len(used), _BLOCK):
-        which = used[first : first + _BLOCK]
-        block = cube.pixels((slice(int(which[0]), int(which[-1]) + 1),))
-        data = batch_data({name: rows[which - which[0]] for name, rows in block.items()}, view.noise)
-        at = np.clip(units[first : first + _BLOCK], 0.0, 1.0)
+    for own, data in spectra.blocks():
+        which, at = used[own], np.clip(units[own], 0.0, 1.0)
         fit = polish.in_rows(polish.at_best, search.static, search.common, data, at).model
         known = data.weight > 0
         left = np.where(known, data.values - fit, np.nan).reshape(len(which), -1, search.view.channels)

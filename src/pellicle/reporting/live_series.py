@@ -108,7 +108,7 @@ def live_page(
 
 
 def news(fits: Sequence[LiveFit], parameters: Sequence[Parameter], unit: str) -> dict[str, Any]:
-    """What changes on the page: a sentence, the latest files, and the figure."""
+    """Parts of the page that change: a sentence, the latest files, and the figure."""
     failed = sum(bool(fit.error) for fit in fits)
     decided = sum(fit.status in _DECIDED for fit in fits)
     counted = f"{len(fits)} files: {decided} decided, {len(fits) - decided - failed} not, {failed} not fitted"

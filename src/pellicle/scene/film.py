@@ -5,10 +5,9 @@ marks an absent effect, which costs nothing.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, TypeVar, final
 
 import equinox as eqx
 import jax
@@ -39,6 +38,8 @@ from pellicle.signals.base import Signal
 from pellicle.signals.contrast import FORMS
 from pellicle.signals.registry import SIMULATED, of_light
 
+Whole = TypeVar("Whole")
+
 
 @final
 class Reference(eqx.Module):
@@ -68,14 +69,6 @@ class Reference(eqx.Module):
                 "a `reference` is known: give its thicknesses and indices as plain numbers, or tie them to"
                 ' those of the sample, as in thickness = "oxide.thickness"'
             )
-
-    def of(self, substrate: Substrate, layers: Sequence[Layer | Interface | Plate]) -> "Reference":
-        """Return the reference of this form with another substrate and other layers, which are not checked:
-        they may have numbers that a simulation changes."""
-        other = object.__new__(Reference)
-        for name, own in (vars(self) | {"substrate": substrate, "layers": tuple(layers)}).items():
-            object.__setattr__(other, name, own)
-        return other
 
 
 POLARISATIONS = ("unpolarised", "s", "p")
@@ -296,11 +289,11 @@ def of_reference(scene: Scene) -> Scene:
     )
 
 
-def unchecked(scene: Scene, **parts: Any) -> Scene:
-    """Return a scene with other parts, without checks: its numbers may have bounds that nobody chose, as an
-    aperture of 0 to 1 beside an oblique angle."""
-    other = object.__new__(Scene)
-    for name, own in (vars(scene) | parts).items():
+def unchecked(whole: Whole, **parts: Any) -> Whole:
+    """Return a scene, or a reference, with other parts, without checks: its numbers may have bounds that
+    nobody chose, as an aperture of 0 to 1 beside an oblique angle."""
+    other = object.__new__(type(whole))
+    for name, own in (vars(whole) | parts).items():
         object.__setattr__(other, name, own)
     return other
 

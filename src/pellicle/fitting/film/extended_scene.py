@@ -244,7 +244,7 @@ class ExtendedScene:
 
         self._one_wafer = Content(own.substrate.material) == Content(opened.substrate.material)
         substrate = replace(own.substrate, material=below) if self._one_wafer else known(own.substrate)
-        return own.of(substrate, [known(x) for x in own.layers])
+        return unchecked(own, substrate=substrate, layers=tuple(map(known, own.layers)))
 
     def _on_reference(self, layers: Sequence[Any]) -> Reference | None:
         """The reference of a stack: on a substrate that the sample has too lies the same oxide, unless the
@@ -262,7 +262,7 @@ class ExtendedScene:
             same = isinstance(own, Layer) and Content(foot.material) == Content(own.material)
         if not same and not any(isinstance(x, Layer) for x in added):
             added = []
-        return reference.of(reference.substrate, [*reference.layers, *added])
+        return unchecked(reference, layers=(*reference.layers, *added))
 
     def _faces(self, layers: list[Any]) -> list[Any]:
         """The layers with a roughness, an oxide and a mixed interface of no size."""
