@@ -93,7 +93,13 @@ def test_any_file_is_read_or_refused_in_one_sentence(path, content):
 
 #: What a column can hold, as the tables of README and the file formats name it.
 ROLES = {
-    *("wavelength", "R", "T", "intensity", "counts", "sigma", "angle"),
+    *("wavelength", "R", "T", "intensity", "counts", "sigma", "angle", "azimuth", "contrast"),
+    *(
+        f"{of}_{ratio}"
+        for of in ("psi", "delta", "sigma_psi", "sigma_delta")
+        for ratio in ("ane", "aps", "asp")
+    ),
+    *(f"{of}m{row}{column}" for of in ("", "sigma_") for row in range(1, 5) for column in range(1, 5)),
     *("psi", "delta", "sigma_psi", "sigma_delta", "N", "C", "S", "alpha", "beta", "analyser"),
     *("depolarisation", "sigma_depolarisation", "tan_psi", "cos_delta"),
     *("processed", "sample counts", "reference counts", "dark counts", "foreign"),
