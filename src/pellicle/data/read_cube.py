@@ -105,32 +105,19 @@ def read_cube(
     """
     if isinstance(source, Cube):
         return source
-    if signal is not None and signal not in SIGNALS:
-        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
-    if polarisation is not None and polarisation not in POLARISATIONS:
-        raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
-    if white_frame is None and any(x is not None for x in (dark_frame, white_reflectance, saturation)):
-        raise UsageError(
-            "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
-        )
+    camera = {"dark_frame": dark_frame, "white_reflectance": white_reflectance, "saturation": saturation}
+    _check_arguments(signal, polarisation, white_frame, camera)
     given, unit = (None, "") if wavelengths is None else checks.parse_wavelengths(wavelengths)
     raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, signal), time_from)
     nm, notes = checks.in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
     bands, told = checks.chosen_bands(nm, range, without_bands, raw.good, raw.path)
     notes = [*raw.notes, *notes, *told]
-    kind = signal or raw.signal or "R"
-    if signal is raw.signal is None:
-        notes.append('signal: R, assumed; give `signal="T"` for transmittance')
-    if (kind == "psi-delta") != ("delta" in raw.arrays):
-        raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
+    kind, told = _kind(raw, signal)
+    notes += told
     frames = None
     if white_frame is not None:
-        if raw_cube.ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
-            raise UsageError(
-                f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
-            )
-        white, dark = _raw_frame(white_frame, raw), dark_frame
-        dark = None if dark is None else _raw_frame(dark, raw)
+        dark = None if dark_frame is None else _raw_frame(dark_frame, raw)
+        white = _raw_frame(white_frame, raw)
         frames, told = camera_frames(raw, nm, white, dark, white_reflectance, saturation)
         notes += told
     calibrated = raw.calibrated if calibrated is None else calibrated
@@ -163,6 +150,29 @@ def read_cube(
     cube = _with_fingerprint(cube, raw, [x for x in (white_frame, dark_frame) if x is not None], facts)
     log.info("%s", cube)
     return cube
+
+
+def _check_arguments(
+    signal: str | None, polarisation: str | None, white_frame: Any, camera: Mapping[str, Any]
+) -> None:
+    """Check the names that a cube can have, and that counts of a camera have a white reference."""
+    if signal is not None and signal not in SIGNALS:
+        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
+    if polarisation is not None and polarisation not in POLARISATIONS:
+        raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
+    if white_frame is None and any(x is not None for x in camera.values()):
+        raise UsageError(
+            "`dark_frame`, `white_reflectance` and `saturation` need `white_frame`: the counts of white"
+        )
+
+
+def _kind(raw: raw_cube.RawCube, signal: str | None) -> tuple[str, list[str]]:
+    """Return the signal of a cube and a note where it is assumed. Raises UsageError."""
+    kind = signal or raw.signal or "R"
+    if (kind == "psi-delta") != ("delta" in raw.arrays):
+        raise UsageError(f"{raw.path}: psi-delta needs variables named psi and delta: name both in the file")
+    assumed = 'signal: R, assumed; give `signal="T"` for transmittance'
+    return kind, [assumed] if signal is raw.signal is None else []
 
 
 def _raw(source: Any, asked: raw_cube.Asked, time_from: str | None = None) -> raw_cube.RawCube:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.cubes.raw_cube import WAVELENGTH, RawCube, Stored
+from pellicle.data.cubes.raw_cube import ANGLE, WAVELENGTH, RawCube, Stored
 from pellicle.data.photographs import image_format
 from pellicle.data.read_spectrum import read_spectrum
 from pellicle.errors import DataError, UsageError, decoding, needs
@@ -63,6 +63,10 @@ def camera_frames(
     `reflectance` of the white is a number, a CSV or a function of the wavelength. Raises DataError or
     UsageError.
     """
+    if ANGLE in raw.arrays["values"].axes or "delta" in raw.arrays:
+        raise UsageError(
+            f"{raw.path}: `white_frame` is for a cube of counts against wavelength only: leave it out"
+        )
     bright, note = _frame(white, raw, "white")
     notes, black = [note], None
     if dark is None:
