@@ -1,0 +1,1 @@
+"""Identification of films: hypotheses about an unknown sample, weighed by their evidence."""
