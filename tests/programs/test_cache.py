@@ -49,9 +49,9 @@ def test_a_program_that_calls_lapack_runs_in_a_new_process(tmp_path):
 
 
 def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(program_cache, "_OPTIONS", {"xla_of_another_version": True})
+    monkeypatch.setattr(program_cache, "_OPTIONS", {"some": {"xla_of_another_version": True}})
     monkeypatch.setattr(program_cache, "compiler_options", program_cache.compiler_options.__wrapped__)
-    path, options = tmp_path / "programs" / "one", program_cache.compiler_options()
+    path, options = tmp_path / "programs" / "one", program_cache.compiler_options("some")
     program = program_cache.make(path, KEY, lambda x: [x + 1], VECTOR, tmp_path, options)
     np.testing.assert_array_equal(program(np.arange(3.0))[0], [1, 2, 3])
 
@@ -181,10 +181,11 @@ def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_pr
 @pytest.mark.parametrize("cached", [True, False])
 def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached, refuses):
     """XLA refuses an option that it does not have."""
-    monkeypatch.setattr(program_cache, "compiler_options", lambda: {"xla_of_another_version": True})
+    of_another_version = {"some": {"xla_of_another_version": True}, "many": {}}
+    monkeypatch.setattr(program_cache, "compiler_options", of_another_version.get)
     if not cached:
         jax.config.update("jax_compilation_cache_dir", None)
-    assert kept(plain_scaled, many_calls=True)(2, np.arange(4.0)).total == 12
+    assert kept(plain_scaled, calls="many")(2, np.arange(4.0)).total == 12
     refuses(jax.errors.JaxRuntimeError, "xla_of_another_version", scaled, 2, np.arange(5.0))
 
 

@@ -23,7 +23,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any, TypeAlias, get_type_hints
+from typing import Any, Literal, TypeAlias, get_type_hints
 
 import jax
 import numpy as np
@@ -118,32 +118,38 @@ def _is_private(handle: int) -> bool:
 log = logging.getLogger(__name__)
 
 Program: TypeAlias = Callable[..., Any]
-Options: TypeAlias = dict[str, str | bool]
+Options: TypeAlias = dict[str, str | bool | int]
 """Options of XLA."""
 
 LIMIT = 256 * 2**20
 """Size of the folder (bytes) above which its oldest files are removed. A program takes 0.05 to 1 MB."""
 
-_OPTIONS: Options = {"xla_cpu_use_fusion_emitters": False}
+Calls: TypeAlias = Literal["few", "some", "many"]
+"""How often one fit calls a program: once or twice, in a loop or for many candidates, for every pixel."""
+
+_SOME: Options = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
+_FEW: Options = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
+_OPTIONS: dict[Calls, Options] = {"few": _SOME | _FEW, "some": _SOME, "many": {}}
 """XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
 most run as fast within 20 %, those of a slow scale and offset a third slower (jaxlib 0.10, by
-`benchmarks/fit.py` and `benchmarks/cold_start.py`). Derivatives of hundreds of spectra at once run at a third
-to two thirds of the speed (`benchmarks/map.py`): such programs are called often, and have no options."""
+`benchmarks/fit.py` and `benchmarks/cold_start.py`). In one piece a program takes 10 to 35 % less, and without
+optimisation half; it then runs at a third of the speed. Derivatives of hundreds of spectra at once run at a
+third to two thirds of the speed (`benchmarks/map.py`): such programs have no options."""
 
 _DIGEST = hashlib.sha256().digest_size
 _CALLS = re.compile(r"custom_call @([\w.]+)")
 
 
-@lru_cache(maxsize=1)
-def compiler_options() -> Options:
-    """Options of XLA for the programs of a fit; none for a GPU, or for an XLA that lacks them."""
-    if jax.default_backend() != "cpu":
+@lru_cache(maxsize=3)
+def compiler_options(calls: Calls) -> Options:
+    """Options of XLA for programs of so many calls; none for a GPU, or for an XLA that lacks them."""
+    if jax.default_backend() != "cpu" or not _OPTIONS[calls]:
         return {}
     try:
-        jax.jit(lambda: 0.0).lower().compile(compiler_options=_OPTIONS)
+        jax.jit(lambda: 0.0).lower().compile(compiler_options=_OPTIONS[calls])
     except jax.errors.JaxRuntimeError:
         return {}
-    return _OPTIONS
+    return _OPTIONS[calls]
 
 
 def load(path: Path, key: bytes) -> Program | None:
@@ -213,17 +219,17 @@ def _loaded(content: bytes, key: bytes) -> Callable[..., Any]:
     return serialize_executable.deserialize_and_load(*program, execution_devices=jax.devices()[:1])
 
 
-def kept(function: Program, *, many_calls: bool = False) -> Program:
+def kept(function: Program, *, calls: Calls = "some") -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
-    its `repr` says all that the program depends on. The arrays are NumPy's. With `many_calls` it is compiled
-    to run fast, not in a short time.
+    its `repr` says all that the program depends on. The arrays are NumPy's. With many `calls` it is compiled
+    to run fast, with few in a short time.
     """
 
     @lru_cache(maxsize=1)
     def jitted() -> Program:  # at the first call, which starts JAX's backend anyway
-        return jax.jit(function, static_argnums=0, compiler_options=_options(many_calls))
+        return jax.jit(function, static_argnums=0, compiler_options=compiler_options(calls))
 
     @wraps(function)
     def call(plan: Hashable, *arguments: Any) -> Any:
@@ -233,7 +239,7 @@ def kept(function: Program, *, many_calls: bool = False) -> Program:
         leaves, structure = jax.tree_util.tree_flatten(arguments)
         arrays = [np.asarray(leaf) for leaf in leaves]
         shapes = tuple((a.shape, a.dtype) for a in arrays)
-        run, output = _load(function, many_calls, plan, structure, shapes, folder)
+        run, output = _load(function, calls, plan, structure, shapes, folder)
         # NumPy's arrays are views of the program's own, and cheaper to work on
         return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
 
@@ -242,7 +248,7 @@ def kept(function: Program, *, many_calls: bool = False) -> Program:
 
 @lru_cache(maxsize=128)
 def _load(
-    function: Program, many_calls: bool, plan: Hashable, structure: Any, shapes: tuple, folder: str
+    function: Program, calls: Calls, plan: Hashable, structure: Any, shapes: tuple, folder: str
 ) -> tuple[Program, Any]:
     """The program as a function of flat arrays, and the structure of its results."""
 
@@ -252,7 +258,7 @@ def _load(
     cache = Path(folder)
     from jaxlib.version import __version__ as jaxlib
 
-    about = function.__module__, function.__qualname__, many_calls, repr(plan), str(structure), str(shapes)
+    about = function.__module__, function.__qualname__, calls, repr(plan), str(structure), str(shapes)
     # versions, device and settings that change a program
     settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
     versions = jax.__version__, jaxlib, jax.default_backend(), _hardware(), os.environ.get("XLA_FLAGS", "")
@@ -261,17 +267,13 @@ def _load(
     inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
     run = load(path, key) if jax.default_backend() == "cpu" else None
     if run is None:
-        options = _options(many_calls)  # found by compiling, which a kept program needs not
+        options = compiler_options(calls)  # found by compiling, which a kept program needs not
         if jax.default_backend() == "cpu":
             run = make(path, key, flat, inputs, cache, options)
         if run is None:
             run = jax.jit(_traced(path.with_suffix(".export"), flat, inputs).call, compiler_options=options)
     kind = get_type_hints(function)["return"]
     return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
-
-
-def _options(many_calls: bool) -> Options:
-    return {} if many_calls else compiler_options()
 
 
 def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Any:

@@ -273,7 +273,7 @@ def _orthonormal(vectors: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray,
     return basis, triangle
 
 
-@partial(kept, many_calls=True)
+@partial(kept, calls="many")
 def scan(layout: Layout, lookup: Lookup, values: Any, weight_scale: Any) -> Candidates:
     """Best nodes of spectra (spectra, points), each with weights `weight_scale` (spectra,) times the
     common."""

@@ -124,7 +124,7 @@ def curved(static: Static, common: Common, rows: BatchData, units: Any) -> Curve
     return jax.vmap(one)(rows, units)
 
 
-@partial(kept, many_calls=True)
+@partial(kept, calls="many")
 def stepped(static: Static, common: Common, rows: BatchData, units: Any, damping: Any) -> Stepped:
     """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
 
@@ -159,7 +159,7 @@ def stepped(static: Static, common: Common, rows: BatchData, units: Any, damping
     return jax.vmap(one)(rows, units, damping)
 
 
-@partial(kept, many_calls=True)
+@partial(kept, calls="many")
 def at_best(static: Static, common: Common, rows: BatchData, units: Any) -> Best:
     """One step of spectra from points `units` (spectra, parameters) next to their minima, and the model
     there.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -67,7 +68,7 @@ class Local(NamedTuple):
     layer_slope: Array  # their derivatives, (2, points, parameters)
 
 
-@kept
+@partial(kept, calls="few")
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
     linear = linearised(form, scene, data, values)
