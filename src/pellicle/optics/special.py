@@ -10,7 +10,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.special
 
 from pellicle.optics.pair import custom_jvp, fori_loop, namespace
 
@@ -174,7 +173,11 @@ def _dawson_slope(primals, tangents):
 
 def erfc(x: Any) -> Any:
     """Return the complementary error function of a real array."""
-    return (scipy.special if namespace(x) is np else jax.scipy.special).erfc(x)
+    if namespace(x) is not np:
+        return jax.scipy.special.erfc(x)
+    from scipy.special import erfc as of_numbers  # slow to import
+
+    return of_numbers(x)
 
 
 @custom_jvp
