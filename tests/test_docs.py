@@ -45,6 +45,8 @@ EXIT_4 = (
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = (
+    "pellicle identify unknown.csv",  # cli/test_identify.py
+    "pellicle fit --recipe found/1.toml",  # identification/test_identify.py
     # compile for 4 to 30 s; what the test that is named covers
     "pellicle fit docs/examples/oxide_um_percent.csv --recipe docs/examples/oxide.rcp",  # recipes
     "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml",  # fitting/film/test_generalised.py
@@ -64,7 +66,6 @@ SLOW = (
     "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml",  # hard/test_anisotropic.py
     "pellicle compare film.csv",  # cli/test_compare_command.py
     "pellicle plan docs/examples/graded.toml",  # effects/test_plan.py
-    "pellicle plan-measurement docs/examples/nitride_film.toml",  # fitting/test_measurement_plan.py
     "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded",
     "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
@@ -355,8 +356,9 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
-    names = "fit sample simulate plan plan-measurement compare cost chart explore export map series watch"
-    names += " materials read"
+    names = (
+        "fit sample identify simulate plan compare cost chart explore export map series watch materials read"
+    )
     helps = []
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])

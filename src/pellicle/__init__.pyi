@@ -5,11 +5,11 @@ from pellicle import fitting as fitting
 from pellicle.api.fits import compare as compare
 from pellicle.api.fits import fit as fit
 from pellicle.api.fits import sample as sample
+from pellicle.api.identification import identify as identify
 from pellicle.api.maps import map as map
 from pellicle.api.maps import series as series
 from pellicle.api.plans import cost as cost
 from pellicle.api.plans import plan as plan
-from pellicle.api.plans import plan_measurement as plan_measurement
 from pellicle.api.simulations import depth_profile as depth_profile
 from pellicle.api.simulations import explore as explore
 from pellicle.api.simulations import export as export
@@ -30,6 +30,7 @@ from pellicle.dispersion import effective_medium, profiles
 from pellicle.dispersion.anisotropic import Anisotropic as Anisotropic
 from pellicle.fitting.result import Fit as Fit
 from pellicle.fitting.result import Status as Status
+from pellicle.identification.hypothesis import Identification as Identification
 from pellicle.mapping.map_result import Map as Map
 from pellicle.mapping.photograph import ThicknessMap as ThicknessMap
 from pellicle.mapping.series_result import Series as Series

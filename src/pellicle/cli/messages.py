@@ -33,8 +33,7 @@ _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
 _COMMAND_ARGUMENTS = (
     *("depth", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats", "strip"),
-    *("family", "idle", "no_page", "thickness_map", "time_from", "to"),
-    *("angles", "noise_degrees", "polarisations", "signals"),
+    *("allow", "among", "budget", "family", "idle", "no_page", "thickness_map", "time_from", "to"),
 )
 """Flags that one command has outside the groups of `pellicle.cli.flags`."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}

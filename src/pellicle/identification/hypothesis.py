@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.result import Estimate
+from pellicle.fitting.result import Estimate, ReportMixin
 from pellicle.recipes.dispersion_models import MODELS, build_model
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
@@ -113,6 +114,13 @@ class Hypothesis:
         return found | {x.name: x for x in self.instrument}
 
     @property
+    def status(self) -> str:
+        """Status as that of a fit: "misfit", "not-identifiable" without a thickness, or "converged"."""
+        if not self.adequate:
+            return "misfit"
+        return "converged" if math.isfinite(self.layers[0].thickness.stderr) else "not-identifiable"
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that it needs beside its layers."""
         return tuple(dict.fromkeys(word for word, _ in self.effect_numbers()))
@@ -154,8 +162,8 @@ class DecidingSignal:
     delta_ln_z: float
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, repr=False)
+class Identification(ReportMixin):
     """What spectra of one sample say about its layers.
 
     `hypotheses` are those that the data leave, the best first, and `excluded` the others that were tried,
@@ -182,3 +190,5 @@ class Identification:
 
     def __str__(self) -> str:
         return f"{self.status}: {self.verdict}"
+
+    __repr__ = __str__

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
 from pellicle.dispersion import critical_points, oscillators
 from pellicle.dispersion.anisotropic import ParameterLocation
 from pellicle.dispersion.base import AbstractDispersion, require_nonnegative
@@ -18,8 +20,9 @@ from pellicle.scene.free import Free, is_free
 from pellicle.scene.ties import Tied
 
 Parameter: TypeAlias = float | Free | Tied
-Values: TypeAlias = Mapping[str, "Parameter | Sequence[Parameter]"]
-"""Parameters of a model by name; of a spline one or one per knot, and its `knots` (nm)."""
+Values: TypeAlias = Mapping[str, "Parameter | np.ndarray | Sequence[Parameter]"]
+"""Parameters of a model by name, of several at once as arrays; of a spline one or one per knot, and its
+`knots` (nm)."""
 
 
 class ParameterSpec(NamedTuple):

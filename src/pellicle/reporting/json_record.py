@@ -42,7 +42,7 @@ def to_json(fit: Fit, posterior: Posterior | None = None) -> dict[str, Any]:
         "schema": SCHEMA,
         "data": data if fit.joint else data[0],
         **taken(fit, "status", "verdict"),
-        "parameters": {name: _parameter(p) for name, p in fit.parameters.items()},
+        "parameters": {name: parameter_record(p) for name, p in fit.parameters.items()},
         "rivals": [
             taken(rival, "parameters", "delta_chi2") | _known(rival, "probability", "stderr")
             for rival in fit.rivals
@@ -134,7 +134,8 @@ def _index(index: Index) -> list[dict[str, float]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def _parameter(p: Estimate) -> dict[str, Any]:
+def parameter_record(p: Estimate) -> dict[str, Any]:
+    """Convert the estimate of a parameter to dictionaries."""
     return {
         **taken(p, "value", "stderr", "stderr_noise", "expanded", "coverage_factor"),
         "degrees_of_freedom": p.effective_degrees_of_freedom,

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.accuracy.registry import Cost
 from pellicle.fitting.comparison import Comparison
-from pellicle.fitting.planned_measurement import MeasurementPlan
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
+from pellicle.identification.hypothesis import Identification
 from pellicle.mapping.photograph import ThicknessMap
 from pellicle.reporting import (
     comparison,
@@ -22,7 +22,7 @@ from pellicle.reporting import (
     figures,
     fit_text,
     folders,
-    measurement_plan,
+    identification,
     photograph_map,
     plans,
     posterior,
@@ -52,9 +52,9 @@ _WAYS: dict[type, _Ways] = {
         lambda folder, posterior: folders.write_fit(folder, posterior.fit, posterior),
     ),
     Comparison: _Ways(comparison.report, None, comparison.write_comparison),
+    Identification: _Ways(identification.report, None, identification.write_identification),
     Repeats: _Ways(repeats.report, None, repeats.write_repeats),
     Plan: _Ways(plans.report),
-    MeasurementPlan: _Ways(measurement_plan.report),
     Cost: _Ways(cost.text, cost.draw, cost.write_cost),
     ThicknessMap: _Ways(photograph_map.report, photograph_map.draw, photograph_map.write_map),
 }

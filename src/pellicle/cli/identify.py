@@ -1,0 +1,100 @@
+"""`pellicle identify`: the film on a known substrate, from files of one sample."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from pellicle.cli.batch import written
+from pellicle.cli.flags import OUTPUT, SCENE, FileFlags, flag, switch
+from pellicle.cli.messages import show
+from pellicle.cli.reading import check_words, is_of_colours, read
+from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
+from pellicle.data.options import FileOptions, parse_number
+from pellicle.errors import UsageError
+
+
+def identify(
+    *data: Annotated[str, Parameter(help="Files of one sample, which count together.")],
+    substrate: Annotated[str | None, flag(SCENE, "Substrate: a material (Si), an index or a file.")] = None,
+    back: Annotated[str | None, flag(SCENE, "Medium behind the substrate, where it is a plate.")] = None,
+    ambient: Annotated[str | None, flag(SCENE, "Medium in front of the film (air).")] = None,
+    among: Annotated[str | None, flag(SCENE, "Materials to try: SiO2,Si3N4.")] = None,
+    family: Annotated[
+        str | None,
+        flag(SCENE, "Films to try: oxide, nitride, fluoride, polymer, semiconductor or metal; or all."),
+    ] = None,
+    allow: Annotated[
+        str | None, flag(SCENE, "Layers, and mistakes to look for (layers=2,calibration,plate).")
+    ] = None,
+    budget: Annotated[str | None, flag(SCENE, "Time after which no more structures are tried: 20s.")] = None,
+    reading: Annotated[FileFlags | None, Parameter(name="*")] = None,
+    out: Annotated[str | None, flag(OUTPUT, "Folder for the report and a recipe of each film.")] = None,
+    json: Annotated[bool, switch(OUTPUT, "Print one JSON object.")] = False,
+) -> int:
+    """Identify a film on a known substrate: which layers, dispersion and effects its spectra need.
+
+    Example: pellicle identify unknown.csv --substrate Si --out found
+
+    Example: pellicle identify R.csv T.csv --substrate BK7 --back air --family oxide
+    """
+    paths, options = list(data), (reading or FileFlags()).options()
+    if not paths:
+        raise UsageError("no data: name the files, as in pellicle identify oxide.csv --substrate Si")
+    if substrate is None:
+        raise UsageError("no substrate: an identification needs it, as in --substrate Si")
+    check_words(options)
+    given: dict[str, Any] = {"back": back, "ambient": ambient, "family": family}
+    given = {name: value for name, value in given.items() if value is not None} | _allowed(allow)
+    if budget is not None:
+        given["budget"] = parse_number(budget.removesuffix("s"), "`budget`", "seconds, as in 20s")
+    if among is not None:
+        given["among"] = [word.strip() for word in among.split(",")]
+    if out is not None:
+        check_folder(out)
+    start()
+    return _identify(paths, options, substrate, given, out, json)
+
+
+def _identify(
+    paths: list[str], options: FileOptions, substrate: str, given: dict[str, Any], out: str | None, json: bool
+) -> int:
+    from pellicle.api.identification import identify as identified
+    from pellicle.recipes.media import medium
+    from pellicle.reporting.identification import failure, report, to_json, write_identification
+
+    for name in ("back", "ambient"):
+        if name in given:
+            given[name] = medium(given[name], name=f"`{name}`")
+    below = medium(substrate, name="`substrate`")
+    if options.angle is not None:
+        given["angle"] = options.angle
+    try:
+        if colours := [path for path in paths if is_of_colours(path, options)]:
+            raise UsageError(f"{colours[0]}: colours cannot be identified: give a spectrum")
+        spectra = [spectrum for path in paths for spectrum in read(path, options)]
+        found = identified(spectra, below, **given)
+    except ValueError as error:
+        message = error_message(error, paths)
+        return reported(message, failure(paths, message) if json else None)
+    show(to_json(found) if json else report(found), out is not None)
+    code = GOOD if found.status == "identified" else UNCLEAR
+    if out is None:
+        return code
+    write = partial(write_identification, Path(out), found)
+    return max(code, written(write, f"{out}: report and recipes written"))
+
+
+def _allowed(allow: str | None) -> dict[str, Any]:
+    """Layers and mistakes of a list such as layers=1,plate. Raises UsageError for another word."""
+    if allow is None:
+        return {}
+    words = [word.strip() for word in allow.split(",")]
+    layers = [word.removeprefix("layers=") for word in words if word.startswith("layers=")]
+    if any(not x.isdigit() for x in layers):
+        raise UsageError(f"--allow takes layers=1 or layers=2, not layers={layers[0]}")
+    mistakes = {"allow": [word for word in words if not word.startswith("layers=")]}
+    return mistakes | ({"layers": int(layers[-1])} if layers else {})

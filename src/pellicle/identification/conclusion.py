@@ -1,0 +1,152 @@
+"""Conclusion from weighed structures: which the data leave, and whether they are one film or several."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pellicle.fitting.result import Estimate
+from pellicle.identification.evidence import Weighed
+from pellicle.identification.growth import BARE, SIGNIFICANT, Growth, needed
+from pellicle.identification.hypothesis import Hypothesis, Outcome, SupposedLayer
+from pellicle.identification.problem import Problem
+
+DECIDED = 5.0
+"""Δ ln Z that excludes a hypothesis: odds of 150 to 1."""
+NOISY = 2.0
+"""Ratio of unexplained residuals to noise above which nothing is identified."""
+_LIKE = 0.02
+"""Relative difference of two indices that name one film: that of pages of one material."""
+_SAME_THICKNESS, _THIN = 3.0, 10.0
+"""Standard errors between thicknesses of one film, and nm between those of its thinner neighbour."""
+
+
+def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """Structures that describe the data and are not excluded by their evidence, the best first.
+
+    The evidence chooses: where the best does not describe the data and no rival as good does, none is left.
+    """
+    pool = [x for x in weighed if needed(x)] or list(weighed)
+    near = [x for x in pool if pool[0].ln_z - x.ln_z < DECIDED]
+    return [x for x in near if x.adequate]
+
+
+def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
+    """The outcome of an identification that leaves these structures."""
+    if not kept:
+        return Outcome.NONE
+    best = kept[0]
+    if best.remaining > NOISY or not all(same(problem, best, x) for x in kept[1:]):
+        return Outcome.UNDECIDED
+    value, error = _thickest(best)
+    lost = not value > SIGNIFICANT * error and value > BARE
+    return Outcome.UNDECIDED if lost else Outcome.IDENTIFIED
+
+
+def same(problem: Problem, a: Weighed, b: Weighed) -> bool:
+    """True where two structures are one sample in other words: thicknesses alike within errors, and indices
+    of all layers but very thin ones."""
+    (da, ea), (db, eb) = _thickest(a), _thickest(b)
+    ea, eb = (min(e, 0.1 * d) if math.isfinite(e) else 0.1 * d for e, d in ((ea, da), (eb, db)))
+    thin = [_others(x) for x in (a, b)]
+    if abs(da - db) > _SAME_THICKNESS * math.hypot(ea, eb) or abs(thin[0] - thin[1]) > _THIN:
+        return False
+    pairs = zip(_seen(problem, a), _seen(problem, b), strict=False)
+    return len(_seen(problem, a)) == len(_seen(problem, b)) and all(_alike(*pair) for pair in pairs)
+
+
+def _seen(problem: Problem, x: Weighed) -> list[np.ndarray]:
+    """Index of each layer that is not very thin."""
+    return [index_of(problem, x, i) for i, depth in enumerate(_depths(x)) if depth > BARE]
+
+
+def _alike(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.max(np.abs(a / b - 1)) < 2 * _LIKE and abs(a.mean() / b.mean() - 1) < _LIKE)
+
+
+def index_of(problem: Problem, x: Weighed, layer: int) -> Any:
+    """Complex index of a layer at the wavelengths of all spectra."""
+    views = problem.views
+    return np.concatenate([x.structure.index(layer, x.x[None], v)[0, : v.points] for v in views])
+
+
+def _depths(x: Weighed) -> np.ndarray:
+    return x.structure.thicknesses(x.x[None])[0]
+
+
+def _thickest(x: Weighed) -> tuple[float, float]:
+    """Thickness of the thickest layer and its standard error."""
+    thicknesses = [
+        (v, e) for n, v, e in zip(x.structure.numbers, x.x, x.stderr, strict=True) if n.name == "thickness"
+    ]
+    return max(thicknesses)
+
+
+def _others(x: Weighed) -> float:
+    """Thickness (nm) of the other layers together."""
+    depths = _depths(x)
+    return float(depths.sum() - depths.max())
+
+
+def hypotheses(growth: Growth, weighed: Sequence[Weighed], condition: str = "") -> list[Hypothesis]:
+    """Structures as hypotheses, with their probabilities beside each other."""
+    shares = np.exp([x.ln_z - weighed[0].ln_z for x in weighed]) if weighed else np.zeros(0)
+    found = [_hypothesis(growth, x, condition) for x in weighed]
+    return [
+        replace(x, probability=float(p)) for x, p in zip(found, shares / max(shares.sum(), 1.0), strict=True)
+    ]
+
+
+def _hypothesis(growth: Growth, x: Weighed, condition: str) -> Hypothesis:
+    problem, structure = growth.problem, x.structure
+    estimates = _estimates(x)
+    layers = tuple(
+        _supposed(growth, x, i, tuple(e for number, e in estimates if number.layer == i))
+        for i in range(len(structure.layers))
+    )
+    instrument = tuple(
+        replace(e, name=f"instrument.{e.name}") for number, e in estimates if number.layer is None
+    )
+    values = problem.by_channel(x.attempt.values)
+    return Hypothesis(
+        _name(x), layers, x.ln_z, x.remaining, x.adequate, problem.views[0].around,
+        tuple(view.quantities(own.ravel()) for view, own in values), instrument, condition,
+    )  # fmt: skip
+
+
+def _name(x: Weighed) -> str:
+    """Name of a structure; one of a native oxide alone is bare."""
+    if len(x.x) == 1 and x.structure.layers[0].most == BARE:
+        return "native oxide" if x.x[0] > SIGNIFICANT * x.stderr[0] else "bare substrate"
+    return x.structure.name
+
+
+def _estimates(x: Weighed) -> list[tuple]:
+    """Each number with its estimate. A thickness is free around its value, as a fit may confirm it."""
+    found = []
+    for number, value, error, noise in zip(x.structure.numbers, x.x, x.stderr, x.stderr_noise, strict=True):
+        lower, upper = number.lower, number.upper
+        if number.name == "thickness":
+            lower, upper = max(0.0, 0.7 * value - 10), 1.4 * value + 20
+        error, noise = (e if e < upper - lower else math.inf for e in (float(error), float(noise)))
+        own = Estimate(
+            number.name, float(value), error, number.unit, lower, upper, free=True, stderr_noise=noise
+        )
+        found.append((number, own))
+    return found
+
+
+def _supposed(growth: Growth, x: Weighed, layer: int, numbers: tuple[Estimate, ...]) -> SupposedLayer:
+    index = index_of(growth.problem, x, layer)
+    n, k = ((float(part.min()), float(part.max())) for part in (index.real, index.imag))
+    distances = {}
+    for name in growth.order:
+        views = growth.problem.views
+        table = np.concatenate([view.tables[name][: view.points] for view in views])
+        distances[name] = float(np.sqrt(np.mean(np.abs(table - index) ** 2)) / np.mean(np.abs(index)))
+    near = tuple(name for name in sorted(distances, key=lambda w: distances[w]) if distances[name] < _LIKE)
+    return SupposedLayer(x.structure.layers[layer].name, near, n, k, numbers)

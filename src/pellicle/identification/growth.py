@@ -1,0 +1,233 @@
+"""Growth of structures from the bare substrate until one describes the data within usual effects."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pellicle.identification.evidence import NATIVE, Weighed, weigh
+from pellicle.identification.hypothesis import EFFECTS
+from pellicle.identification.problem import Attempt, Column, Problem
+from pellicle.identification.search import minima, polished, scan, thickness_grid
+from pellicle.identification.structure import Material, Structure
+from pellicle.recipes.dispersion_models import MODELS
+
+NOISE_LIKE = 1.3
+"""Ratio of unexplained residuals to noise up to which growth ends."""
+BARE = 15.0
+"""Largest thickness (nm) of the native oxide on a bare substrate."""
+PARTNERS = ("SiO2", "SU-8", "alumina", "Si3N4", "TiO2")
+"""Materials of a second layer, of indices from 1.46 to 2.5: beside each of them a free index is fitted, since
+a wide grid of two free indices chooses wrongly."""
+SIGNIFICANT = 3.5
+"""Total standard errors that a further number must differ from 0 by."""
+_FLEXIBLE = 4
+"""Numbers up to which one film that describes the data needs no two layers as rivals: an absorbing film of
+five described 60 nm of titania on 300 nm of oxide."""
+_TABLES, _PAIRS = 8, 4
+"""Structures that a scan lets through."""
+_STARTS: dict[str, list[dict[str, float]]] = {
+    "cauchy": [
+        {"A": a, "B": min(1.2e4 * (a - 1) ** 2, 9e4)}
+        for a in (1.38, 1.46, 1.55, 1.65, 1.8, 1.95, 2.1, 2.25, 2.45, 2.7)
+    ],
+    "cauchy-urbach": [
+        {"A": a, "B": 1e4, "k0": k, "Eu": 0.4} for a in (1.5, 1.8, 2.1, 2.5) for k in (0.05, 0.4)
+    ],
+    "drude": [{"eps_inf": e, "Ep": p, "gamma": 0.15} for e in (2.5, 3.5, 4.5) for p in (1.0, 1.7, 2.5)],
+    "lorentz": [
+        {"eps_inf": 2.0, "A": a, "E0": e, "gamma": 0.6} for a in (1.0, 4.0) for e in (2.2, 3.0, 3.8, 5.0)
+    ],
+    "tauc-lorentz": [
+        {"eps_inf": e, "A": a, "E0": p, "C": 1.5, "Eg": g}
+        for e, a, p, g in ((1.5, 80.0, 4.0, 2.2), (1.5, 200.0, 3.6, 1.5), (2.0, 100.0, 5.0, 3.2))
+    ],
+}
+"""Starts of models, by their index; thicknesses are scanned for each."""
+
+
+def needed(x: Weighed) -> bool:
+    """True where the data need every layer beside a first and every effect, and no model rests on a bound."""
+    layers = len(x.structure.layers)
+    for number, value, error in zip(x.structure.numbers, x.x, x.stderr, strict=True):
+        reach = 1e-6 * (number.upper - number.lower)
+        extra = number.name in EFFECTS or number.name == "k0" or (layers > 1 and number.name == "thickness")
+        if extra and abs(value) < SIGNIFICANT * error:
+            return False
+        if value > number.upper - reach or (number.name == "A" and value < number.lower + reach):
+            return False
+    return True
+
+
+@dataclass
+class Growth:
+    """What was tried of one problem, and its weights so far, the best first."""
+
+    problem: Problem
+    deadline: float = np.inf
+    """Time of `time.monotonic` after which nothing more is tried."""
+    attempts: list[Attempt] = field(default_factory=list)
+    weighed: list[Weighed] = field(default_factory=list)
+    order: list[str] = field(default_factory=list)
+    """Materials of the catalogue, the best single film first."""
+    columns: dict[int, list[Column]] = field(default_factory=dict)
+
+    @property
+    def oxidised(self) -> bool:
+        """True for a substrate that has a native oxide."""
+        return float(np.mean(self.problem.views[0].media[1].real)) > NATIVE
+
+    def done(self, most: int = 99) -> bool:
+        """Weigh all; true where time is up, or the best needs at most `most` numbers and leaves but noise."""
+        self.weighed = weigh(self.problem, self.attempts, self.columns)
+        best = next((x for x in self.weighed if needed(x)), self.weighed[0])
+        enough = best.adequate and best.remaining < NOISE_LIKE and len(best.x) <= most
+        return enough or time.monotonic() > self.deadline
+
+    def add(self, layers: Sequence[Material], starts: Iterable[np.ndarray], *effects: str) -> None:
+        """Polish a structure from starts (numbers,) and keep it."""
+        structure = Structure(tuple(layers), effects)
+        self.attempts.append(polished(self.problem, structure, list(starts)))
+
+    def film(self, name: str) -> Material:
+        return Material(name, self.problem.thickest)
+
+    @property
+    def scanned(self) -> Problem:
+        """The problem with the points of a scan."""
+        return self.problem.coarse or self.problem
+
+    def tables(self, name: str) -> list[np.ndarray]:
+        """Index of a material at the points of a scan, in each view."""
+        return [view.tables[name] for view in self.scanned.views]
+
+
+def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int = 2) -> Growth:
+    """Grow structures of the materials `names` and of models, up to `layers` layers."""
+    growth = Growth(problem, deadline)
+    if "SiO2" in problem.views[0].tables:
+        growth.add([Material("SiO2", BARE)], [np.array([2.0])])
+    _single_films(growth, names)
+    growth.add([growth.film("cauchy")], _model_starts(growth, "cauchy", 4))
+    if not growth.done():
+        for model in ("cauchy-urbach", "drude", "lorentz", "tauc-lorentz"):
+            growth.add([growth.film(model)], _model_starts(growth, model, 3))
+    if not growth.done(_FLEXIBLE):
+        _effects(growth)
+    if layers > 1 and not growth.done(_FLEXIBLE):
+        _pairs(growth)
+        _named(growth)
+    growth.weighed = weigh(problem, growth.attempts, growth.columns)
+    return growth
+
+
+def _single_films(growth: Growth, names: Sequence[str]) -> None:
+    grid = thickness_grid(growth.problem)
+    ranks: dict[str, tuple[float, np.ndarray]] = {}
+    for name in names:
+        costs = scan(growth.scanned, [[x] for x in growth.tables(name)], grid[:, None])
+        at = minima(costs, 2)
+        ranks[name] = float(costs[at[0]]), grid[at]
+    growth.order = sorted(ranks, key=lambda name: ranks[name][0])
+    for name in growth.order[:_TABLES]:
+        growth.add([growth.film(name)], ranks[name][1][:, None])
+
+
+def _model_starts(growth: Growth, model: str, keep: int) -> list[np.ndarray]:
+    """The best starts of a film of a model: its numbers with the thickness that a scan finds."""
+    grid, found = thickness_grid(growth.problem), []
+    structure = Structure((growth.film(model),))
+    keys = [key for key, spec in MODELS[model].items() if spec.free]
+    for start in _STARTS[model]:
+        x = np.array([[0.0, *(start[key] for key in keys)]])
+        index = [[structure.index(0, x, view)[0]] for view in growth.scanned.views]
+        costs = scan(growth.scanned, index, grid[:, None])
+        best = int(np.argmin(costs))
+        found.append((costs[best], np.array([grid[best], *x[0, 1:]])))
+    return [x for _, x in sorted(found, key=lambda pair: pair[0])[:keep]]
+
+
+def _effects(growth: Growth) -> None:
+    """Effects on the best film of a table, on the free index, and on another model that is far better."""
+    single = [x for x in growth.weighed if len(x.structure.layers) == 1 and x.attempt.x[0] > BARE]
+    tables = [x for x in single if not x.structure.layers[0].modelled]
+    cauchy = [x for x in single if x.structure.layers[0].name == "cauchy"]
+    others = [x for x in single if x.structure.layers[0].modelled and x not in cauchy]
+    bases = [*tables[:1], *cauchy[:1]]
+    if others and (not bases or others[0].ln_z > bases[0].ln_z + 20):
+        bases.append(others[0])
+    tried: dict[str, tuple[float, ...]] = {"roughness": (3.0, 12.0), "thickness_spread": (5.0, 20.0)}
+    if any(view.oblique for view in growth.problem.views):
+        tried["angle_shift"] = (-0.5, 0.5)
+    for base in bases:
+        x, layers = base.attempt.x, base.structure.layers
+        for effect, starts in tried.items():
+            growth.add(layers, [np.append(x, value) for value in starts], effect)
+        if growth.oxidised and layers[-1].name != "SiO2" and "SiO2" in growth.order:
+            growth.add([*layers, Material("SiO2", 60.0)], [np.append(x, value) for value in (3.0, 15.0)])
+
+
+def _pairs(growth: Growth) -> None:
+    """Two layers: the best by a scan, and a free index above or below each partner."""
+    most = growth.problem.thickest
+    thick = np.arange(20.0, min(most, 1200.0), 16.0)
+    thin = np.array([6.0, 12, 18, 25, 35, 50, 65, 80, 100, 130, 160, 200, 250])
+    near, far = (np.stack([x.ravel() for x in np.meshgrid(*pair, indexing="ij")], 1)
+                 for pair in ((thick, thin), (thin, thick)))  # fmt: skip
+    grid = np.concatenate([near, far])
+    partners = [x for x in PARTNERS if x in growth.order]
+    tops = list(dict.fromkeys([*growth.order[:3], *partners]))
+    found = []
+    for upper in tops:
+        for lower in tops:
+            if upper == lower or (upper not in partners and lower not in partners):
+                continue
+            pairs = zip(growth.tables(upper), growth.tables(lower), strict=True)
+            costs = scan(growth.scanned, [list(pair) for pair in pairs], grid)
+            best = int(np.argmin(costs))
+            found.append((float(costs[best]), grid[best], upper, lower))
+    found.sort(key=lambda x: x[0])
+    for _, depth, upper, lower in found[:_PAIRS]:
+        growth.add([growth.film(upper), growth.film(lower)], [depth])
+    seen = set()
+    for rank, (_, depth, *names) in enumerate(found[: 2 * _PAIRS]):
+        for i in (0, 1):
+            for partner in dict.fromkeys([names[1 - i], *(partners if rank == 0 else ())]):
+                if (i, partner) in seen:
+                    continue
+                seen.add((i, partner))
+                free = _as_cauchy(growth.tables(names[i])[0])
+                layers = [growth.film("cauchy"), growth.film(partner)]
+                start = [np.array([depth[i], *free]), depth[1 - i : 2 - i]]
+                growth.add(
+                    layers if i == 0 else layers[::-1], [np.concatenate(start if i == 0 else start[::-1])]
+                )
+
+
+def _named(growth: Growth) -> None:
+    """Tables in place of the free index of the best pairs, where two are near it."""
+    growth.weighed = weigh(growth.problem, growth.attempts, growth.columns)
+    view, tried = growth.problem.views[0], {x.structure for x in growth.attempts}
+    pairs = [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]
+    for x in pairs[:_PAIRS]:
+        layers, depths = x.structure.layers, x.structure.thicknesses(x.x[None])[0]
+        for i, layer in enumerate(layers):
+            index = x.structure.index(i, x.x[None], view)[0]
+            distance = {name: float(np.mean(np.abs(view.tables[name] - index))) for name in growth.order}
+            near = sorted(distance, key=lambda name: distance[name])[:3] if layer.name == "cauchy" else []
+            for own in (growth.film(name) for name in near):
+                pair = (*layers[:i], own, *layers[i + 1 :])
+                if Structure(pair) not in tried and pair[0] != pair[1]:
+                    tried.add(Structure(pair))
+                    growth.add(pair, [depths])
+
+
+def _as_cauchy(index: Any) -> tuple[float, float]:
+    """A and B of a free index near a table's."""
+    mean = float(np.mean(index.real))
+    slope = float(np.clip(1.2e4 * (mean - 1) ** 2, 0.0, 9e4))
+    return float(np.clip(mean - slope / 3.6e5, 1.26, 2.8)), slope

@@ -1,0 +1,196 @@
+"""Identification of the film on a substrate, from spectra of one sample to hypotheses with evidence."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pellicle.data.spectrum import Spectrum
+from pellicle.errors import DataError, UsageError
+from pellicle.fitting.film.fringes import fringes
+from pellicle.identification import conclusion, films, words
+from pellicle.identification.growth import Growth, grown
+from pellicle.identification.hypothesis import Identification, NotTried, Outcome
+from pellicle.identification.problem import Problem
+from pellicle.identification.search import THICK
+from pellicle.identification.signal_view import (
+    MOST_POINTS,
+    SCANNED_POINTS,
+    SignalView,
+    check_signal,
+    compared_points,
+)
+from pellicle.scene.film import Light, Scene
+from pellicle.scene.layers import Layer, Substrate, medium
+
+FEWEST = 20
+"""Points below which a spectrum cannot tell structures apart."""
+_USUAL, _FRINGED = 3000.0, 8000.0
+"""Largest thickness (nm) that is tried, unless fringes have an optical path of at least the second."""
+CONDITIONS = ("calibration", "plate")
+"""Statements about a measurement that may be wrong."""
+REFERENCES = ("substrate", "Al")
+"""Mirrors against which a reflectance may have been measured."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of an identification: substrate, light, materials, seconds and what may be varied."""
+
+    substrate: Substrate
+    ambient: Any
+    light: Light
+    names: tuple[str, ...]
+    layers: int = 2
+    conditions: tuple[str, ...] = CONDITIONS
+    budget: float = np.inf
+
+    def around(self) -> Scene:
+        """The scene of the bare substrate."""
+        return Scene(Layer(medium("SiO2"), 0.0), self.substrate, ambient=self.ambient, light=self.light)
+
+
+def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> Identification:
+    """Identify the film of spectra of one sample.
+
+    **Raises:** UsageError for a signal that cannot be identified; DataError for too few points, or a
+    substrate without data at the wavelengths.
+    """
+    for spectrum in spectra:
+        check(spectrum, request)
+    deadline = time.monotonic() + request.budget
+    growth, left_out = _grown(spectra, request, deadline, request.layers)
+    kept = conclusion.survivors(growth.weighed)
+    folded = _folded(spectra)
+    if not kept and folded is not None:
+        again, _ = _grown(folded, request, deadline, request.layers)
+        kept = conclusion.survivors(again.weighed)
+        growth = again if kept else growth
+    if kept:
+        status = conclusion.outcome(growth.problem, kept)
+        return _record(growth, kept, status, "", left_out, request, began)
+    for condition, other in _conditions(spectra, request):
+        again, _ = _grown(*other, deadline, 1)
+        found = [x for x in conclusion.survivors(again.weighed) if x.remaining < conclusion.NOISY]
+        if found:
+            return _record(again, found, Outcome.UNDECIDED, condition, left_out, request, began)
+    return _record(growth, [], Outcome.NONE, "", left_out, request, began)
+
+
+def _grown(
+    spectra: Sequence[Spectrum], request: Request, deadline: float, layers: int
+) -> tuple[Growth, list[NotTried]]:
+    problem, left_out = _problem(spectra, request)
+    tried = [name for name in request.names if name in problem.views[0].tables]
+    return grown(problem, tried, deadline, layers), left_out
+
+
+def _folded(spectra: Sequence[Spectrum]) -> list[Spectrum] | None:
+    """Spectra with a folded Δ where the sign of Δ may not have been measured; None where it was."""
+    half = [x.delta is not None and not x.folded and bool(np.all(x.delta <= 180)) for x in spectra]
+    if not any(half):
+        return None
+    return [replace(x, folded=True) if own else x for x, own in zip(spectra, half, strict=True)]
+
+
+def _record(
+    growth: Growth, kept: list, status: Outcome, condition: str, left_out: list[NotTried], request: Request,
+    began: float,
+) -> Identification:  # fmt: skip
+    problem = growth.problem
+    rest = [x for x in growth.weighed if not any(x is y for y in kept)]
+    hypotheses = conclusion.hypotheses(growth, kept, condition)
+    excluded = conclusion.hypotheses(growth, rest, condition)
+    substrate = getattr(request.substrate.material, "name", "the substrate")
+    nearest = growth.weighed[0]
+    noise = problem.short_range_noise(problem.data - nearest.attempt.values)
+    channels = np.split(noise, np.cumsum([view.channels for view in problem.views])[:-1])
+    return Identification(
+        status=status,
+        hypotheses=tuple(hypotheses),
+        excluded=tuple(replace(x, probability=0.0) for x in excluded),
+        not_tried=tuple(left_out),
+        verdict=words.verdict(status, hypotheses, excluded, nearest, left_out, substrate),
+        data=tuple(view.spectrum for view in problem.views),
+        noise=tuple(channels),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def check(spectrum: Spectrum, request: Request) -> None:
+    """Raise where a spectrum cannot be identified."""
+    check_signal(spectrum)
+    name = spectrum.path or "the data"
+    if len(spectrum) < FEWEST:
+        raise DataError(
+            f"{name}: {len(spectrum)} points are too few to tell films apart: give at least {FEWEST}"
+        )
+    oblique = spectrum.angle is not None or np.any(np.asarray(request.light.angle) > 0)
+    if spectrum.signal == "psi-delta" and not oblique:
+        raise UsageError(f"{name}: psi and delta need the `angle` of incidence, and the data do not state it")
+
+
+def _problem(spectra: Sequence[Spectrum], request: Request) -> tuple[Problem, list[NotTried]]:
+    """The problem of spectra, and materials that do not cover them."""
+    around = request.around()
+    paths = [_optical_path(x) for x in spectra]
+    thickest = THICK if max(paths) > _FRINGED else _USUAL
+    finest = max(*paths, 2 * _USUAL) if max(paths) > _FRINGED else max(*paths, 2000.0)
+
+    def views(most: int) -> tuple[SignalView, ...]:
+        return tuple(SignalView(compared_points(x, finest, most), around) for x in spectra)
+
+    fine, coarse = views(MOST_POINTS), views(SCANNED_POINTS)
+    for view in fine:
+        if not np.all(np.isfinite(view.media)):
+            request.substrate.material.check_range(view.spectrum.wavelength)  # pyright: ignore
+    left_out = films.tabulated(fine, request.names)
+    films.tabulated(coarse, list(fine[0].tables))
+    return Problem(fine, thickest, Problem(coarse, thickest)), left_out
+
+
+def _optical_path(spectrum: Spectrum) -> float:
+    """Optical path (nm) of the fringes of a spectrum, 0 where it has none or several angles."""
+    if spectrum.angle is not None and np.ptp(spectrum.angle) > 0:
+        return 0.0
+    found = fringes(2 / spectrum.wavelength, spectrum.values)
+    return 0.0 if found is None else 2 * found.thickness
+
+
+def _conditions(
+    spectra: Sequence[Spectrum], request: Request
+) -> Iterator[tuple[str, tuple[Sequence[Spectrum], Request]]]:
+    """Usual mistakes in what is stated: each in words, with spectra and request without it."""
+    below = request.substrate
+    if "calibration" in request.conditions and all(x.signal == "R" for x in spectra):
+        for name in REFERENCES:
+            mirror = below.material if name == "substrate" else medium(name)
+            relative = [_times_mirror(x, mirror, request) for x in spectra]
+            known = [x for x in relative if x is not None]
+            if len(known) == len(spectra):
+                named = getattr(mirror, "name", "the substrate")
+                yield f"the reflectance was measured relative to {named}", (known, request)
+    if "plate" not in request.conditions:
+        return
+    index: Any = SignalView(spectra[0], request.around()).index_of(below.material)
+    if below.back is None and float(np.mean(index.imag)) < 1e-4:
+        plate = replace(request, substrate=replace(below, back=medium("air")))
+        yield "light from the back face was measured too", (spectra, plate)
+    elif below.back is not None and all(x.signal != "T" for x in spectra):
+        yield (
+            "no light from the back face was measured",
+            (spectra, replace(request, substrate=replace(below, back=None))),
+        )
+
+
+def _times_mirror(spectrum: Spectrum, mirror: Any, request: Request) -> Spectrum | None:
+    """A reflectance times that of a bare mirror at normal incidence; None where it is above 1."""
+    index = SignalView(spectrum, request.around()).index_of(mirror)[: len(spectrum)]
+    values = spectrum.values * np.abs((1 - index) / (1 + index)) ** 2
+    if not np.all(np.isfinite(values)) or values.max() > 1.05:
+        return None
+    return replace(spectrum, values=values, sigma=None)

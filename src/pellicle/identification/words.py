@@ -1,0 +1,129 @@
+"""Sentences of an identification: what stands, what the data need, and what is excluded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from pellicle.fitting.result import Estimate
+from pellicle.identification.conclusion import DECIDED
+from pellicle.identification.evidence import Weighed
+from pellicle.identification.growth import BARE
+from pellicle.identification.hypothesis import Hypothesis, NotTried, Outcome, SupposedLayer
+
+_SHOWN = 4
+"""Names of hypotheses and materials in one sentence."""
+
+
+def verdict(
+    status: Outcome,
+    kept: Sequence[Hypothesis],
+    excluded: Sequence[Hypothesis],
+    nearest: Weighed,
+    left_out: Sequence[NotTried],
+    substrate: str,
+) -> str:
+    """Return the verdict on a sample on `substrate`: what it is, or what the data leave open."""
+    if status is Outcome.NONE:
+        name, size = nearest.excess
+        sentences = [
+            "No hypothesis that was tried describes the data within usual errors.",
+            f"The nearest, {nearest.structure.name} on {substrate}, leaves residuals of"
+            f" {nearest.remaining:.2g} times the noise and needs an error of {name} of {size:.2g} times its"
+            " usual size.",
+        ]
+    elif status is Outcome.IDENTIFIED:
+        sentences = [f"{_sentence(kept[0], substrate)}.", *_effects(kept[0], excluded)]
+    else:
+        sentences = _undecided(kept, substrate)
+    if kept and excluded:
+        best = kept[0].ln_z
+        far = [x for x in excluded if best - x.ln_z >= DECIDED]
+        rows = [f"{x.name} (Δ ln Z {best - x.ln_z:.0f})" for x in far[:_SHOWN]]
+        sentences += [f"Excluded: {', '.join(rows)}."] if rows else []
+    if left_out:
+        names = ", ".join(x.material for x in left_out[:_SHOWN])
+        more = f" and {len(left_out) - _SHOWN} more" if len(left_out) > _SHOWN else ""
+        sentences.append(f"Not tried, as their tables do not cover the data: {names}{more}.")
+    return " ".join(sentences)
+
+
+def _undecided(kept: Sequence[Hypothesis], substrate: str) -> list[str]:
+    names = [x.name for x in kept]
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    if kept[0].condition:
+        return [
+            "No hypothesis describes the data as they are stated.",
+            f"If {kept[0].condition}, they may be of this: {_lower(_sentence(kept[0], substrate))}.",
+        ]
+    if len(kept) == 1:
+        return [f"One hypothesis is left, but is not certain: {_lower(_sentence(kept[0], substrate))}."]
+    sentences = [f"The data do not decide between {', '.join(names[:_SHOWN])}{more} on {substrate}."]
+    main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]
+    n = min(x.n[0] for x in main), max(x.n[1] for x in main)
+    like = dict.fromkeys(name for x in main for name in x.like[:2])
+    depths = [_interval(x.thickness) for x in main]
+    low, high = min(x for x, _ in depths), max(x for _, x in depths)
+    if all(x.thickness.value > BARE for x in main) and high < 1.5 * low:
+        sentences.append(
+            f"In all of them a film has an index of {_range(n)}{_as(tuple(like))}, and a thickness of"
+            f" {low:.4g} to {high:.4g} nm."
+        )
+    return sentences
+
+
+def _lower(sentence: str) -> str:
+    return sentence[0].lower() + sentence[1:]
+
+
+def _sentence(x: Hypothesis, substrate: str) -> str:
+    if x.name == "bare substrate":
+        return f"No film is seen on {substrate}: an oxide is thinner than {_most(x):.2g} nm"
+    if x.name == "native oxide":
+        return f"{substrate} with a native oxide of {_value(x.layers[0].thickness)}"
+    films = [_film(layer) for layer in x.layers]
+    if len(films) == 1:
+        return f"A film {films[0]} on {substrate}"
+    return f"{len(films)} layers on {substrate}: " + " on ".join(f"one {film}" for film in films)
+
+
+def _film(layer: SupposedLayer) -> str:
+    absorbing = f", k {layer.k[0]:.2g} to {layer.k[1]:.2g}" if layer.k[1] > 1e-3 else ""
+    of = f"of index {_range(layer.n)}{absorbing}{_as(layer.like)}"
+    return f"{of}, {_value(layer.thickness)} thick"
+
+
+def _effects(best: Hypothesis, excluded: Sequence[Hypothesis]) -> list[str]:
+    """Sentences on the effects that the data need, and on those that were tried and are not needed."""
+    called = [f"{word} of {_value(x)}" for word, x in best.effect_numbers()]
+    tried = dict.fromkeys(word for x in excluded for word in x.effects if word not in best.effects)
+    two = any(len(x.layers) > len(best.layers) for x in excluded)
+    idle = [*tried, *(["a further layer"] if two else [])]
+    sentences = [f"The data need {' and '.join(called)}."] if called else []
+    return [*sentences, *([f"They do not need {' or '.join(idle)}."] if idle else [])]
+
+
+def _as(names: Sequence[str]) -> str:
+    return f", as {', '.join(names[:_SHOWN])}" if names else ""
+
+
+def _range(n: tuple[float, float]) -> str:
+    low, high = (f"{x:.3g}" for x in n)
+    return low if low == high else f"{low} to {high}"
+
+
+def _interval(x: Estimate) -> tuple[float, float]:
+    reach = x.stderr if math.isfinite(x.stderr) else 0.0
+    return max(x.value - reach, 0.0), x.value + reach
+
+
+def _most(x: Hypothesis) -> float:
+    own = x.layers[0].thickness
+    return own.value + 1.645 * (own.stderr if math.isfinite(own.stderr) else own.value)
+
+
+def _value(x: Estimate) -> str:
+    if not math.isfinite(x.stderr):
+        return f"{x.value:.3g} {x.unit} (not determined)"
+    digits = max(0, 1 - math.floor(math.log10(x.stderr))) if x.stderr > 0 else 3
+    return f"{x.value:.{min(digits, 4)}f} ± {x.stderr:.2g} {x.unit}"

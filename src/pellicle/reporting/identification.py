@@ -1,0 +1,97 @@
+"""Report, JSON record and folder of an identification, with a recipe for each hypothesis that is left."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pellicle.files import new_folder
+from pellicle.fitting.status import describe
+from pellicle.identification.hypothesis import Hypothesis, Identification, SupposedLayer
+from pellicle.recipes.write import recipe_text
+from pellicle.reporting.folders import REPORT
+from pellicle.reporting.json_record import failed, parameter_record, strict, taken, versions, write_result
+from pellicle.reporting.plain_text import INDENT, blocks_of, table, wrapped
+
+SCHEMA = "pellicle.identify/1"
+_SHOWN = 12
+"""Excluded hypotheses in a report."""
+
+
+def report(found: Identification) -> str:
+    """Format the verdict and a table of hypotheses: evidence, residuals, numbers."""
+    names = ", ".join(x.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for x in found.data)
+    points = sum(len(x) for x in found.data)
+    verdict = [*wrapped(f"{found.status.value}: {found.verdict}"), *wrapped(f"{names}: {points} points")]
+    rows = [("", "hypothesis", "probability", "Δ ln Z", "residuals", "numbers")]
+    least = max((x.ln_z for x in (*found.hypotheses, *found.excluded)), default=0.0)
+    for x in (*found.hypotheses, *found.excluded[:_SHOWN]):
+        left = x in found.hypotheses
+        numbers = ", ".join(describe(own) for own in x.parameters.values())
+        share = f"{x.probability:.2g}" if left else ""
+        rows.append(("*" * left, x.name, share, f"{x.ln_z - least:.1f}", f"{x.remaining:.3g}", numbers))
+    notes = [
+        "* left by the data",
+        "residuals that no systematic effect explains are in units of the noise",
+        *(f"not tried: {x.material}, {x.why}" for x in found.not_tried),
+    ]
+    body = [*table(rows), "", *(INDENT + note for note in notes)]
+    return blocks_of([("Verdict", verdict), ("Hypotheses", body)])
+
+
+def to_json(found: Identification) -> dict[str, Any]:
+    """Convert an identification to dictionaries."""
+    least = max((x.ln_z for x in (*found.hypotheses, *found.excluded)), default=0.0)
+    data = [taken(x, "path", "sha256", "signal") | {"points": len(x)} for x in found.data]
+    record = {
+        "schema": SCHEMA,
+        "data": data[0] if len(data) == 1 else data,
+        "status": found.status.value,
+        "verdict": found.verdict,
+        "hypotheses": [_hypothesis(x) for x in found.hypotheses],
+        "excluded": [
+            taken(x, "name", "remaining", "status") | {"delta_ln_z": x.ln_z - least} for x in found.excluded
+        ],
+        "not_tried": [vars(x) for x in found.not_tried],
+        "would_decide": [vars(x) for x in found.would_decide],
+        "versions": versions(),
+        "seconds": found.seconds,
+    }
+    return strict(record)
+
+
+def failure(paths: Sequence[str], error: str) -> dict[str, Any]:
+    """Build the record of data that could not be identified."""
+    data = {"path": ", ".join(paths), "sha256": None, "signal": None, "points": 0}
+    return failed(SCHEMA, data, error)
+
+
+def _hypothesis(x: Hypothesis) -> dict[str, Any]:
+    return {
+        "name": x.name,
+        "layers": [_layer(layer) for layer in x.layers],
+        **taken(x, "effects", "condition", "probability", "ln_z", "remaining", "status"),
+        "parameters": {name: parameter_record(own) for name, own in x.parameters.items()},
+    }
+
+
+def _layer(layer: SupposedLayer) -> dict[str, Any]:
+    own = layer.thickness
+    thickness = [own.value, own.stderr, own.stderr_noise]
+    return taken(layer, "material", "like", "n", "k") | {"thickness": thickness}
+
+
+def write_identification(folder: str | os.PathLike[str], found: Identification) -> Path:
+    """Write report.txt, result.json and a recipe of each hypothesis that is left, `1.toml` and on.
+
+    Returns the folder. Raises UsageError for a folder with other files.
+    """
+    target = new_folder(folder)
+    contents = {REPORT: report(found)}
+    files = [x.path for x in found.data if x.path]
+    options = {"joint": True} if len(files) > 1 else {}
+    for number, x in enumerate(found.hypotheses, 1):
+        contents[f"{number}.toml"] = recipe_text(x.scene(), target, files=files, reading=options)
+    return write_result(target, to_json(found), contents)

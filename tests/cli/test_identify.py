@@ -1,0 +1,44 @@
+"""`pellicle identify`: JSON, recipes that a fit takes, and messages."""
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    nm = np.linspace(420, 880, 120)
+    path = tmp_path_factory.mktemp("film") / "unknown.csv"
+    oxide = pl.Scene(pl.Layer("SiO2", 300.0), "Si")
+    pl.write_spectrum(path, pl.simulate(oxide, nm, noise=0.002, seed=1))
+    return path
+
+
+def test_a_film_is_named_and_written_as_a_recipe(pellicle, film, tmp_path):
+    out = tmp_path / "out"
+    flags = ("--substrate", "Si", "--among", "SiO2,Si3N4", "--json", "--out", out)
+    [found] = pellicle("identify", film, *flags, code=0).objects
+    assert (found["schema"], found["status"]) == ("pellicle.identify/1", "identified")
+    [best] = found["hypotheses"]
+    [layer] = best["layers"]
+    value, stderr, by_noise = layer["thickness"]
+    assert abs(value - 300) < 3 * stderr
+    assert 0 < by_noise < stderr
+    assert layer["like"] == ["SiO2"]
+    assert best["probability"] == 1
+    assert best["parameters"]["thickness"]["value"] == value
+    assert found["excluded"][0]["delta_ln_z"] < 0
+    recipe = pl.read_recipe(out / "1.toml")
+    assert recipe.scene().layers[0].thickness.start == pytest.approx(value)
+    assert (out / "report.txt").read_text().startswith("[[Verdict]]\n    identified: A film of index 1.45")
+
+
+def test_what_is_missing_is_said(pellicle, film):
+    assert "no substrate" in pellicle("identify", film, code=2).err
+    assert "no data" in pellicle("identify", "--substrate", "Si", code=2).err
+    assert (
+        "layers=1 or layers=2"
+        in pellicle("identify", film, "--substrate", "Si", "--allow", "layers=x", code=2).err
+    )
+    assert "Sii" in pellicle("identify", film, "--substrate", "Sii", code=2).err

@@ -1,0 +1,101 @@
+"""Identification of films that the package tmm computes, with noise, and what is refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.identification.hypothesis import Outcome
+from tests import by_tmm
+
+NM = np.linspace(420, 880, 120)
+
+
+def index(name):
+    n = pl.medium(name)(NM)
+    return np.asarray(n, complex)
+
+
+def reflectance(*films, substrate="Si", noise=0.002, seed=1):
+    """R of films (name, thickness) from the ambient down."""
+    indices = 1.0, *(index(name) for name, _ in films), index(substrate)
+    values = by_tmm.films("s", NM, indices, [depth for _, depth in films])
+    return pl.Spectrum(NM, values + noise * np.random.default_rng(seed).normal(size=NM.size), "R")
+
+
+def test_an_oxide_is_identified_by_its_index():
+    found = pl.identify(reflectance(("SiO2", 300.0)), "Si", family="oxide")
+    film = found.best.layers[0]
+    assert found.status is Outcome.IDENTIFIED
+    assert film.like[0] == "SiO2"
+    assert abs(film.thickness.value - 300) < 3 * film.thickness.stderr < 10
+    assert film.thickness.stderr_noise < film.thickness.stderr
+    assert found.verdict.startswith("A film of index 1.45 to 1.47, as SiO2, 30")
+    assert "Excluded: " in found.verdict
+    assert {"alumina", "Y2O3"} <= {x.name for x in found.excluded}
+
+
+def test_films_of_one_index_are_not_told_apart():
+    """Yttria and nitride of 245 nm differ by 4 % in index; thickness and scale make up for it."""
+    found = pl.identify(reflectance(("Si3N4", 245.0)), "Si", among=["Si3N4", "Y2O3", "SiO2"])
+    assert found.status is Outcome.UNDECIDED
+    assert {x.name for x in found.hypotheses} >= {"Si3N4", "Y2O3"}
+    assert sum(x.probability for x in found.hypotheses) == pytest.approx(1)
+    assert "do not decide" in found.verdict
+
+
+def test_bare_silicon_has_no_film():
+    found = pl.identify(reflectance(("SiO2", 2.0)), "Si", among=["SiO2", "Si3N4"])
+    assert found.best.name in ("bare substrate", "native oxide")
+
+
+def test_a_reflectance_relative_to_silicon_is_at_most_undecided():
+    spectrum = reflectance(("SiO2", 300.0), noise=0.001)
+    mirror = np.abs((1 - index("Si")) / (1 + index("Si"))) ** 2
+    relative = dataclasses.replace(spectrum, values=spectrum.values / mirror)
+    found = pl.identify(relative, "Si", among=["SiO2", "Si3N4"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert found.best.condition == "the reflectance was measured relative to Si"
+    assert "If the reflectance was measured relative to Si" in found.verdict
+    alone = pl.identify(relative, "Si", among=["SiO2"], layers=1, allow=())
+    assert (alone.status, alone.hypotheses) == (Outcome.NONE, ())
+    assert alone.verdict.startswith("No hypothesis that was tried describes the data")
+
+
+@pytest.mark.slow  # two layers
+def test_two_layers_are_found_unasked():
+    found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si")
+    upper, lower = found.best.layers
+    assert ("TiO2" in upper.like, "SiO2" in lower.like) == (True, True)
+    assert abs(upper.thickness.value - 60) < 3 * upper.thickness.stderr
+    assert abs(lower.thickness.value - 300) < 3 * lower.thickness.stderr
+
+
+@pytest.mark.slow  # compiles a fit of the film
+def test_a_fit_confirms_what_is_left():
+    spectrum = reflectance(("SiO2", 300.0))
+    best = pl.identify(spectrum, "Si").best
+    fit = pl.fit(spectrum, best.scene())
+    assert fit.status is pl.Status.CONVERGED
+    assert abs(fit["thickness"].value - best.layers[0].thickness.value) < fit["thickness"].stderr
+
+
+def test_what_cannot_be_identified(refuses):
+    spectrum = reflectance(("SiO2", 300.0))
+    few = pl.Spectrum(NM[:12], spectrum.values[:12], "R")
+    counts = pl.Spectrum(NM, spectrum.values * 1000, "counts", calibrated=False)
+    ratio = pl.Spectrum(NM, np.full(NM.size, 30.0), "psi-delta", delta=np.full(NM.size, 90.0))
+    for data, given, message in (
+        (few, {}, "12 points are too few"),
+        (counts, {}, "cannot be identified: give calibrated"),
+        (ratio, {}, "need the `angle` of incidence"),
+        (spectrum, {"family": "oxides"}, "no family 'oxides'"),
+        (spectrum, {"family": "oxide", "among": ["SiO2"]}, "not both"),
+        (spectrum, {"among": ["SiO3"]}, "SiO3"),
+        (spectrum, {"layers": 3}, "`layers` must be 1 or 2"),
+        (spectrum, {"allow": ["lamp"]}, "`allow` must be of calibration, plate"),
+        ([], {}, "a list of spectra"),
+    ):
+        refuses(ValueError, message, pl.identify, data, "Si", **given)
+    refuses(ValueError, "Sil", pl.identify, spectrum, "Sil")
