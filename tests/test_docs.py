@@ -66,6 +66,7 @@ SLOW = (
     "pellicle fit tilted.csv --recipe docs/examples/tilted_mueller.toml",  # hard/test_anisotropic.py
     "pellicle compare film.csv",  # cli/test_compare_command.py
     "pellicle plan docs/examples/graded.toml",  # effects/test_plan.py
+    "pellicle plan-measurement docs/examples/nitride_film.toml",  # fitting/test_measurement_plan.py
     "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded",
     "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
@@ -356,9 +357,8 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
-    names = (
-        "fit sample identify simulate plan compare cost chart explore export map series watch materials read"
-    )
+    names = "fit sample identify simulate plan plan-measurement compare cost chart explore export map series"
+    names += " watch materials read"
     helps = []
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])

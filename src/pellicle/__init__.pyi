@@ -10,6 +10,7 @@ from pellicle.api.maps import map as map
 from pellicle.api.maps import series as series
 from pellicle.api.plans import cost as cost
 from pellicle.api.plans import plan as plan
+from pellicle.api.plans import plan_measurement as plan_measurement
 from pellicle.api.simulations import depth_profile as depth_profile
 from pellicle.api.simulations import explore as explore
 from pellicle.api.simulations import export as export

@@ -5,13 +5,26 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
+_LONG = re.compile(r"\S{1000,}|'[^'\n]{300,}'")
+"""Words and quoted texts that are longer than any path, such as a cell of 10 MB of a damaged file."""
+
+
+def _readable(message: str) -> str:
+    return _LONG.sub(lambda long: f"{long[0][:60]}… ({len(long[0])} characters)", message)
+
 
 class DataError(ValueError):
     """Unreadable or impossible data or recipe; the command line ends with exit code 3."""
 
+    def __init__(self, message: str = ""):
+        super().__init__(_readable(message))
+
 
 class UsageError(ValueError):
     """An argument that is missing, contradictory or out of range; exit code 2."""
+
+    def __init__(self, message: str = ""):
+        super().__init__(_readable(message))
 
 
 def did_you_mean(word: str, known: Iterable[str], cutoff: float = 0.5) -> str:

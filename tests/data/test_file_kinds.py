@@ -54,3 +54,19 @@ def test_what_is_none_is_named(content, said, refusal, write):
 )
 def test_what_may_be_one_passes(content):
     assert foreign_format(content) is None
+
+
+def test_a_zero_byte_in_a_number_is_no_digit_and_none_between_fields_matters(refusal, write):
+    text = "wavelength,R\n400,0.1\n500,0.{}3\n600,0.2\n"
+    refusal(read_spectrum, write(text.format("\0")), DataError, "line 3: a zero byte within a number")
+    filled = write("wavelength,R\n400,0.1\0\0\n500,\0" + "0.2\n600,0.3\n", "filled.csv")
+    assert read_spectrum(filled).values.tolist() == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize("cell", ["x" * 100_000, "1" * 100_000, "x " * 50_000])
+def test_a_long_cell_is_not_printed(cell, write):
+    with pytest.raises(DataError) as error:
+        read_spectrum(write(f"wavelength,R\n400,0.1\n500,{cell}\n600,0.2\n"))
+    assert "line 3" in str(error.value)
+    assert "characters)" in str(error.value)
+    assert len(str(error.value)) < 400

@@ -1,5 +1,7 @@
 """The explorer's server: who may ask, and for what."""
 
+import socket
+
 import pytest
 
 import pellicle as pl
@@ -100,3 +102,37 @@ def test_requests_are_posted(client):
 def test_a_port_that_cannot_be_opened_is_named(port, refuses):
     session = Session(pl.Scene(pl.Layer("SiO2", 100.0), "Si"))
     refuses(ValueError, f"port {port} cannot be opened", server.serve, session, port)
+
+
+class NoStop:
+    """A session that answers at once."""
+
+    def answer(self, request, body):
+        return {"request": request, "body": body}
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """The address of a server that waits a tenth of a second for a request."""
+    monkeypatch.setattr(server, "SLOWEST", 0.1)
+    address = server.serve_beside(NoStop(), server.explorer_page)
+    port = int(address.split(":")[2].partition("/")[0])
+    return port, address.partition("token=")[2]
+
+
+def test_half_a_request_ends_and_a_client_that_hangs_up_leaves_no_traceback(served, caplog, capfd):
+    port, token = served
+    head = f"POST /api/scene HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+    body = f"X-Pellicle-Token: {token}\r\nContent-Length: 100\r\n\r\n{{"
+    for sent, answered in ((head, b""), (head + body, b"HTTP/1.1 408")):
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
+            connection.sendall(sent.encode())
+            received = b"".join(iter(lambda: connection.recv(4096), b""))  # until the server closes it
+            assert received.startswith(answered) if answered else not received
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
+        connection.sendall((head + body).encode())
+    with socket.create_connection(("127.0.0.1", port), timeout=20) as connection:
+        whole = body.replace("Content-Length: 100", "Content-Length: 2") + "}"
+        connection.sendall((head + whole).encode())
+        assert connection.recv(4096).startswith(b"HTTP/1.1 200")
+    assert "Traceback" not in caplog.text + capfd.readouterr().err

@@ -16,6 +16,7 @@ import zarr
 import pellicle as pl
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.batch.data import CODES
+from pellicle.mapping import run
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
 from pellicle.reporting.map_text import cube_report
@@ -240,3 +241,19 @@ def test_arrays_of_a_map_in_a_temporary_folder_outlive_it(cube, scene, fake_fits
     dataset = pl.map(cube, scene).dataset
     gc.collect()
     assert int((dataset["status"] == CODES["converged"]).sum()) == 45 * 32 - 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="files are not locked")
+def test_two_runs_that_replace_a_map_at_once_do_not_share_its_store(mapped, fake_fits, monkeypatch, refuses):
+    """The second run comes while the first has removed the old store and not made the new one."""
+    mapped()
+    begin = run.begin
+
+    def meanwhile(*arguments, **options):
+        refuses(UsageError, "another run is writing there", mapped, fit=fake_fits.refusing, overwrite=True)
+        return begin(*arguments, **options)
+
+    monkeypatch.setattr(run, "begin", meanwhile)
+    made = mapped(overwrite=True)
+    assert made.finished
+    assert not list(made.path.parent.glob(".*"))  # the lock is removed

@@ -89,3 +89,9 @@ def test_the_base_of_a_surface_is_fixed(write):
 )
 def test_wrong_angles_are_named_without_the_types_that_were_tried(write, angle, said, refuses):
     refuses(DataError, said, pl.read_recipe, write(FILM.replace("[scene]", f"angle = {angle}\n[scene]")))
+
+
+def test_a_recipe_has_a_limit_of_layers_in_words(tmp_path, refuses):
+    path = tmp_path / "many.toml"
+    path.write_text('[scene]\nsubstrate = "Si"\n' + "[[scene.layer]]\nmaterial = 1.5\nthickness = 9\n" * 501)
+    refuses(DataError, r"501 layers.*at most 500.*\[\[scene.group\]\] with repeat", pl.read_recipe, path)

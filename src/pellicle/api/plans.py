@@ -1,8 +1,8 @@
-"""Verbs of planning: the effects that a simulation needs, and what accuracy costs in time."""
+"""Verbs of planning: effects that a simulation needs, what accuracy costs in time, what to measure next."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -18,6 +18,8 @@ from pellicle.simulation.brdf import Directions, default_directions
 
 if TYPE_CHECKING:
     from pellicle.accuracy.registry import Cost
+    from pellicle.fitting.planned_measurement import MeasurementPlan
+    from pellicle.fitting.result import Fit
 
 
 def plan(
@@ -102,6 +104,46 @@ def cost(
     shared = {"tolerance": tolerance, "progress": progress}
     of_spectra = {"reference": reference, "noise": noise, "datasets": datasets, "time_limit": time_limit}
     return _measured(scene, wavelength, directions, (space, angle), of_spectra, shared)
+
+
+def plan_measurement(
+    scenes: Scene | Fit | Sequence[Scene | Fit] | Mapping[str, Scene | Fit],
+    wavelength: ArrayLike | None = None,
+    *,
+    signals: Sequence[str] | None = None,
+    angles: Sequence[float] | None = None,
+    polarisations: Sequence[str] | None = None,
+    noise: float | None = None,
+    noise_degrees: float | None = None,
+    progress: Progress = quiet,
+) -> MeasurementPlan:
+    """Find the measurement that decides between rival `scenes`, or that determines the numbers of one best.
+
+    Each rival is simulated and the others are refitted to that, with the systematic effects of a fit
+    integrated out: the expected difference of ln Z is that of the worst case, whichever of them is true.
+
+    **Arguments:**
+
+    - `scenes`: `Scene` whose free numbers start where they are supposed to be, or `Fit` of data, whose values
+      and errors then count too; for rivals a list of two or more, or a dictionary by name.
+    - `wavelength`: nm, shape (wavelengths,), of the measurement; by default those of the fit, or the visible
+      ones that every material has data for. A wider range is tried too.
+    - `signals`: "R", "T" and "psi-delta", those that can be measured; T needs a substrate with a `back`.
+    - `angles`: of incidence in degrees; by default 0 to 75 for R, 0 and 60 for T, 55 to 80 for Ψ and Δ.
+    - `polarisations`: of R at oblique incidence; "unpolarised", "s" and "p" by default.
+    - `noise`: standard deviation of a point of R and T, 0.002 by default; `noise_degrees`: of Ψ and Δ, 0.03.
+    - `progress`: called with the name of a stage, the number of steps done and their total.
+
+    **Returns:** `MeasurementPlan`: its `measurements`, of rivals the most decisive first, with `delta_ln_z`,
+    or of one scene with the `errors` of its free numbers; `would_decide`, `best` and a `verdict`.
+
+    **Raises:** UsageError for surfaces, without free numbers, for another signal, and where the media share
+    no wavelengths.
+    """
+    from pellicle.fitting import measurement_plan
+
+    about = wavelength, signals, angles, polarisations, noise, noise_degrees, progress
+    return measurement_plan.plan_measurement(scenes, *about)
 
 
 def _measured(

@@ -15,6 +15,7 @@ from pellicle.cli.fit import compare, fit, sample
 from pellicle.cli.identify import identify
 from pellicle.cli.map import map
 from pellicle.cli.messages import abandon_stdout, as_flags, log_to_stderr, say, show
+from pellicle.cli.plan_measurement import plan_measurement
 from pellicle.cli.read import materials, read
 from pellicle.cli.series import series
 from pellicle.cli.session import BAD_DATA, INTERRUPTED, WRONG_USAGE, interruptible
@@ -38,6 +39,7 @@ COMMANDS = (
     read,
     simulate,
     plan,
+    plan_measurement,
     compare,
     cost,
     chart,

@@ -6,6 +6,7 @@ name, and bear a random token, which only the address that was printed has.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import secrets
 import socket
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 LARGEST_BODY = 32_000_000
 """Bytes of the largest request: a data file of `LARGEST_FILE` in base64."""
+SLOWEST = 10.0
+"""Seconds after which a request must have arrived: browsers on the same machine take some milliseconds."""
 _TOKEN = "X-Pellicle-Token"
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -62,6 +65,7 @@ def application(session: Answering, token: str, port: int, made: Page = explorer
     with needs("explore", "the explorer needs"):
         from starlette.applications import Starlette
         from starlette.concurrency import run_in_threadpool
+        from starlette.requests import ClientDisconnect
         from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse
         from starlette.routing import Route
     hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
@@ -84,11 +88,18 @@ def application(session: Answering, token: str, port: int, made: Page = explorer
         if refusal := refused(request, request.headers.get(_TOKEN, "")):
             return refusal
         content = bytearray()
-        async for part in request.stream():
-            content += part
-            if len(content) > LARGEST_BODY:
-                error = f"the request is larger than {LARGEST_BODY // 1_000_000} MB: give a smaller file"
-                return JSONResponse({"error": error}, 413, _HEADERS)
+        try:
+            async with asyncio.timeout(SLOWEST):
+                async for part in request.stream():
+                    content += part
+                    if len(content) > LARGEST_BODY:
+                        error = (
+                            f"the request is larger than {LARGEST_BODY // 1_000_000} MB: give a smaller file"
+                        )
+                        return JSONResponse({"error": error}, 413, _HEADERS)
+        except (TimeoutError, ClientDisconnect):
+            ending = {**_HEADERS, "Connection": "close"}
+            return JSONResponse({"error": "the request did not arrive whole: send it again"}, 408, ending)
         try:
             body = json.loads(content or b"{}")
         except (ValueError, RecursionError):
@@ -137,7 +148,8 @@ def _server(session: Answering, port: int, made: Page = explorer_page) -> tuple[
         ) from None
     opened, token = listener.getsockname()[1], secrets.token_urlsafe(24)
     how: Any = {"log_level": "error", "access_log": False, "lifespan": "off", "server_header": False}
-    settings = uvicorn.Config(application(session, token, opened, made), timeout_graceful_shutdown=1, **how)
+    how |= {"timeout_graceful_shutdown": 1, "http": _with_timeout}
+    settings = uvicorn.Config(application(session, token, opened, made), **how)
     listener.listen(64)
 
     def run() -> None:
@@ -145,3 +157,26 @@ def _server(session: Answering, port: int, made: Page = explorer_page) -> tuple[
             uvicorn.Server(settings).run(sockets=[listener])
 
     return run, f"http://{HOST}:{opened}/?token={token}"
+
+
+def _with_timeout(*arguments: Any, **options: Any) -> Any:
+    """A connection of uvicorn that is closed where the head of a request does not arrive within `SLOWEST`.
+
+    uvicorn limits the time between requests only.
+    """
+    from uvicorn.protocols.http.h11_impl import H11Protocol
+
+    protocol = H11Protocol(*arguments, **options)
+
+    def check(before: bool) -> None:
+        transport, cycle = protocol.transport, protocol.cycle
+        if transport is not None and transport.is_closing():
+            return
+        waits = (cycle is None or cycle.response_complete) and protocol.timeout_keep_alive_task is None
+        if waits and before:
+            transport.close()
+        else:
+            protocol.loop.call_later(SLOWEST / 2, check, waits)
+
+    protocol.loop.call_later(SLOWEST / 2, check, True)
+    return protocol

@@ -12,7 +12,7 @@ Am. Stat. Assoc. 90, 928).
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from logging import getLogger
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE
-from pellicle.fitting.linear_system import Evidence
+from pellicle.fitting.linear_system import Effect, Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, left_weights, marginal
 from pellicle.fitting.noise import student
 from pellicle.fitting.result import Estimate, Fit, Part, ReportMixin, Status
@@ -236,17 +236,18 @@ def _explained(every: Sequence[Ranking]) -> list[_Explained]:
     One that a candidate describes is what the comparison is about: the others have it not at all.
     """
     evidence = [best.evidence() for best in every]
-    # one layer and several name an effect with and without its layer: `index of the layer`, `index of film`
-    kinds = [{effect.name.split(" of ")[0] for view in own for effect in view.effects} for own in evidence]
-    common = set.intersection(*kinds)
+    common = shared_effects([[effect for view in own for effect in view.effects] for own in evidence])
     return [
-        _Explained(best, [_with(view, common) for view in own])
+        _Explained(best, [view._replace(effects=[*filter(common, view.effects)]) for view in own])
         for best, own in zip(every, evidence, strict=True)
     ]
 
 
-def _with(view: Evidence, kinds: set[str]) -> Evidence:
-    return view._replace(effects=[e for e in view.effects if e.name.split(" of ")[0] in kinds])
+def shared_effects(every: Sequence[Sequence[Effect]]) -> Callable[[Effect], bool]:
+    """Return a test for effects of a kind that each of several descriptions leaves out."""
+    # one layer and several name an effect with and without its layer: `index of the layer`, `index of film`
+    common = set.intersection(*({effect.name.split(" of ")[0] for effect in own} for own in every))
+    return lambda effect: effect.name.split(" of ")[0] in common
 
 
 def _matrices(fit: Fit) -> int:

@@ -43,13 +43,15 @@ class Marginal(NamedTuple):
     of the posterior, both up to a constant; `stderr` (..., parameters) are the standard errors there.
 
     `log_evidence` (...) is ln of the evidence: the likelihood integrated over effects, nuisances and, with a
-    uniform prior between their bounds, the parameters.
+    uniform prior between their bounds, the parameters. `step` (..., parameters) leads in the unit cube to the
+    best parameters of the linear model.
     """
 
     deviance: Any
     log_share: Any
     stderr: np.ndarray
     log_evidence: Any
+    step: Any
 
 
 def marginal(
@@ -102,7 +104,8 @@ def marginal(
     logs = [np.log(np.maximum(own, 1e-300)).reshape(fits, -1) - _HALF_LOG_2PI for own in weights]
     log_evidence = by_range + sum(np.sum(own, axis=1) for own in logs)
     log_evidence += np.sum(density + np.log(np.maximum(inside, 1e-300)), axis=1)
-    return Marginal(*(system.led(x) for x in (deviance, log_share, stderr, log_evidence)))
+    every = deviance, log_share, stderr, log_evidence, solution[:, :count]
+    return Marginal(*(system.led(x) for x in every))
 
 
 class Ranking(NamedTuple):

@@ -132,12 +132,13 @@ def run_map(
     model = prepare(cube, scene) if model is None else model
     orders = model.search.orders
     about, who = attributes(cube, model, recipe, preview), identity(cube, scene, orders)
-    tried = time.monotonic()
-    if fit is None and (overwrite or not Path(path).exists()):
-        about["notes"] += bands_off(model, cube)
-    tried = time.monotonic() - tried  # nearly all of it compilation
-    store = begin(path, cube, model.parameters, who, about, orders=orders, resume=resume, overwrite=overwrite)
-    with held(store.path):
+    how: Any = {"orders": orders, "resume": resume, "overwrite": overwrite}
+    with held(Path(path)):
+        tried = time.monotonic()
+        if fit is None and (overwrite or not Path(path).exists()):
+            about["notes"] += bands_off(model, cube)
+        tried = time.monotonic() - tried  # nearly all of it compilation
+        store = begin(path, cube, model.parameters, who, about, **how)
         run = _fit_blocks(Job(model, cube, store, fit or fit_pixels), workers, scheduler, progress)
     return Map(path, run._replace(seconds=time.monotonic() - began, compiling=run.compiling + tried))
 

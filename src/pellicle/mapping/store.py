@@ -236,17 +236,16 @@ def begin(
     - `orders`: number of minima of each pixel.
     - `resume`: continue a store of the same identity. `overwrite`: remove any store of a map at `path`.
 
-    **Raises:** UsageError where there is something else at `path`, or another process writes it.
+    **Raises:** UsageError where there is something else at `path`. The caller holds it (`held`).
     """
     target = Path(path).resolve()  # workers may have another working folder
     if target.exists():
-        with held(target):
-            if not overwrite:
-                return _continued(target, cube, parameters, identity, resume=resume)
-            _check_map(target)
-            old = _draft(target)
-            target.rename(old)  # at once: a half-removed store is never taken for a map
-            shutil.rmtree(old)
+        if not overwrite:
+            return _continued(target, cube, parameters, identity, resume=resume)
+        _check_map(target)
+        old = _draft(target)
+        target.rename(old)  # at once: a half-removed store is never taken for a map
+        shutil.rmtree(old)
     store = MapStore(target, blocks_of(cube), tuple(parameters))
     draft = _draft(target)
     try:
@@ -280,28 +279,49 @@ def _continued(
 
 @contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the folder of a store for this process, until the block or the process ends.
+    """Hold the place of a store for this process, until the block or the process ends.
+
+    The lock is on a hidden file beside it, which stays the same where a run replaces the store.
 
     **Raises:** UsageError where another run holds it.
     """
-    if os.name == "nt":  # folders cannot be locked there
+    lock = path.resolve()
+    lock = lock.with_name(f".{lock.name}.lock")
+    handle = _locked(lock, path)
+    try:
         yield
-        return
+    finally:
+        if handle is not None:
+            lock.unlink(missing_ok=True)
+            os.close(handle)
+
+
+def _locked(lock: Path, path: Path) -> int | None:
+    """An open and locked file; None where there are no locks, or none can be written."""
+    if os.name == "nt":
+        return None
     import fcntl
 
-    folder = os.open(path, os.O_RDONLY)
-    try:
+    while True:
         try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock.parent.mkdir(parents=True, exist_ok=True)
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError:  # reported by what writes the store
+            return None
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(handle), lock.stat()):
+                return handle
         except BlockingIOError:
+            os.close(handle)
             raise UsageError(
                 f"{path}: another run is writing there; wait for it, or choose another `out`"
             ) from None
-        except OSError:  # a file system without locks
+        except FileNotFoundError:  # removed by a run that has just ended
             pass
-        yield
-    finally:
-        os.close(folder)
+        except OSError:  # a file system without locks
+            return handle
+        os.close(handle)
 
 
 def write_dataset(path: str | os.PathLike[str], dataset: Dataset) -> None:

@@ -184,6 +184,11 @@ class DataTable(ReadingTable, FitOptions):  # pyright: ignore[reportGeneralTypeI
         return self
 
 
+MOST_LAYERS = 500
+"""Layers of a scene: 300 are simulated in 8 s of processor time, which grows with their number; a filter with
+more of them repeats some."""
+
+
 class SceneTable(_uncertainties(name for name in _EVERY if name in _OF_SCENE)):
     """`[scene]`."""
 
@@ -195,6 +200,11 @@ class SceneTable(_uncertainties(name for name in _EVERY if name in _OF_SCENE)):
 
     @model_validator(mode="after")
     def _has_layers(self):
+        if (count := len(self.layer)) > MOST_LAYERS:
+            raise ValueError(
+                f"{count} layers, and a scene has at most {MOST_LAYERS}: write layers that repeat once, as a"
+                " [[scene.group]] with repeat = N"
+            )
         if not self.layer and not self.group:
             raise ValueError(
                 "scene.layer is missing: a scene has at least one [[scene.layer]] or [[scene.group]]"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pellicle.accuracy.registry import Cost
 from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.planned_measurement import MeasurementPlan
 from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
@@ -23,6 +24,7 @@ from pellicle.reporting import (
     fit_text,
     folders,
     identification,
+    measurement_plan,
     photograph_map,
     plans,
     posterior,
@@ -55,6 +57,7 @@ _WAYS: dict[type, _Ways] = {
     Identification: _Ways(identification.report, None, identification.write_identification),
     Repeats: _Ways(repeats.report, None, repeats.write_repeats),
     Plan: _Ways(plans.report),
+    MeasurementPlan: _Ways(measurement_plan.report),
     Cost: _Ways(cost.text, cost.draw, cost.write_cost),
     ThicknessMap: _Ways(photograph_map.report, photograph_map.draw, photograph_map.write_map),
 }

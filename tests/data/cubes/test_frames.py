@@ -8,6 +8,7 @@ import tifffile
 import xarray as xr
 from PIL import Image
 
+from pellicle.data.cubes import checks
 from pellicle.data.read_cube import read_cube
 from pellicle.errors import DataError, UsageError
 
@@ -197,3 +198,22 @@ def test_frames_stay_in_their_file(camera, tmp_path):
     np.save(tmp_path / "white.npy", np.tile(white, (280, 1, 1)) + 1)
     again = read_cube(tmp_path / "raw.npy", wavelengths=NM, white_frame=tmp_path / "white.npy")
     assert again.fingerprint != cube.fingerprint
+
+
+def test_a_cube_of_missing_values_is_refused_before_it_is_read_whole(monkeypatch, refused):
+    class Missing:
+        shape, dtype, read = (400, 300, 10), np.dtype("f4"), 0
+
+        def __getitem__(self, where):
+            block = np.broadcast_to(np.float32(np.nan), self.shape)[where]
+            Missing.read += block.size
+            return block
+
+    monkeypatch.setattr(checks, "MOST_SOUGHT", 30_000)
+    cube = {"values": Missing()}
+    seen = checks.sample(cube, 2)
+    assert not np.isfinite(seen["values"]).any()
+    sampled = sum(np.empty(cube["values"].shape)[w].size for w in checks.sample_blocks((400, 300), 10))
+    assert Missing.read <= sampled + 30_000
+    with pytest.raises(DataError, match=r"only NaN.*`mask`"):
+        checks.live_bands(seen["values"], 120_000, "cube.npy")

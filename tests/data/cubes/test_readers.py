@@ -3,6 +3,7 @@
 import itertools
 import pickle
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -280,3 +281,15 @@ def test_a_compression_that_needs_another_package(values, refused, tmp_path):
         content[at : at + 2] = (34887).to_bytes(2, "little")  # LERC
     path.write_bytes(content)
     refused(path, str(path), "without compression", error=DataError, wavelengths=NM, signal_unit=4000)
+
+
+def test_the_declared_size_of_a_packed_array_is_checked_before_it_is_unpacked(refused, tmp_path):
+    """A head that declares 4 GB, whose content is not there: nothing is unpacked."""
+    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("cube.npy", b"\x93NUMPY\x01\x00")
+    content = (tmp_path / "bomb.npz").read_bytes()
+    place = content.index(b"PK\x01\x02") + 24  # the size in the directory
+    (tmp_path / "bomb.npz").write_bytes(
+        content[:place] + (4 * 10**9).to_bytes(4, "little") + content[place + 4 :]
+    )
+    refused(tmp_path / "bomb.npz", "4.0 GB", "np.savez", error=DataError)

@@ -29,6 +29,8 @@ _MOST = 100_000
 _EXAMPLE = "as in 400:900:5, 450,550,650 or a file with one number a line"
 WHOLE = 1_000_000
 """Values up to which a cube is checked whole."""
+MOST_SOUGHT = 200_000_000
+"""Values that are read in search of one that is not missing: some seconds of a disk."""
 _BLOCKS = {1: (16,), 2: (5, 5), 3: (3, 4, 4)}
 _WIDTHS = {1: (64,), 2: (8, 8), 3: (1, 8, 8)}
 _SHARE = 0.95
@@ -230,18 +232,23 @@ def sample(arrays: Mapping[str, Any], rank: int, mask: np.ndarray | None = None)
     """Sampled values (pixels, bands, ...) by name, NaN outside the mask.
 
     `rank` is the number of axes of pixels. Where the sample has no values, as of a small film on a large
-    background, the cube is read line by line up to the first that has some.
+    background, lines that lie evenly over the cube are read, up to the first that has some, and at most
+    `MOST_SOUGHT` values.
     """
     shape = tuple(next(iter(arrays.values())).shape)
     sizes, points = shape[:rank], int(np.prod(shape[rank:]))
     seen = _read(arrays, mask, list(sample_blocks(sizes, points)), shape[rank:])
     if int(np.prod(sizes)) * points <= WHOLE:
         return seen
-    for line in itertools.product(*(range(n) for n in sizes[:-1])):
+    lines = np.arange(int(np.prod(sizes[:-1])))
+    if mask is not None:
+        lines = lines[mask.reshape(lines.size, -1).any(1)]
+    most = max(1, MOST_SOUGHT // (sizes[-1] * points))
+    for line in lines[:: -(-lines.size // most) or 1]:
         values = next(iter(seen.values()))
         if np.any(np.isfinite(values) & (values != 0)):
             break
-        where = (*(slice(i, i + 1) for i in line), slice(None))
+        where = (*(slice(i, i + 1) for i in np.unravel_index(line, sizes[:-1])), slice(None))
         seen = _read(arrays, mask, [where], shape[rank:])
     return seen
 
@@ -283,9 +290,14 @@ def live_bands(values: np.ndarray, pixels: int, path: str) -> tuple[np.ndarray, 
     """
     finite = np.isfinite(values)
     if not finite.any():
-        raise DataError(f"{path}: has no values, only NaN, in all pixels looked at: check how it was written")
-    if not np.any(values[finite]):
-        raise DataError(f"{path}: is zero in all pixels looked at: check how it was written")
+        none = "has no values, only NaN,"
+    elif not np.any(values[finite]):
+        none = "is zero"
+    else:
+        none = ""
+    if none:
+        small = ", or name the film's pixels with `mask`" if pixels > len(values) else ""
+        raise DataError(f"{path}: {none} in all pixels looked at: check how it was written{small}")
     known = finite & (values != 0)
     others = (0, *range(2, values.ndim))
     measured = known.any(others)

@@ -6,6 +6,7 @@ arrays state which are the measured values, and which their errors; that holds f
 
 import re
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ _PIXELS = {1: ("site",), 2: ("y", "x"), 3: ("time", "y", "x")}
 """Axes of pixels of an array, by their number."""
 _ERROR = r"(?:sigma|std|sd|stdev|stddev|stderr|uncertainty|unc|err|error|errors)"
 _ERRORS = re.compile(rf"(?:{_ERROR}(?:_(?P<of>.+))?|(?P<name>.+)_{_ERROR})", re.IGNORECASE)
+_MOST_UNPACKED = 2e9
+"""Bytes of the arrays of a compressed `.npz`, which are held in memory: cubes of hyperspectral cameras take
+0.1 to 1 GB, and a file of 4.7 MB can declare 4.7 GB of zeros."""
 _COUNTS = ("counts", "count", "dn", "adu", "digital number", "raw")
 
 
@@ -62,6 +66,13 @@ def _members(path: Path) -> dict[str, Any]:
     arrays: dict[str, Any] = {}
     try:
         with zipfile.ZipFile(path) as archive, path.open("rb") as whole:
+            packed = [info for info in archive.infolist() if info.compress_type != zipfile.ZIP_STORED]
+            if (size := sum(info.file_size for info in packed)) > _MOST_UNPACKED:
+                raise DataError(
+                    f"{path}: would take {size / 1e9:.1f} GB of memory unpacked, and at most"
+                    f" {_MOST_UNPACKED / 1e9:g} are read: save it without compression (np.savez), which is"
+                    " read in blocks"
+                )
             for info in archive.infolist():
                 name = info.filename.removesuffix(".npy")
                 if info.compress_type != zipfile.ZIP_STORED:
@@ -71,9 +82,12 @@ def _members(path: Path) -> dict[str, Any]:
                 whole.seek(info.header_offset + 26)  # lengths of the name and of the extra field
                 lengths = np.frombuffer(whole.read(4), "<u2")
                 arrays[name] = mapped_array(path, info.header_offset + 30 + int(lengths.sum()))
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, RuntimeError, MemoryError, EOFError, *_OF_ZIP) as error:
         raise error if isinstance(error, DataError) else _damaged(path, error) from None
     return arrays
+
+
+_OF_ZIP = (zipfile.BadZipFile, zlib.error)
 
 
 def _damaged(path: Path, error: Exception) -> DataError:

@@ -17,6 +17,8 @@ _NUMBER = re.compile(
 )
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+(?:e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")  # but the end-of-file mark of DOS, 0x1a
+_FILLING = re.compile(rb"(?<![\d.\0])\0+|\0+(?![\d.\0])")  # zero bytes, but between two digits
+_BROKEN = re.compile(r"[\d.]\x00+[\d.]")
 _SEPARATOR = re.compile(r"\"?sep=\S?\"?\s*", re.IGNORECASE)  # Excel's first line, which names the delimiter
 _MOST_ZEROS = 0.1  # share of zero bytes in a text
 _HEAD = 4096  # bytes that tell the kind of a file
@@ -98,6 +100,11 @@ def text_of(content: bytes, path: str | os.PathLike[str]) -> str:
     if advice := foreign_format(content):
         raise DataError(f"{path}: is {advice}")
     text = decoded(content).replace("\r\n", "\n").replace("\r", "\n").rstrip("\x1a")
+    if (broken := _BROKEN.search(text)) and not _CONTROL.search(text.replace("\0", "")):
+        line = text.count("\n", 0, broken.start()) + 1
+        raise DataError(
+            f"{path}: line {line}: a zero byte within a number; the file is damaged, export it again"
+        )
     if _CONTROL.search(text):
         raise DataError(f"{path}: is a binary file of an unknown format; export it as text (CSV) first")
     if not text.strip():
@@ -108,8 +115,8 @@ def text_of(content: bytes, path: str | os.PathLike[str]) -> str:
 def decoded(content: bytes) -> str:
     """Decode UTF-8, UTF-16 (by its mark or its zeros), or Latin-1 as older instruments write.
 
-    Single zeros in a text, with which some programs fill fields of fixed length, are left out. The text of a
-    binary file keeps control characters.
+    Single zeros in a text, with which some programs fill fields of fixed length, are left out, but within a
+    number. The text of a binary file keeps control characters.
     """
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     head = content[: min(_HEAD, len(content) & ~1)]
@@ -121,7 +128,7 @@ def decoded(content: bytes) -> str:
         except UnicodeDecodeError:
             return content.decode("latin-1")
     if content.count(0) < _MOST_ZEROS * len(content):
-        content = content.replace(b"\0", b"")
+        content = _FILLING.sub(b"", content)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
