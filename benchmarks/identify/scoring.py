@@ -1,0 +1,152 @@
+"""Scores of identifications against the truth."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from suite import Case
+
+LEAST = 10.0
+"""Layers thinner than this (nm) count as faces: native oxides, roughness, contamination."""
+SAME_INDEX, SAME_DEPTH, ERRORS = 0.025, 0.03, 3.0
+"""Relative difference of the mean index and of the thickness, or its standard errors, of one layer."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer of one case: `outcome` is "right", "listed", "wrong" (identified, and not so), "missed" or
+    "silent" (undecided without the truth, and none); `close` is true where the answer leaves residuals of the
+    noise only, so that nothing in the data contradicts it."""
+
+    name: str
+    group: str
+    status: str
+    outcome: str
+    layers_right: bool
+    close: bool
+    truth: str
+    answer: str
+    verdict: str
+    seconds: float
+
+
+def truth_of(case: Case) -> str:
+    """The sample in words."""
+    nm = case.view.nm
+    layers = [
+        f"{x.material} {x.thickness:.0f} nm n {np.mean(np.real(x.index(nm))):.3f}"
+        for x in case.specimen.layers
+    ]
+    return ", ".join([*layers, f"on {case.specimen.substrate}"])
+
+
+def thick(hypothesis: Any) -> list[Any]:
+    """Layers of a hypothesis that are no faces."""
+    return [layer for layer in hypothesis.layers if layer.thickness.value > LEAST]
+
+
+def matches(case: Case, hypothesis: Any) -> bool:
+    """True where a hypothesis has the layers of the truth, with their index and thickness."""
+    every, nm = [x for x in case.specimen.layers if x.thickness > LEAST], case.view.nm
+    supposed, flaws = thick(hypothesis), case.specimen.flaws
+    if len(every) != len(supposed):
+        return False
+    for layer, own in zip(every, supposed, strict=True):
+        n = float(np.mean(np.real(layer.index(nm))))
+        low, high = own.n
+        # the mean lies between the least and the largest index
+        off = max(low - n, n - high, 0.0) / n
+        depth, error = own.thickness.value, own.thickness.stderr
+        near = max(SAME_DEPTH * layer.thickness, ERRORS * (error if np.isfinite(error) else 0.0), 2.0)
+        near += flaws.carbon + flaws.rough / 2  # which may count as a part of the film
+        if off > SAME_INDEX or abs(depth - layer.thickness) > near:
+            return False
+    return True
+
+
+def score(case: Case, found: Any) -> tuple[str, bool]:
+    """Outcome of an identification, and whether its best hypothesis has the right number of layers."""
+    status, hypotheses = str(found.status), list(found.hypotheses)
+    count = sum(x.thickness > LEAST for x in case.specimen.layers)
+    layers = bool(hypotheses) and len(thick(hypotheses[0])) == count
+    right = [matches(case, x) for x in hypotheses]
+    if case.expected == "mistake":
+        # what the mistake does not touch may be right
+        return ("wrong" if status == "identified" and not right[0] else "right"), layers
+    if status == "identified":
+        return ("right" if right[:1] == [True] else "wrong"), layers
+    return ("listed" if any(right) else "missed" if status == "undecided" else "silent"), layers
+
+
+def described(found: Any) -> str:
+    """The best hypotheses in words."""
+    words = []
+    for x in list(found.hypotheses)[:3]:
+        layers = [
+            f"{layer.material} {layer.thickness.value:.1f}±{layer.thickness.stderr:.1f} n"
+            f" {layer.n[0]:.3f}-{layer.n[1]:.3f}"
+            for layer in x.layers
+        ]
+        words.append(f"{' / '.join(layers) or 'bare'} (remaining {x.remaining:.2f})")
+    return "; ".join(words)
+
+
+def table(answers: Sequence[Answer]) -> str:
+    """Outcomes by group, in Markdown."""
+    heads = ("right", "listed", "wrong", "missed", "silent")
+    columns = ("right", "undecided, truth listed", "confidently wrong", "undecided, truth not listed", "none")
+    lines = [f"| group | cases | {' | '.join(columns)} | median s |", "|---" * 8 + "|"]
+    groups = list(dict.fromkeys(x.group for x in answers))
+    for group in [*groups, "all"]:
+        own = [x for x in answers if group in (x.group, "all")]
+        counts = [sum(x.outcome == head for x in own) for head in heads]
+        seconds = median(x.seconds for x in own)
+        lines.append(f"| {group} | {len(own)} | {' | '.join(map(str, counts))} | {seconds:.1f} |")
+    return "\n".join(lines)
+
+
+def goals(answers: Sequence[Answer]) -> list[str]:
+    """The figures that are required, with those of this run."""
+
+    def share(kept: Iterable[Answer], wanted: Callable[[Answer], bool]) -> str:
+        every = list(kept)
+        hits = sum(map(wanted, every))
+        return f"{hits} of {len(every)} ({100 * hits / max(len(every), 1):.0f} %)"
+
+    films = [x for x in answers if x.group in ("one film", "clean", "two layers", "there", "not there")]
+    group = {name: [x for x in answers if x.group == name] for name in ("not there", "there", "clean")}
+    mistakes = [x for x in answers if x.group.startswith("wrong ")]
+
+    def wrong(x: Answer) -> bool:
+        return x.outcome == "wrong"
+
+    return [
+        f"confidently wrong: {share(answers, wrong)}; goal 3 %",
+        f"of these the data contradict: {share(answers, lambda x: wrong(x) and not x.close)}; goal 1 %",
+        f"right: {share(films, lambda x: x.outcome == 'right')}; goal 65 %",
+        f"right or listed: {share(films, lambda x: x.outcome in ('right', 'listed'))}; goal 90 %",
+        f"a layer that is not there: {share(group['not there'], lambda x: wrong(x) and not x.layers_right)}",
+        f"a layer that is there: {share(group['there'], lambda x: x.layers_right)}",
+        f"mistakes told as a film: {share(mistakes, wrong)}; goal 3 %",
+        f"clean, one answer: {share(group['clean'], lambda x: x.outcome == 'right')}; goal 90 %",
+    ]
+
+
+def failures(answers: Sequence[Answer]) -> str:
+    """Every confident error."""
+    wrong = [x for x in answers if x.outcome == "wrong"]
+    return "\n".join(f"- {x.name}: truth {x.truth}; answer {x.answer}" for x in wrong)
+
+
+def write_csv(answers: Sequence[Answer], path: Path) -> None:
+    """Write all answers."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, [each.name for each in fields(Answer)])
+        writer.writeheader()
+        writer.writerows(asdict(x) for x in answers)

@@ -1,0 +1,90 @@
+"""Benchmark of identifications: its simulator against the forward model, its cases and its scores."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import pellicle as pl
+
+HERE = Path(__file__).parents[1] / "benchmarks" / "identify"
+
+
+@pytest.fixture(scope="module")
+def bench(modules_of):
+    with modules_of(HERE, "specimens", "suite", "scoring") as modules:
+        yield SimpleNamespace(**modules)
+
+
+@pytest.mark.parametrize(
+    ("signal", "angle", "back"), [("R", 0.0, ""), ("T", 0.0, "air"), ("psi-delta", 70.0, "")]
+)
+def test_the_simulator_agrees_with_the_forward_model(bench, signal, angle, back):
+    s = bench.specimens
+    film = s.Specimen((s.Layer("TiO2", 90.0), s.Layer("SiO2", 120.0)), "BK7", back)
+    view = s.View(signal, angle, 0.0, points=12)
+    layers = [pl.Layer(s.PAGES["TiO2"], 90.0), pl.Layer("SiO2", 120.0)]
+    substrate = pl.Substrate("BK7", back=back or None)
+    own = pl.simulate(pl.Scene(layers, substrate, light=pl.Light(angle=angle, signal=signal)), view.nm)
+    expected = own.values if own.delta is None else np.stack([own.values, own.delta], axis=1)
+    np.testing.assert_allclose(s.clean(film, view), expected, atol=2e-5)
+
+
+def test_flaws_change_the_signal_by_their_size(bench):
+    s = bench.specimens
+    film = s.Specimen((s.Layer("Si3N4", 200.0),), "Si")
+    view = s.View("R", 0.0, 0.0, points=12)
+    plain = s.clean(film, view)
+    level = s.clean(replace(film, flaws=s.Flaws(scale=0.01, offset=0.002)), view)
+    np.testing.assert_allclose(level, 1.01 * plain + 0.002)
+    for flaw in ("spread", "rough", "carbon", "bandwidth"):
+        off = np.abs(s.clean(replace(film, flaws=s.Flaws(**{flaw: 1.0})), view) - plain).max()
+        assert 1e-5 < off < 0.05, flaw
+
+
+def test_cases_are_many_named_once_and_drawn_anew_by_another_seed(bench):
+    cases = bench.suite.cases(bench.suite.SEED)
+    assert len(cases) >= 200
+    assert len({case.name for case in cases}) == len(cases)
+    again = bench.suite.cases(bench.suite.SEED)
+    other = bench.suite.cases(bench.suite.HELD_OUT)
+    assert cases == again
+    assert cases[0].specimen != other[0].specimen
+
+
+def trivial(case, status, offset=0.0):
+    """An identification that knows the truth, off by `offset` nm."""
+    nm, layers = case.view.nm, []
+    for layer in case.specimen.layers:
+        n = layer.index(nm).real
+        depth = SimpleNamespace(value=layer.thickness + offset, stderr=1.0)
+        layers.append(SimpleNamespace(material=layer.material, n=(n.min(), n.max()), thickness=depth))
+    return SimpleNamespace(status=status, hypotheses=[SimpleNamespace(layers=layers, remaining=1.0)])
+
+
+def test_scores_of_a_trivial_identifier(bench):
+    score, by_group = bench.scoring.score, {x.group: x for x in bench.suite.cases(1)}
+    film = by_group["two layers"]
+    assert score(film, trivial(film, "identified")) == ("right", True)
+    assert score(film, trivial(film, "undecided")) == ("listed", True)
+    assert score(film, trivial(film, "identified", 40.0)) == ("wrong", True)
+    assert score(film, trivial(film, "undecided", 40.0)) == ("missed", True)
+    assert score(film, SimpleNamespace(status="none", hypotheses=[])) == ("silent", False)
+    # a layer too many
+    assert score(by_group["not there"], trivial(by_group["there"], "identified")) == ("wrong", False)
+    assert score(by_group["wrong substrate"], trivial(film, "identified")) == ("wrong", False)
+    assert score(by_group["wrong substrate"], trivial(film, "undecided"))[0] == "right"
+    assert score(by_group["no film"], trivial(by_group["no film"], "identified")) == ("right", True)
+
+
+def test_shares_of_a_run(bench):
+    about = {"close": True, "truth": "", "answer": "", "verdict": "", "seconds": 1.0}
+    made = [
+        bench.scoring.Answer(f"{i}", group, "identified", outcome, True, **about)
+        for i, (group, outcome) in enumerate([("clean", "right"), ("clean", "wrong"), ("there", "listed")])
+    ]
+    assert bench.scoring.goals(made)[0] == "confidently wrong: 1 of 3 (33 %); goal 3 %"
+    assert "| all | 3 | 1 | 1 | 1 | 0 | 0 | 1.0 |" in bench.scoring.table(made)
+    assert bench.scoring.failures(made).startswith("- 1: truth")
