@@ -118,7 +118,7 @@ def _is_private(handle: int) -> bool:
 log = logging.getLogger(__name__)
 
 Program: TypeAlias = Callable[..., Any]
-Options: TypeAlias = dict[str, str | bool | int]
+Options: TypeAlias = dict[str, str | bool]
 """Options of XLA."""
 
 LIMIT = 256 * 2**20
@@ -127,8 +127,8 @@ LIMIT = 256 * 2**20
 Calls: TypeAlias = Literal["few", "some", "many"]
 """How often one fit calls a program: once or twice, in a loop or for many candidates, for every pixel."""
 
-_SOME: Options = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": 1}
-_FEW: Options = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
+_SOME: Options = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": "1"}
+_FEW: Options = {"xla_backend_optimization_level": "0", "xla_llvm_disable_expensive_passes": True}
 _OPTIONS: dict[Calls, Options] = {"few": _SOME | _FEW, "some": _SOME, "many": {}}
 """XLA's older code generator compiles the programs of a fit in 5 to 22 s of processor time, not 7 to 30 s;
 most run as fast within 20 %, those of a slow scale and offset a third slower (jaxlib 0.10, by
