@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.optimize import least_squares as scipy_least_squares
 
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+from pellicle.fitting.optimistix_solver import BoundedLevenbergMarquardt
 from pellicle.simulation.functions import reflectance
 
 WAVELENGTH = np.linspace(400.0, 900.0, 64)

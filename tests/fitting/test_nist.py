@@ -21,7 +21,7 @@ from pellicle.fitting.coordinates import box
 from pellicle.fitting.covariance import errors, scaled
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.view import Local, SpectrumView
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+from pellicle.fitting.optimistix_solver import BoundedLevenbergMarquardt
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Noise, Problem
 

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+from pellicle.fitting.levenberg_marquardt import advance, begin, ended
 
 _LEAST, _SETTLING = 4, 0.1
 """Evaluations before a lane is given up, and the share of the promise before to which that of a step falls in
@@ -49,45 +48,43 @@ def least_squares(
     `steps` evaluations, or where an undamped step promises less than the share `coarse` of its distance to
     the best cost of all: it cannot become the best.
     """
-    solver = BoundedLevenbergMarquardt(rtol, atol)
-    options = {"lower": 0.0, "upper": 1.0}
-    size, tags = len(starts), frozenset()
+    size, bounds = len(starts), (jnp.zeros_like(starts[0]), jnp.ones_like(starts[0]))
     shapes: Any = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
 
-    def begin(y):
-        return solver.init(fn, y, None, options, shapes[0], shapes[1], tags)
+    def begun(y):
+        return begin(y, bounds, shapes[1])
 
-    def advance(y, state, which):
+    def advanced(y, state, which):
         own = jax.tree.map(lambda leaf: leaf[jnp.minimum(which, size - 1)], args)
-        y, state, _ = solver.step(fn, y, own, options, state, tags)
-        done, result = solver.terminate(fn, y, own, options, state, tags)
-        return y, state, done, result == optx.RESULTS.successful
+        y, state = advance(fn, y, own, bounds, state)
+        found = ended(y, state, rtol, atol)
+        return y, state, found.ended, ~(found.diverged | found.lost)
 
     def proceed(carry):
         y, state, which, used, following, results = carry
         before = state.promise
-        y, state, done, success = jax.vmap(advance)(y, state, which)
+        y, state, done, success = jax.vmap(advanced)(y, state, which)
         active, used = which < count, used + 1
         best = jnp.minimum(jnp.min(results.cost), jnp.min(jnp.where(active, state.cost, jnp.inf)))
         settling = state.promise <= _SETTLING * before
         hopeless = (used >= _LEAST) & settling & (state.promise <= coarse * (state.cost - best))
-        ended = active & (done | hopeless | (used >= steps))
-        at = jnp.where(ended, which, size)  # out of range: dropped
+        over = active & (done | hopeless | (used >= steps))
+        at = jnp.where(over, which, size)  # out of range: dropped
         new = Solutions(y, state.cost, state.aux, hopeless | (done & success), used)
         results = jax.tree.map(lambda old, row: old.at[at].set(row, mode="drop"), results, new)
         # lanes that have ended take the next starts of the queue
-        which = jnp.where(ended, following + jnp.cumsum(ended) - 1, which)
+        which = jnp.where(over, following + jnp.cumsum(over) - 1, which)
         start = starts[jnp.minimum(which, size - 1)]
         y, state = jax.tree.map(
-            lambda new, old: jnp.where(ended.reshape(-1, *[1] * (old.ndim - 1)), new, old),
-            (start, jax.vmap(begin)(start)),
+            lambda new, old: jnp.where(over.reshape(-1, *[1] * (old.ndim - 1)), new, old),
+            (start, jax.vmap(begun)(start)),
             (y, state),
         )
-        return y, state, which, jnp.where(ended, 0, used), following + jnp.sum(ended), results
+        return y, state, which, jnp.where(over, 0, used), following + jnp.sum(over), results
 
     first = jnp.arange(lanes)
     start = starts[jnp.minimum(first, size - 1)]
-    state = jax.vmap(begin)(start)
+    state = jax.vmap(begun)(start)
     empty = Solutions(
         jnp.array(starts),
         jnp.full(size, jnp.inf, starts.dtype),

@@ -1,4 +1,4 @@
-"""Box-bounded Levenberg-Marquardt with second-order correction, as a solver of Optimistix.
+"""Box-bounded Levenberg-Marquardt with second-order correction.
 
 Optimistix's least-squares solvers know no bounds, and Gauss-Newton steps crawl towards minima with large
 residuals: those of a wrong order of interference take a hundred steps. Here the Gauss-Newton matrix JᵀJ is
@@ -9,15 +9,17 @@ damping follows H. Nielsen (1999, IMM-REP-1999-05). The state has the size of th
 data, so that many lanes are cheap to carry (`fitting.lanes`).
 """
 
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
 from pellicle.fitting.positive_definite import solve_if_positive
+
+Bounds: TypeAlias = tuple[Any, Any]
+"""Lower and upper bounds, arrays like the parameters."""
 
 _START = 1e-3
 """First damping, in units of the largest curvature so far: near Gauss-Newton."""
@@ -119,106 +121,90 @@ def normal_equations(fn, y, args):
     return cost, gradient, sum(c @ c.T for c in columns), aux
 
 
-@final
-class BoundedLevenbergMarquardt(optx.AbstractLeastSquaresSolver):
-    """`optx.least_squares(fn, BoundedLevenbergMarquardt(rtol, atol), y0, options={"lower":, "upper":})`.
+def begin(y: Any, bounds: Bounds, aux: Any) -> State:
+    """The state before the first evaluation, at y (parameters,); `aux` is like the function's own output."""
+    zero = jnp.zeros((), y.dtype)
+    square = jnp.zeros((y.size,) * 2, y.dtype)
+    return State(
+        first=jnp.array(True),
+        y_eval=jnp.clip(y, *bounds),
+        cost=zero + jnp.inf,
+        gradient=0 * y,
+        hessian=square,
+        curvature=square,
+        top=0 * y,
+        damping=zero,
+        growth=zero,
+        predicted=jnp.zeros(2, y.dtype),
+        corrected=jnp.array(False),
+        promise=zero + jnp.inf,
+        fruitless=jnp.array(0),
+        aux=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), aux),
+    )
 
-    `y0` and the bounds are one-dimensional arrays (or scalar bounds); residuals are any pytree. A point has
-    settled where an undamped step inside the box promises to change ‖r‖ by at most atol + rtol ‖r‖: this is
-    0 at a constrained minimum and free of the parameters' scale. Runs under jit and vmap, in float32 and
-    float64. Do not differentiate through it: Optimistix's implicit rule assumes a vanishing gradient, which
-    is wrong at an active bound.
+
+def advance(fn: Any, y: Any, args: Any, bounds: Bounds, state: State) -> tuple[Any, State]:
+    """The accepted point and the state after an evaluation of residuals and `aux`, `fn(y, args)`."""
+    cost, gradient, hessian, aux = normal_equations(fn, state.y_eval, args)
+    cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
+    accept = state.first | (cost < state.cost)
+
+    def chosen(new, old):
+        return jnp.where(accept, new, old)
+
+    hessian = chosen(hessian, state.hessian)
+    curvature = _with_secant(state, state.y_eval - y, gradient, hessian)
+    fall = state.cost - cost
+    by_first, by_second = jnp.abs(state.predicted - fall)
+    corrected = jnp.where(jnp.isfinite(fall), by_second <= by_first, state.corrected)
+    gain = fall / jnp.maximum(state.predicted[state.corrected.astype(int)], jnp.finfo(y.dtype).tiny)
+    damping = state.damping * jnp.where(accept, jnp.clip(1 - (2 * gain - 1) ** 3, 0.1, 2), state.growth)
+    top = jnp.maximum(state.top, jnp.diagonal(hessian))
+    y = chosen(state.y_eval, y)
+    gradient = chosen(gradient, state.gradient)
+    damping = jnp.where(state.first, jnp.asarray(_START, y.dtype), damping)
+    model = QuadraticModel(y, gradient, hessian, curvature, top, *bounds)
+    trial, predicted, promise = model.propose(damping, corrected)
+    return y, State(
+        first=jnp.array(False),
+        y_eval=trial,
+        cost=chosen(cost, state.cost),
+        gradient=gradient,
+        hessian=hessian,
+        curvature=curvature,
+        top=top,
+        damping=damping,
+        growth=jnp.where(accept, 2, 2 * state.growth).astype(y.dtype),
+        predicted=predicted,
+        corrected=corrected,
+        promise=promise,
+        fruitless=jnp.where(fall > jnp.finfo(y.dtype).eps ** _ROUNDING * state.cost, 0, state.fruitless + 1),
+        aux=jax.tree.map(chosen, aux, state.aux),
+    )
+
+
+class Ended(NamedTuple):
+    """True where the solver stops; where it is stuck far from a minimum; where the cost is not finite."""
+
+    ended: Any
+    diverged: Any
+    lost: Any
+
+
+def ended(y: Any, state: State, rtol: Any, atol: Any) -> Ended:
+    """Test a state after its first evaluation, at y.
+
+    A point has settled where an undamped step inside the box promises to change ‖r‖ by at most atol +
+    rtol ‖r‖: this is 0 at a constrained minimum and free of the parameters' scale.
     """
-
-    rtol: Any  # a number, also a traced one
-    atol: Any
-    norm: Any = optx.two_norm
-
-    def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        del fn, args, f_struct, tags
-        zero = jnp.zeros((), y.dtype)
-        square = jnp.zeros((y.size,) * 2, y.dtype)
-        lower, upper = _bounds(options, y)
-        return State(
-            first=jnp.array(True),
-            y_eval=jnp.clip(y, lower, upper),
-            cost=zero + jnp.inf,
-            gradient=0 * y,
-            hessian=square,
-            curvature=square,
-            top=0 * y,
-            damping=zero,
-            growth=zero,
-            predicted=jnp.zeros(2, y.dtype),
-            corrected=jnp.array(False),
-            promise=zero + jnp.inf,
-            fruitless=jnp.array(0),
-            aux=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), aux_struct),
-        )
-
-    def step(self, fn, y, args, options, state, tags):
-        del tags
-        cost, gradient, hessian, aux = normal_equations(fn, state.y_eval, args)
-        cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
-        accept = state.first | (cost < state.cost)
-
-        def chosen(new, old):
-            return jnp.where(accept, new, old)
-
-        hessian = chosen(hessian, state.hessian)
-        curvature = _with_secant(state, state.y_eval - y, gradient, hessian)
-        fall = state.cost - cost
-        by_first, by_second = jnp.abs(state.predicted - fall)
-        corrected = jnp.where(jnp.isfinite(fall), by_second <= by_first, state.corrected)
-        gain = fall / jnp.maximum(state.predicted[state.corrected.astype(int)], jnp.finfo(y.dtype).tiny)
-        damping = state.damping * jnp.where(accept, jnp.clip(1 - (2 * gain - 1) ** 3, 0.1, 2), state.growth)
-        top = jnp.maximum(state.top, jnp.diagonal(hessian))
-        y = chosen(state.y_eval, y)
-        gradient = chosen(gradient, state.gradient)
-        damping = jnp.where(state.first, jnp.asarray(_START, y.dtype), damping)
-        model = QuadraticModel(y, gradient, hessian, curvature, top, *_bounds(options, y))
-        trial, predicted, promise = model.propose(damping, corrected)
-        aux = jax.tree.map(chosen, aux, state.aux)
-        state = State(
-            first=jnp.array(False),
-            y_eval=trial,
-            cost=chosen(cost, state.cost),
-            gradient=gradient,
-            hessian=hessian,
-            curvature=curvature,
-            top=top,
-            damping=damping,
-            growth=jnp.where(accept, 2, 2 * state.growth).astype(y.dtype),
-            predicted=predicted,
-            corrected=corrected,
-            promise=promise,
-            fruitless=jnp.where(
-                fall > jnp.finfo(y.dtype).eps ** _ROUNDING * state.cost, 0, state.fruitless + 1
-            ),
-            aux=aux,
-        )
-        return y, state, aux
-
-    def terminate(self, fn, y, args, options, state, tags):
-        del fn, args, options, tags
-        eps = jnp.finfo(y.dtype).eps
-        size, promise = jnp.sqrt(state.cost), jnp.sqrt(state.promise)
-        rounding = eps * jnp.max(jnp.sqrt(jnp.diagonal(state.hessian)) * jnp.abs(y))
-        done = promise <= self.atol + self.rtol * size + rounding
-        done = done | ((state.fruitless >= _FRUITLESS) & (state.promise <= eps**_ROUNDING * state.cost))
-        stuck = ~done & jnp.all(jnp.abs(state.y_eval - y) <= eps * jnp.abs(y))
-        lost, results = ~jnp.isfinite(size), optx.RESULTS
-        result = results.where(
-            stuck & (promise > jnp.sqrt(jnp.asarray(self.rtol)) * size),
-            results.nonlinear_divergence,
-            results.successful,
-        )
-        result = results.where(lost, results.nonfinite, result)
-        return ~state.first & (done | stuck | lost), results.where(state.first, results.successful, result)
-
-    def postprocess(self, fn, y, aux, args, options, state, tags, result):
-        del fn, args, options, state, tags, result
-        return y, aux, {}
+    eps = jnp.finfo(y.dtype).eps
+    size, promise = jnp.sqrt(state.cost), jnp.sqrt(state.promise)
+    rounding = eps * jnp.max(jnp.sqrt(jnp.diagonal(state.hessian)) * jnp.abs(y))
+    done = promise <= atol + rtol * size + rounding
+    done = done | ((state.fruitless >= _FRUITLESS) & (state.promise <= eps**_ROUNDING * state.cost))
+    stuck = ~done & jnp.all(jnp.abs(state.y_eval - y) <= eps * jnp.abs(y))
+    lost = ~jnp.isfinite(size)
+    return Ended(done | stuck | lost, stuck & (promise > jnp.sqrt(jnp.asarray(rtol)) * size), lost)
 
 
 def _with_secant(state: State, step: Array, gradient: Any, hessian: Any) -> Array:
@@ -228,10 +214,3 @@ def _with_secant(state: State, step: Array, gradient: Any, hessian: Any) -> Arra
     defined = ~state.first & (jnp.abs(along) > _RANK_ONE * jnp.linalg.norm(missing) * jnp.linalg.norm(step))
     update = jnp.outer(missing, missing) / jnp.where(defined, along, 1)
     return jnp.where(defined & jnp.all(jnp.isfinite(update)), state.curvature + update, state.curvature)
-
-
-def _bounds(options: dict[str, Any], y: Array) -> tuple[Array, Array]:
-    """Lower and upper bounds as arrays like y; none where the options have none."""
-    sides = options.get("lower", -jnp.inf), options.get("upper", jnp.inf)
-    lower, upper = (jnp.broadcast_to(jnp.asarray(side, y.dtype), y.shape) for side in sides)
-    return lower, upper

@@ -1,7 +1,4 @@
-"""Small positive definite systems, solved inside compiled loops.
-
-Apart from the solver, which imports Optimistix: a cached program needs no solver.
-"""
+"""Small positive definite systems, solved inside compiled loops."""
 
 import jax
 import jax.numpy as jnp

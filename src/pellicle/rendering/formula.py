@@ -23,7 +23,7 @@ import optimistix as optx
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.colour.bands import published_gaussians
 from pellicle.colour.spaces import srgb_matrix
-from pellicle.fitting.levenberg_marquardt import BoundedLevenbergMarquardt
+from pellicle.fitting.optimistix_solver import BoundedLevenbergMarquardt
 from pellicle.rendering.appearance import ANGLES, Appearance
 
 Numbers = Mapping[str, Any]
