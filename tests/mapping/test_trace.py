@@ -12,7 +12,7 @@ from pellicle.cli import app
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.trace import lost
 from pellicle.mapping.trace_light import Light
-from pellicle.mapping.trace_path import KINK, Candidates, trace_path
+from pellicle.mapping.trace_path import KINK, Candidates, Course, trace_path
 
 LASER, INDEX = 633.0, 1.46
 FRINGE = LASER / 2 / INDEX
@@ -156,7 +156,7 @@ def test_the_path_is_the_cheapest_of_all():
     assert trace_path(t, candidates).price == pytest.approx(min(costs))
     assert tuple(trace_path(t, candidates).chosen) == every[int(np.argmin(costs))]
     monotonic = min(min(price(np.array(path), way) for path in every) for way in (1, -1))
-    assert trace_path(t, candidates, monotonic=True).price == pytest.approx(monotonic)
+    assert trace_path(t, candidates, Course(turn=np.inf)).price == pytest.approx(monotonic)
     assert monotonic > min(costs)
 
 

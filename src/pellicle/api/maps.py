@@ -6,12 +6,13 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
+from pellicle.data.movies import is_movie
 from pellicle.data.read_cube import is_photograph, read_cube
 from pellicle.errors import UsageError
+from pellicle.mapping.movie import fit_movie
 from pellicle.mapping.photograph import map_photograph
 from pellicle.mapping.run import map_cube
 from pellicle.mapping.series import fit_series
-from pellicle.mapping.series_result import Series
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface, check_scene
 
@@ -71,8 +72,8 @@ _OF_MAPS = "neighbours", "preview", "lamp_reference", "model"
 """Arguments of the map of a cube that a series does not take."""
 
 
-def series(data: Any, scene: Scene, **options: Any) -> Series:
-    """Fit a film that changes: thickness and rate against time from all spectra together.
+def series(data: Any, scene: Scene, **options: Any) -> Any:
+    """Fit a film that changes: thickness and rate against time from all spectra together, or from a movie.
 
     Each spectrum is fitted alone first, as a pixel of a map. The path of the thickness then decides the order
     of interference, and a state-space smoother joins all spectra, linearised around their values.
@@ -88,7 +89,17 @@ def series(data: Any, scene: Scene, **options: Any) -> Series:
     - `lamp_curve`: a gain against wavelength that no time changes, as of a window, by which all spectra are
       divided: "joint", fitted together with the films of all times, or a `LampCurve`.
 
-    **Returns:** a `Series`: `dataset` has thickness, rate, errors and status of each time.
+    Of a movie, whose frames `data` are: a folder of images or their paths, or a TIFF of several pages:
+
+    - `time_from` as above, or `frame_rate`, frames per second by the numbers in the names. Grey frames need
+      the one wavelength of their filter in nm, `wavelengths`.
+    - `strip` "x0,y0,x1,y1", a line of places, or `region` "x,y,width,height", by default the whole frame in
+      squares; `points` "x,y;x,y", or positions along the line, at which thinning laws are fitted.
+    - `space`, `observer`, `illuminant`, `lamp`, `sensitivities`, `gamma`, `flat_field`: as in `pellicle.map`
+      of a photograph. Gain and dark level of each channel come from the movie.
+
+    **Returns:** a `Series`: `dataset` has thickness, rate, errors and status of each time. Of a movie a
+    `MovieResult`, whose `dataset` has them at each place, too, and which has thinning `laws`.
 
     **Raises:** DataError for data that cannot be read; UsageError for fewer than three times, and where
     nothing varies.
@@ -101,6 +112,10 @@ def series(data: Any, scene: Scene, **options: Any) -> Series:
     check_scene(scene)
     if isinstance(scene, Surface):
         raise UsageError("`scene` of a series must be a Scene, a film, not a Surface")
+    if is_movie(data):
+        if unknown := sorted(options.keys() - {*signature(fit_movie).parameters}):
+            raise UsageError(f"`{unknown[0]}` is no argument of a movie; leave it out")
+        return fit_movie(data, scene, **options)
     known = {*signature(map_cube).parameters, *signature(read_cube).parameters}
     known -= {"reading", *_OF_MAPS}
     if unknown := sorted(options.keys() - known):

@@ -222,15 +222,16 @@ def map(
     of_photograph = [*named(n for n, value in photograph.items() if value is not None), *camera.given()]
     of_cube = [name for name in (*run.given(), *cube.given()) if name not in _OF_BOTH]
     if is_photograph(Path(data)):
-        _refuse(data, "photograph", "cubes", of_cube)
+        refuse(data, "photograph", "cubes", of_cube)
         seen = photograph | {"signal": cube.signal, "noise": cube.noise, "neighbours": bool(run.neighbours)}
         return _map_photograph(data, described, camera, seen, out, json)
     if Path(data).exists():
-        _refuse(data, "cube", "photographs", of_photograph)
+        refuse(data, "cube", "photographs", of_photograph)
     return map_cube(data, described, run, cube, out, json)
 
 
-def _refuse(data: str, kind: str, others: str, flags: list[str]) -> None:
+def refuse(data: str, kind: str, others: str, flags: list[str]) -> None:
+    """Raise UsageError for flags of other data."""
     if flags:
         verb = "is" if len(flags) == 1 else "are"
         raise UsageError(

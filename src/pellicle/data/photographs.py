@@ -29,7 +29,8 @@ _FLOAT_LEVELS = 65535.0
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
-    """Pixels of a photograph: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top.
+    """Pixels of a photograph: coded values from 0 to 1, float32, (height, width, 3), row 0 at the top; one
+    channel of a grey frame of a movie.
 
     `step` is the step of the coding, 1/255 for 8 bits, that of 16 bits for floats; `profile` the name of an
     embedded colour profile that is not sRGB, or ""; `floats` is true of floating-point
@@ -65,6 +66,14 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
     **Raises:** DataError, one sentence, for a file that is no such photograph, damaged, grey,
     with transparent pixels, or in another colour model; UsageError without the extra `images`.
     """
+    read = read_frame(path)
+    if read.pixels.shape[2] == 1:
+        raise DataError(f"{path}: is grey: a photograph in R, G, B is needed")
+    return read
+
+
+def read_frame(path: str | os.PathLike[str]) -> Photograph:
+    """Read a photograph in colour, or a grey one with a single channel; the rest as `read_photograph`."""
     kind = image_format(path)
     if kind is None:
         raise DataError(f"{path}: is no PNG, TIFF or JPEG photograph; save it as one of these")
@@ -78,7 +87,9 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
             values, full, profile, notes = _tiff(content) if kind == "TIFF" else _by_pillow(content)
     finally:
         log.setLevel(level)
-    if values.ndim != 3 or values.shape[2] not in (3, 4):
+    if values.ndim == 2:
+        values = values[..., None]
+    if values.ndim != 3 or values.shape[2] not in (1, 3, 4):
         raise DataError(f"{path}: has the shape {values.shape} and not three channels; save it in R, G, B")
     if values.shape[2] == 4 and np.any(values[..., 3] < full):
         clear = max(round(float(100 * np.mean(values[..., 3] < full))), 1)
@@ -88,7 +99,7 @@ def read_photograph(path: str | os.PathLike[str]) -> Photograph:
         )
     coded = values[..., :3].astype(np.float32) / np.float32(full)
     name = _profile_name(profile) if profile else "sRGB"
-    foreign = "" if "srgb" in name.lower() or "61966-2" in name else name
+    foreign = "" if "srgb" in name.lower() or "61966-2" in name or values.shape[2] == 1 else name
     if kind == "JPEG":
         notes = [*notes, "JPEG: its compression shifts colours by a few of 255; PNG and TIFF do not"]
     floats = values.dtype.kind == "f"
@@ -101,14 +112,17 @@ def _by_pillow(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[st
 
     opened = Image.open(BytesIO(content))
     notes, profile = [], opened.info.get("icc_profile")
-    if content.startswith(b"\x89PNG") and content[24:25] == b"\x10":
+    deep = content.startswith(b"\x89PNG") and content[24:25] == b"\x10"
+    if deep and opened.mode.startswith("I"):
+        return np.asarray(opened), _FLOAT_LEVELS, profile, notes
+    if deep:
         notes.append("PNG of 16 bits, read to 8: save a TIFF to keep all")
     image: Any = ImageOps.exif_transpose(opened)
     if image.mode == "P":
         notes.append("palette converted to R, G, B")
         image = image.convert("RGBA" if "transparency" in image.info else "RGB")
-    if image.mode not in _COLOUR_MODES:
-        known = {"1": "black and white", "CMYK": "in CMYK"} | dict.fromkeys(("L", "LA", "I", "I;16"), "grey")
+    if image.mode not in (*_COLOUR_MODES, "L"):
+        known = {"1": "black and white", "CMYK": "in CMYK", "LA": "grey, with alpha"}
         shown = known.get(image.mode, f"in the mode {image.mode}")
         raise DataError(f"is {shown}: a photograph in R, G, B is needed")
     return np.asarray(image), 255.0, profile, notes
@@ -120,27 +134,35 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     with tifffile.TiffFile(BytesIO(content)) as file:
         page: Any = file.pages[0]
         notes = [f"page 1 of {len(file.pages)}"] if len(file.pages) > 1 else []
-        name = page.photometric.name if page.photometric is not None else "unknown"
-        if name not in ("RGB", "PALETTE"):
-            shown = "grey" if name.startswith("MINIS") else f"in the colour model {name}"
-            raise DataError(f"is {shown}: a photograph in R, G, B is needed")
-        if page.size > LARGEST:
-            raise DataError(f"has {page.size:,} values, more than {LARGEST:,}; cut it to the film")
-        values = page.asarray()
-        if name == "PALETTE":
-            values = np.moveaxis(page.colormap[:, values], 0, -1)
-            notes.append("palette converted to R, G, B")
-        elif page.planarconfig.name == "SEPARATE":
-            values = np.moveaxis(values, 0, -1)
+        values, full = tiff_page(page)
+        notes += ["palette converted to R, G, B"] if page.photometric.name == "PALETTE" else []
         tag = page.tags.get(34675)  # ICC profile
-        profile = None if tag is None else tag.value
+        return values, full, None if tag is None else tag.value, notes
+
+
+def tiff_page(page: Any) -> tuple[np.ndarray, float]:
+    """Values (height, width), or (height, width, channels), of a page, and the value of white.
+
+    Raises DataError for other colours than R, G, B and grey, and for types that a camera does not have.
+    """
+    name = page.photometric.name if page.photometric is not None else "unknown"
+    if name not in ("RGB", "PALETTE", "MINISBLACK"):
+        shown = "grey with black as its largest value" if name == "MINISWHITE" else f"in the model {name}"
+        raise DataError(f"is {shown}: a photograph in R, G, B is needed")
+    if page.size > LARGEST:
+        raise DataError(f"has {page.size:,} values, more than {LARGEST:,}; cut it to the film")
+    values = page.asarray()
+    if name == "PALETTE":
+        values = np.moveaxis(page.colormap[:, values], 0, -1)
+    elif values.ndim == 3 and page.planarconfig == 2:  # separate planes
+        values = np.moveaxis(values, 0, -1)
     if values.dtype.kind == "f":
         if not (np.isfinite(values).all() and values.min() >= 0 and values.max() <= 1):
             raise DataError("has values beyond 0 to 1: divide them by that of white")
-        return values, 1.0, profile, notes
+        return values, 1.0
     if values.dtype not in (np.uint8, np.uint16):
         raise DataError(f"has values of the type {values.dtype}: save it with 8 or 16 bits")
-    return values, float(np.iinfo(values.dtype).max), profile, notes
+    return values, float(np.iinfo(values.dtype).max)
 
 
 def _profile_name(profile: bytes) -> str:
@@ -186,7 +208,7 @@ class Region(NamedTuple):
                 " shift or shrink it"
             )
         rows, columns = slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
-        return photograph.pixels[rows, columns].reshape(-1, 3)
+        return photograph.pixels[rows, columns].reshape(-1, photograph.pixels.shape[2])
 
     def __str__(self) -> str:
         return f"{self.x},{self.y},{self.width},{self.height}"

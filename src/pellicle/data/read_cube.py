@@ -24,6 +24,7 @@ from pellicle.data.cubes import (
 )
 from pellicle.data.cubes.frames import camera_frames, read_mask
 from pellicle.data.fingerprint import WHOLE, file_fingerprint, fingerprint
+from pellicle.data.movies import refuse_movie
 from pellicle.data.photographs import image_format
 from pellicle.data.spectrum import POLARISATIONS
 from pellicle.errors import DataError, UsageError
@@ -332,6 +333,7 @@ def read_raw(path: Path, asked: raw_cube.Asked) -> raw_cube.RawCube:
     """Read the cube of a file or folder. Raises DataError or UsageError, one sentence."""
     if not path.exists():
         raise DataError(f"{path}: no such file or folder; check its name")
+    refuse_movie(path)
     for recognises, read in READERS.items():
         if recognises(path):
             return read(path, asked)

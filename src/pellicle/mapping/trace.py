@@ -32,7 +32,7 @@ from pellicle.mapping.series_result import Joined
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.trace_branches import Branches, branches_of, known_ends, signals_at
 from pellicle.mapping.trace_light import Light, averaged, light_of
-from pellicle.mapping.trace_path import TracePath
+from pellicle.mapping.trace_path import Course, TracePath
 from pellicle.scene.film import Scene
 from pellicle.scene.free import MONOTONIC, SHARED, SLOWLY
 from pellicle.scene.instrument import Drift
@@ -76,7 +76,7 @@ class Trace(NamedTuple):
         light = light_of(self.cube, time, (self.gain, self.offset))
         fit = _Fitter(model, kinds, depth)
         rough = averaged(light)
-        found = branches_of(rough, model, depth, kinds[depth] == MONOTONIC)
+        found = branches_of(rough, model, depth, Course(np.inf if kinds[depth] == MONOTONIC else 0.0))
         path, rival = _decided(fit, rough, found)
         nearest = found.nearest(time)
         used = np.flatnonzero(np.isfinite(light.values).any(axis=1) & found.inside[nearest])

@@ -16,7 +16,7 @@ from pellicle.fitting.film.problem import shortest_wavelength
 from pellicle.fitting.parameter import Parameter
 from pellicle.mapping.pixels import PixelModel
 from pellicle.mapping.trace_light import Light, windows_of
-from pellicle.mapping.trace_path import KINK, Candidates, TracePath, trace_path
+from pellicle.mapping.trace_path import KINK, Candidates, Course, TracePath, trace_path
 from pellicle.scene.priors import Normal
 
 _ROUNDS = 4
@@ -33,16 +33,17 @@ _OUTSIDE = 25.0
 
 class Branches(NamedTuple):
     """Candidates of the windows that a thickness explains, at the times `centre` of all windows, of which
-    these are `inside`; the best path, the gain and offset (wavelengths, 2), and the other parameters in the
-    unit cube."""
+    these are `inside`; what the film may do; the best path, the gain and offset (wavelengths, 2), the other
+    parameters in the unit cube, and the price of path, misfit and windows outside."""
 
     candidates: Candidates
     centre: np.ndarray
     inside: np.ndarray
-    monotonic: bool
+    course: Course
     path: TracePath
     gain: np.ndarray
     start: np.ndarray
+    price: float
 
     def thickness(self, path: TracePath) -> np.ndarray:
         """Thickness of a path in its windows."""
@@ -56,45 +57,81 @@ class Branches(NamedTuple):
         """The windows of any times."""
         return np.searchsorted(0.5 * (self.centre[1:] + self.centre[:-1]), time)
 
+    def gain_of(
+        self,
+        path: TracePath,
+        seen: np.ndarray,
+        grid: np.ndarray,
+        table: np.ndarray,
+        known: tuple[float | None, float | None],
+    ) -> np.ndarray:
+        """Gain and offset (wavelengths, 2) of the light `seen` in the windows that are `inside`, by a
+        path."""
+        thickness = self.thickness(path)
+        reflected = np.stack([np.interp(thickness, grid, column) for column in table.T], axis=1)
+        return gain_of(seen, reflected, known)
+
     def without(self, path: TracePath, window: int) -> TracePath:
         """The best path that is elsewhere than `path` in a window."""
         delta = self.candidates.delta.copy()
         delta[window, self.candidates.same(path.chosen)[window]] = np.inf
         others = self.candidates._replace(delta=delta)
-        return trace_path(self.centre[self.inside], others, monotonic=self.monotonic)
+        return trace_path(self.centre[self.inside], others, self.course)
 
 
-def branches_of(light: Light, model: PixelModel, depth: int, monotonic: bool) -> Branches:
+def branches_of(light: Light, model: PixelModel, depth: int, course: Course) -> Branches:
     """The path of the thickness through the branches, by windows of time."""
     parameter = model.parameters[depth]
     grid = nodes(parameter.lower, parameter.upper, shortest_wavelength(model.problem))
-    ends, (windows, weight) = known_ends(model, depth), windows_of(light)
-    seen = np.stack([np.nanmean(light.values[w], axis=0) for w in windows])
-    count = np.array([len(w) for w in windows])
-    centre = np.array([light.time[w].mean() for w in windows])
-    best, least_price, better = None, np.inf, np.zeros((0, 2))
+    ends, found = known_ends(model, depth), []
     for start in _starts(model.parameters, depth):
         units = np.tile(start, (len(grid), 1))
         units[:, depth] = (grid - parameter.lower) / (parameter.upper - parameter.lower)
         table = np.asarray(signals_at(model, units).signal)
-        rounds = product(_first_gains(light, seen, grid, table, ends), range(_ROUNDS))
-        for first, number in rounds:
-            gain = better if number else first
-            error = np.hypot(light.noise / np.sqrt(count)[:, None], _TOLERANCE[number > 0] * light.span)
-            candidates, least = _candidates(grid, table, seen, error, gain, weight)
-            inside = least < _OUTSIDE + 9 * np.median(least)
-            own = _anchored(Candidates(*(x[inside] for x in candidates)), ends)
-            path = trace_path(centre[inside], own, monotonic=monotonic)
-            made = Branches(own, centre, inside, monotonic, path, gain, start)
-            price = path.price + weight * float(np.sum(least[inside])) + KINK * float(np.sum(~inside))
-            if number and price < least_price:
-                best, least_price = made, price
-            thickness = made.thickness(path)
-            reflected = np.stack([np.interp(thickness, grid, column) for column in table.T], axis=1)
-            better = _gain(seen[inside], reflected, light.known)
-    if best is None:
+        made = branches_in(light, grid, table, ends, course)
+        found += [] if made is None else [made._replace(start=start)]
+    if not found:
         raise UsageError("no thickness within its bounds follows the trace: widen them")
+    return min(found, key=lambda made: made.price)
+
+
+def branches_in(
+    light: Light,
+    grid: np.ndarray,
+    table: np.ndarray,
+    ends: list[tuple[int, Normal]],
+    course: Course,
+    first: np.ndarray | None = None,
+) -> Branches | None:
+    """The cheapest path through the branches of one light, in rounds, each with a better gain; None without.
+
+    **Arguments:** `table` (thicknesses, wavelengths) is the light of a gain of 1 at the thicknesses `grid`;
+    `ends` are known thicknesses; `first`, the gain and offset (wavelengths, 2) to start from.
+    """
+    windows, weight = windows_of(light)
+    seen = np.stack([np.nanmean(light.values[w], axis=0) for w in windows])
+    count = np.array([len(w) for w in windows])
+    centre = np.array([light.time[w].mean() for w in windows])
+    best, better = None, np.zeros((0, 2))
+    starts = _first_gains(light, seen, grid, table, ends) if first is None else iter([first])
+    for begun, number in product(starts, range(_ROUNDS)):
+        gain = better if number else begun
+        error = np.hypot(light.noise / np.sqrt(count)[:, None], _TOLERANCE[number > 0] * light.span)
+        candidates, least = candidates_of(grid, table, seen, error, gain, weight)
+        inside = explained(least)
+        own = anchored(Candidates(*(x[inside] for x in candidates)), ends)
+        path = trace_path(centre[inside], own, course)
+        price = path.price + weight * float(np.sum(least[inside])) + KINK * float(np.sum(~inside))
+        made = Branches(own, centre, inside, course, path, gain, np.zeros(0), price)
+        if number and price < (np.inf if best is None else best.price):
+            best = made
+        better = made.gain_of(path, seen[inside], grid, table, light.known)
     return best
+
+
+def explained(least: np.ndarray) -> np.ndarray:
+    """True for windows whose `least` misfit (windows,) a thickness explains."""
+    return least < _OUTSIDE + 9 * np.median(least)
 
 
 def _starts(parameters: tuple[Parameter, ...], depth: int) -> Iterator[np.ndarray]:
@@ -138,7 +175,7 @@ def _first_gains(
             yield np.stack([(seen[row] - offset) / np.maximum(there, 1e-9), level], axis=1)
 
 
-def _gain(seen: np.ndarray, reflected: np.ndarray, known: tuple[float | None, float | None]) -> np.ndarray:
+def gain_of(seen: np.ndarray, reflected: np.ndarray, known: tuple[float | None, float | None]) -> np.ndarray:
     """Gain and offset (wavelengths, 2) by least squares, as far as they are free."""
     scale, offset = known
     rows = []
@@ -153,7 +190,7 @@ def _gain(seen: np.ndarray, reflected: np.ndarray, known: tuple[float | None, fl
     return np.array(rows)
 
 
-def _candidates(
+def candidates_of(
     grid: np.ndarray,
     table: np.ndarray,
     seen: np.ndarray,
@@ -198,7 +235,7 @@ def known_ends(model: PixelModel, depth: int) -> list[tuple[int, Normal]]:
     return [(row, x if isinstance(x, Normal) else Normal(x, width)) for row, x in ends if x is not None]
 
 
-def _anchored(candidates: Candidates, ends: list[tuple[int, Normal]]) -> Candidates:
+def anchored(candidates: Candidates, ends: list[tuple[int, Normal]]) -> Candidates:
     """The candidates without those of the first and of the last window that contradict a known thickness."""
     delta = candidates.delta.copy()
     for row, end in ends:

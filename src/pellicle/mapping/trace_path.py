@@ -13,6 +13,9 @@ import numpy as np
 
 KINK = 20.0
 """Price of an abrupt change of the rate, as Δχ²."""
+LEAP = 12.0
+"""Price of a step that is twice as long as one can be, for each such length more, as Δχ²: of several jumps
+the shorter one."""
 _BEND = 0.3
 """Usual change of a step from one window to the next, as its share."""
 _NEAR = 6
@@ -48,21 +51,36 @@ class TracePath(NamedTuple):
     price: float
 
 
-def trace_path(time: np.ndarray, candidates: Candidates, *, monotonic: bool = False) -> TracePath:
+class Course(NamedTuple):
+    """What a film does: `turn` is the price, as Δχ², of a film that both grows and thins, infinite for one
+    that does not; a step longer than `far` (nm) is a jump, whose length has a price, too."""
+
+    turn: float = 0.0
+    far: float = np.inf
+
+
+ANY = Course()
+"""The course of a film that grows and thins as it likes."""
+
+
+def trace_path(time: np.ndarray, candidates: Candidates, course: Course = ANY) -> TracePath:
     """Find the path through the candidates of all windows, three at least, at the times (windows,).
 
-    A `monotonic` film only grows or only thins: whichever fits better, and the other one is a rival.
+    Where turning has a price, a film that only grows, one that only thins, and one that turns are rivals.
     """
-    if not monotonic:
-        return _path(time, candidates, 0)
-    best, other = sorted((_path(time, candidates, way) for way in (1, -1)), key=lambda path: path.price)
+    if course.turn == 0:
+        return _path(time, candidates, 0, course.far)
+    found = [_path(time, candidates, way, course.far) for way in (1, -1)]
+    if course.turn < np.inf:
+        free = _path(time, candidates, 0, course.far)
+        found.append(free._replace(price=free.price + course.turn))
+    best = min(found, key=lambda path: path.price)
     with np.errstate(invalid="ignore"):
-        above = np.nan_to_num(other.price - best.price, nan=0.0, posinf=np.inf)
-    same = other.chosen == best.chosen
-    return best._replace(rival=np.minimum(best.rival, np.where(same, np.inf, above)))
+        rivals = [p.price - best.price + np.where(p.chosen == best.chosen, p.rival, 0.0) for p in found]
+    return best._replace(rival=np.min(np.nan_to_num(rivals, nan=np.inf, posinf=np.inf), axis=0))
 
 
-def _path(time: np.ndarray, candidates: Candidates, way: int) -> TracePath:
+def _path(time: np.ndarray, candidates: Candidates, way: int, far: float) -> TracePath:
     """The cheapest path that changes in this `way`: 1 grows, −1 thins, 0 does either."""
     thickness, delta, stderr = candidates
     there = np.isfinite(thickness)
@@ -84,10 +102,12 @@ def _path(time: np.ndarray, candidates: Candidates, way: int) -> TracePath:
         return np.minimum((step - last) ** 2 / (bend**2 + sum(x**2 for x in noise)), KINK)
 
     def forbidden(t: int) -> np.ndarray:
-        """Infinity for steps (candidates at t, those before) in the wrong way by more than the noise."""
+        """Prices of long steps (candidates at t, those before), infinite for those in the wrong way by more
+        than the noise."""
         i = before[t - 1]
-        away = way * (place[t][:, None] - place[t - 1][i])
-        return np.where(away < -3 * np.hypot(sigma[t][:, None], sigma[t - 1][i]), np.inf, 0.0)
+        step = place[t][:, None] - place[t - 1][i]
+        wrong = way * step < -3 * np.hypot(sigma[t][:, None], sigma[t - 1][i])
+        return np.where(wrong, np.inf, LEAP * np.maximum(np.abs(step) / far - 1, 0.0))
 
     forward, origin = np.empty((count, size, near)), np.zeros((count, size, near), int)
     forward[1] = cost[0][before[0]] + cost[1][:, None] + forbidden(1)

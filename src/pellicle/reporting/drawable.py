@@ -65,11 +65,13 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Values (ordinate, abscissa) in colours, symmetric around 0, above `x` and `y`."""
+    """Values (ordinate, abscissa) in colours above `x` and `y`: symmetric around 0, or from the least to the
+    largest where they are `positive`."""
 
     x: np.ndarray
     y: np.ndarray
     values: np.ndarray
+    positive: bool = False
 
     @property
     def limit(self) -> float:

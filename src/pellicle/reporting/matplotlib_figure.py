@@ -144,7 +144,8 @@ def draw_panel(axes: Axes, panel: Panel) -> None:
         _patches(axes, panel)
     if panel.raster is not None:
         at, limit = panel.raster, panel.raster.limit
-        style = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, "shading": "nearest", "rasterized": True}
+        style: dict[str, Any] = {"shading": "nearest", "rasterized": True, "cmap": "RdBu_r"}
+        style |= {"cmap": "viridis"} if at.positive else {"vmin": -limit, "vmax": limit}
         axes.pcolormesh(at.x, at.y, at.values, **style)
         axes.set_ylabel(panel.label)
     points = max((line.x.size for line in panel.lines), default=0)

@@ -20,7 +20,7 @@ from pellicle.signals.limits import HIGHEST
 
 _BLOCK = 64
 """Lines that are averaged at a time."""
-_DEPTHS = (8, 10, 12, 14, 16)
+DEPTHS = (8, 10, 12, 14, 16)
 """Bits of cameras: a white frame whose largest count is exactly the top of one of them is saturated there."""
 
 
@@ -83,7 +83,7 @@ def camera_frames(
         first = max((axis for axis in sizes if axis != WAVELENGTH), key=sizes.__getitem__, default=WAVELENGTH)
         lines = np.unique(np.linspace(0, sizes[first] - 1, _BLOCK).astype(int))  # a sample of the frame
         largest = max(float(np.max(bright.read({first: slice(i, i + 1)}))) for i in lines)
-        if largest < saturation and largest in (2.0**bits - 1 for bits in _DEPTHS):
+        if largest < saturation and largest in (2.0**bits - 1 for bits in DEPTHS):
             saturation = largest
         notes.append(f"counts from {saturation:g} are saturated")
     return CameraFrames(bright, black, _white_reflectance(reflectance, nm, raw.path), saturation), notes

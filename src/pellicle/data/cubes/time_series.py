@@ -44,9 +44,9 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
         [path] = paths
         names = [one.name for one in spectra]
         where = f"the head of {path.name}"
-        time, unit = _stated(names, time_from, path) if time_from else _numbers(names, str(path), "columns")
+        time, unit = _stated(names, time_from, path) if time_from else numbers_of(names, str(path), "columns")
     else:
-        time, unit, where = _times(list(paths), time_from or BY_NAME)
+        time, unit, where = file_times(list(paths), time_from or BY_NAME)
         known = np.flatnonzero(np.isfinite(time))
         where += f", files without one left out: {len(paths) - known.size}" * (known.size < len(paths))
         time, paths = np.asarray(time)[known], [paths[int(i)] for i in known]
@@ -81,10 +81,10 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
     )
 
 
-def _times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
+def file_times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
     """Times of files, their unit, their source; by dates since the first, of one file since 1970."""
     if time_from == BY_NAME:
-        return *_numbers(
+        return *numbers_of(
             [file.stem for file in files], str(files[0].parent), "files"
         ), "the names of the files"
     if time_from == BY_DATE:
@@ -103,8 +103,9 @@ def _since_first(stamps: np.ndarray) -> np.ndarray:
     return stamps - stamps.min() if stamps.size > 1 else stamps
 
 
-def _numbers(names: Sequence[str], path: str, what: str) -> tuple[Any, str]:
-    """The number in which names differ, with its unit; of a single name the one that has a unit."""
+def numbers_of(names: Sequence[str], path: str, what: str, unit: str | None = None) -> tuple[np.ndarray, str]:
+    """The number in which names differ, with its unit, or counted in a `unit` of its own; of a single name
+    the one that has a unit."""
     found = [_NUMBER.findall(name) for name in names]
     if any(len(one) != len(found[0]) for one in found) or not found[0]:
         raise DataError(f"{path}: the names of its {what} state no times: give a table with --time-from FILE")
@@ -118,7 +119,7 @@ def _numbers(names: Sequence[str], path: str, what: str) -> tuple[Any, str]:
             f"{path}: the names of its {what} {told}: give a table of times with --time-from FILE"
         )
     column = columns[differ[0]]
-    units = {unit for _, unit in column}
+    units = {unit for _, unit in column} if unit is None else {unit}
     if len(units) > 1 or not units.copy().pop():
         raise DataError(
             f"{path}: the times in the names of its {what} have no unit: write 20s or 2 min, or give a table"
