@@ -29,6 +29,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 RECIPE = ("--recipe", "measurements/recipes/hematite_on_glass_140nm.toml")
@@ -48,6 +49,7 @@ FITS = {
 }
 BARE = "import jax, jax.numpy as jnp; jnp.ones(3).sum().block_until_ready()"
 PELLICLE = "import sys; from pellicle.cli import main; sys.exit(main())"
+SCENES = ("R, thickness", "psi and delta, Cauchy", "psi and delta, two layers", "tilted axis")
 GOOD = (0, 4)
 """Exit codes of a fit that was made: one answer, no clear answer."""
 
@@ -67,6 +69,66 @@ def times_of(command: list[str], environment: dict[str, str]) -> tuple[float, fl
 def pellicle(*words: str) -> list[str]:
     """The command in this interpreter."""
     return [sys.executable, "-c", PELLICLE, *words]
+
+
+def first_fit(name: str) -> None:
+    """Fit one of `SCENES` in this process and print a line for each program and for the whole fit."""
+    import jax
+    import numpy as np
+    from whole_fits.cases import cases, measurement
+
+    import pellicle as pl
+    from pellicle.programs import cache
+
+    lines, began, names = [], [0.0], [""]
+    load, make, compile_ = cache._load, cache.make, jax.stages.Lowered.compile
+
+    def named(function, *rest):
+        names[0] = function.__qualname__
+        return load(function, *rest)
+
+    def timed(*arguments):
+        began[0] = time.process_time()
+        return make(*arguments)
+
+    def counted(lowered, *arguments, **options):
+        traced, own = time.process_time() - began[0], lowered.as_text().count("\n")
+        at = time.process_time()
+        compiled = compile_(lowered, *arguments, **options)
+        took = time.process_time() - at
+        if lowered.as_text().startswith("module @jit_program_"):  # no trial of options
+            lines.append((names[0], own, str(compiled.as_text()).count("\n"), traced, took))
+        return compiled
+
+    cache._load, cache.make = named, timed
+    stages: Any = jax.stages
+    stages.Lowered.compile = counted
+    if name == SCENES[-1]:
+
+        def tilted(*angles, thickness, azimuth=None):
+            film = pl.Layer(pl.Anisotropic(1.6, 1.75, axis=angles), thickness)
+            return pl.Scene(film, "BK7", light=pl.Light(angle=60.0, signal="psi-delta", azimuth=azimuth))
+
+        truth = tilted(40.0, 25.0, thickness=240.0, azimuth=np.repeat([0.0, 45.0, 90.0], 64))
+        data = pl.simulate(truth, np.tile(np.linspace(400.0, 800.0, 64), 3), noise=0.05, seed=5)
+        scene = tilted(pl.Free(10, 80), pl.Free(0, 90), thickness=pl.Free(100, 400))
+    else:
+        case = cases()[(0, 3, 6)[SCENES.index(name)]]
+        data, scene = measurement(case, 0).spectrum, case.scene
+    with tempfile.TemporaryDirectory() as folder:
+        jax.config.update("jax_compilation_cache_dir", folder)
+        at = time.process_time()
+        pl.fit(data, scene)
+    print(f"{name:<52}{time.process_time() - at:>16.2f}")
+    for program, *sizes in lines:
+        print("    {:<28}{:>10}{:>10}{:>8.2f}{:>8.2f}".format(program, *sizes))
+
+
+def programs() -> None:
+    """Print the programs of each first fit."""
+    print(f"{'':<32}{'StableHLO':>10}{'HLO':>10}{'trace':>8}{'compile':>8}", flush=True)
+    for name in SCENES:
+        subprocess.run([sys.executable, __file__, "--first-fit", name], check=True)
 
 
 def main(rounds: int) -> None:
@@ -102,4 +164,12 @@ def main(rounds: int) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=7)
-    main(parser.parse_args().rounds)
+    parser.add_argument("--programs", action="store_true", help="the programs of first fits")
+    parser.add_argument("--first-fit", choices=SCENES, help="those of one scene, in this process")
+    asked = parser.parse_args()
+    if asked.first_fit:
+        first_fit(asked.first_fit)
+    elif asked.programs:
+        programs()
+    else:
+        main(asked.rounds)
