@@ -35,6 +35,7 @@ _STARTS: dict[str, list[dict[str, float]]] = {
         {"A": a, "B": min(1.2e4 * (a - 1) ** 2, 9e4)}
         for a in (1.38, 1.46, 1.55, 1.65, 1.8, 1.95, 2.1, 2.25, 2.45, 2.7)
     ],
+    "sellmeier": [{"B1": n**2 - 1, "C1": c} for n in (1.4, 1.6, 1.9, 2.3) for c in (8e3, 2e4)],
     "cauchy-urbach": [
         {"A": a, "B": 1e4, "k0": k, "Eu": 0.4} for a in (1.5, 1.8, 2.1, 2.5) for k in (0.05, 0.4)
     ],
@@ -44,7 +45,10 @@ _STARTS: dict[str, list[dict[str, float]]] = {
     ],
     "tauc-lorentz": [
         {"eps_inf": e, "A": a, "E0": p, "C": 1.5, "Eg": g}
-        for e, a, p, g in ((1.5, 80.0, 4.0, 2.2), (1.5, 200.0, 3.6, 1.5), (2.0, 100.0, 5.0, 3.2))
+        for e, a, p, g in (
+            *((1.5, 80.0, 4.0, 2.2), (1.5, 200.0, 3.6, 1.5), (2.0, 100.0, 5.0, 3.2)),
+            *((1.5, 150.0, 6.5, 4.5), (1.5, 250.0, 7.5, 5.0)),
+        )
     ],
 }
 """Starts of models, by their index; thicknesses are scanned for each."""
@@ -114,7 +118,7 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
     _single_films(growth, names)
     growth.add([growth.film("cauchy")], _model_starts(growth, "cauchy", 4))
     if not growth.done():
-        for model in ("cauchy-urbach", "drude", "lorentz", "tauc-lorentz"):
+        for model in ("sellmeier", "cauchy-urbach", "drude", "lorentz", "tauc-lorentz"):
             growth.add([growth.film(model)], _model_starts(growth, model, 3))
     if not growth.done(_FLEXIBLE):
         _effects(growth)

@@ -24,6 +24,8 @@ from pellicle.identification.signal_view import (
     check_signal,
     compared_points,
 )
+from pellicle.materials import check_common_range
+from pellicle.scene.common_range import covered
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.layers import Layer, Substrate, medium
 
@@ -62,6 +64,7 @@ def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> I
     """
     for spectrum in spectra:
         check(spectrum, request)
+    spectra = [covered(spectrum, request.around()) for spectrum in spectra]
     deadline = time.monotonic() + request.budget
     growth, left_out = _grown(spectra, request, deadline, request.layers)
     kept = conclusion.survivors(growth.weighed)
@@ -146,10 +149,9 @@ def _problem(spectra: Sequence[Spectrum], request: Request) -> tuple[Problem, li
 
     fine, coarse = views(MOST_POINTS), views(SCANNED_POINTS)
     for view in fine:
-        if not np.all(np.isfinite(view.media)):
-            request.substrate.material.check_range(view.spectrum.wavelength)  # pyright: ignore
-    left_out = films.tabulated(fine, request.names)
-    films.tabulated(coarse, list(fine[0].tables))
+        check_common_range([request.substrate.material], view.spectrum.wavelength)
+    # of both grids at once: means of neighbours may lie beyond the ends of a table
+    left_out = films.tabulated((*fine, *coarse), request.names)
     return Problem(fine, thickest, Problem(coarse, thickest)), left_out
 
 
