@@ -16,6 +16,41 @@ Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 5:
     R by a recipe, empty cache              3.98    4.92        6.34       6.76
     R, CSV by flags, empty cache            3.95    5.03        6.31       6.91
     psi and delta, recipe, empty cache      5.40    6.63        8.61       9.11
+
+`--programs` has the programs of `pl.fit` of four scenes instead, each in a new process with an empty cache:
+lines of StableHLO and of optimised HLO, and processor time (s) of tracing with lowering and of compilation.
+
+On a machine with 10 to 20 busy processes, where times are about twice as long; all but R while the polish
+still imported Optimistix:
+
+                                     StableHLO       HLO   trace compile
+    R, thickness                                                    5.40
+        deviances                          283       708    0.12    0.07
+        polished                          1775      4106    0.82    1.18
+        local                              532      1306    0.17    0.09
+        _simulated                         913      1899    0.20    0.22
+        _simulated                        1941      5758    0.57    0.55
+        _simulated                        1380      1993    0.23    0.21
+    psi and delta, Cauchy                                          14.06
+        deviances                         1048      1952    0.48    0.39
+        polished                          6035     10503    2.92    3.65
+        local                             3673      5581    1.38    0.76
+        _simulated                         989      2478    0.26    0.48
+        _simulated                        1809      3859    0.71    0.51
+        _simulated                        1456      2610    0.33    0.31
+    psi and delta, two layers                                      20.98
+        deviances                         1526      2250    0.63    0.54
+        polished                          9014     14561    4.04    5.46
+        local                             5479      7891    1.96    1.45
+        _simulated                        1464      2797    0.42    0.78
+        _simulated                        2083      5956    0.78    0.87
+        _simulated                        1974      3042    0.40    0.39
+    tilted axis                                                    36.64
+        deviances                         2388      6694    1.02    3.81
+        polished                          8688     18168    5.97   10.23
+        local                             5253     13542    2.62    2.26
+        _simulated                        2893     10924    0.82    4.17
+        _simulated                        3330     12107    0.75    1.48
 """
 
 from __future__ import annotations
