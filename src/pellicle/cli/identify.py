@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from pellicle.cli.batch import written
 from pellicle.cli.flags import OUTPUT, SCENE, FileFlags, flag, switch
-from pellicle.cli.messages import show
+from pellicle.cli.messages import Progress, show
 from pellicle.cli.reading import check_words, is_of_colours, read
 from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
 from pellicle.data.options import FileOptions, parse_number
@@ -31,6 +31,9 @@ def identify(
         str | None, flag(SCENE, "Layers, and mistakes to look for (layers=2,calibration,plate).")
     ] = None,
     budget: Annotated[str | None, flag(SCENE, "Time after which no more structures are tried: 20s.")] = None,
+    next: Annotated[
+        bool, switch(SCENE, "Compute which measurement would decide, where several are left.")
+    ] = False,
     reading: Annotated[FileFlags | None, Parameter(name="*")] = None,
     out: Annotated[str | None, flag(OUTPUT, "Folder for the report and a recipe of each film.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object.")] = False,
@@ -56,11 +59,17 @@ def identify(
     if out is not None:
         check_folder(out)
     start()
-    return _identify(paths, options, substrate, given, out, json)
+    return _identify(paths, options, substrate, given, next, out, json)
 
 
 def _identify(
-    paths: list[str], options: FileOptions, substrate: str, given: dict[str, Any], out: str | None, json: bool
+    paths: list[str],
+    options: FileOptions,
+    substrate: str,
+    given: dict[str, Any],
+    plan: bool,
+    out: str | None,
+    json: bool,
 ) -> int:
     from pellicle.api.identification import identify as identified
     from pellicle.recipes.media import medium
@@ -77,6 +86,11 @@ def _identify(
             raise UsageError(f"{colours[0]}: colours cannot be identified: give a spectrum")
         spectra = [spectrum for path in paths for spectrum in read(path, options)]
         found = identified(spectra, below, **given)
+        if plan:
+            from pellicle.identification.next_measurement import with_next_measurement
+
+            with Progress("measurements") as progress:
+                found = with_next_measurement(found, progress)
     except ValueError as error:
         message = error_message(error, paths)
         return reported(message, failure(paths, message) if json else None)

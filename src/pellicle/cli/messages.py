@@ -33,7 +33,7 @@ _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
 _COMMAND_ARGUMENTS = (
     *("depth", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats", "strip"),
-    *("allow", "among", "budget", "family", "idle", "no_page", "thickness_map", "time_from", "to"),
+    *("allow", "among", "budget", "family", "idle", "next", "no_page", "thickness_map", "time_from", "to"),
     *("angles", "noise_degrees", "polarisations", "signals"),
 )
 """Flags that one command has outside the groups of `pellicle.cli.flags`."""
