@@ -95,6 +95,7 @@ ELSEWHERE = (
     *("make slow", "make coverage", "python -m pytest"),  # run these tests
     "make properties",  # properties: the same on thousands of scenes
     "make fuzz",  # data/test_properties.py: a short run
+    "python benchmarks/identify",  # test_identify_benchmark.py: its simulator, cases and scores
     *("make verdicts", "python benchmarks/verdicts"),  # test_verdicts.py: its model, cases and scores
     # install several GB; test_benchmarks.py needs no other package
     *("make peers", "python benchmarks/peers/agreement.py --stacks 1000"),
