@@ -58,6 +58,7 @@ from pellicle.scene.surface import SurfaceUncertainty as SurfaceUncertainty
 from pellicle.scene.ties import Tied as Tied
 from pellicle.scene.uncertainty import Uncertainty as Uncertainty
 from pellicle.simulation.brdf import Directions as Directions
+from pellicle.simulation.colours import film_colour as film_colour
 from pellicle.simulation.depth import absorptance as absorptance
 from pellicle.simulation.depth import field as field
 from pellicle.simulation.functions import ellipsometry as ellipsometry

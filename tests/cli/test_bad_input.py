@@ -52,7 +52,7 @@ def test_data(check_refused, write, text, flags, words):
         ("--signal X", ("--signal", "'X'")),
         ("--scale loose", ("--scale", "'loose'")),
         ("--noise -1", ("--noise",)),
-        ("--noise '2 %'", ("--noise", "share of the signal", "BRDF")),
+        ("--layer 'cauchy(1.45,0.0035)'", ("µm²", "write 3500")),
         ("--free q", ("free 'q'",)),
         ("--plate-mm 1", ("--plate-mm", "--back")),
         ("--back air --plate-mm 0", ("--plate-mm", "above zero")),
@@ -113,3 +113,10 @@ def test_wrong_usage_is_a_json_object_with_the_exit_code(pellicle, words, code, 
     assert said in record["error"]
     assert said in ran.err
     assert pellicle(*words.split()).out == ""
+
+
+def test_a_recipe_in_place_of_data_and_data_in_place_of_a_recipe(pellicle, write):
+    recipe, data = write("[scene]\n", "film.toml"), write(f"wavelength,R\n{ROWS}")
+    pellicle("fit", recipe).refused(2, f"{recipe}: is a recipe", f"--recipe {recipe}")
+    pellicle("fit", data, "--layer", "A", "--layer=B").refused(2, "--layer is given twice", "[[scene.layer]]")
+    pellicle("explore", data).refused(2, f"{data}: is data", "[data] files")

@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import json
 import math
 import re
 import tomllib
@@ -66,8 +67,7 @@ def test_several_files_in_order_and_one_that_cannot_be_read(pellicle, spectrum_f
     assert "Traceback" not in ran.err
     assert {p.name for p in (out / "one").iterdir()} == {p.name for p in (out / "two").iterdir()} == FILES
     assert not (out / "bad").exists()
-    lines = (out / "summary.csv").read_text().splitlines()
-    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    rows = list(csv.DictReader((out / "summary.csv").read_text("utf-8-sig").splitlines()))
     assert [row["path"] for row in rows] == list(map(str, files))
     assert [row["status"] for row in rows] == ["converged", "failed", "converged"]
     for record, row, truth in ((found[0], rows[0], 250), (found[2], rows[2], 420)):
@@ -281,3 +281,25 @@ def test_of_a_recipe_with_files_and_flags(pellicle, spectrum_file, scene_recipe,
         np.testing.assert_allclose(numbers(again.objects[0])[name], pair, rtol=1e-9)
     tables = tomllib.loads((out / "recipe.toml").read_text())["data"]["file"]
     assert [table["range"] for table in tables] == [[450, 750]] * 2
+
+
+def test_limits_of_a_specification(pellicle, spectrum_file, scene, tmp_path):
+    """300 nm: within 250 to 350, and beyond 310 to 400, which ends with exit code 6."""
+    file, out = spectrum_file(), tmp_path / "out"
+    (found,) = pellicle(
+        "fit", file, *scene, "--spec", "thickness=250:350", "--json", "--out", out, code=0
+    ).objects
+    assert found["spec"] == json.loads((out / "result.json").read_text())["spec"] == {"thickness": "pass"}
+    ran = pellicle("fit", file, *scene, "--spec", "thickness=310:400", code=6)
+    assert "thickness: FAIL (310 to 400 nm; fitted 30" in ran.out
+    pellicle("fit", file, *scene, "--spec", "thicknes=310:400").refused(3, "did you mean 'thickness'")
+    pellicle("fit", file, *scene, "--spec", "thickness").refused(2, "NAME=LO:HI")
+
+
+def test_a_batch_prints_one_line_a_file(pellicle, spectrum_file, scene):
+    files = spectrum_file("one.csv", 250.0), spectrum_file("two.csv", 420.0)
+    ran = pellicle("fit", *files, *scene, code=0)
+    one, two = ran.out.splitlines()
+    assert one.startswith(f"{files[0]}: converged; thickness 2")
+    assert two.endswith("nm (95 %)")
+    assert f"{files[1]}: signal unit" not in ran.err  # that of the first file is said

@@ -56,7 +56,7 @@ def batch(pellicle, spectrum_file, scene, tmp_path):
 
 def rows(tmp_path):
     """The summary by file name."""
-    lines = (tmp_path / "out" / "summary.csv").read_text().splitlines()[1:]
+    lines = (tmp_path / "out" / "summary.csv").read_text("utf-8-sig").splitlines()
     return {Path(row["path"]).stem: row for row in csv.DictReader(lines)}
 
 

@@ -95,3 +95,17 @@ def test_a_recipe_has_a_limit_of_layers_in_words(tmp_path, refuses):
     path = tmp_path / "many.toml"
     path.write_text('[scene]\nsubstrate = "Si"\n' + "[[scene.layer]]\nmaterial = 1.5\nthickness = 9\n" * 501)
     refuses(DataError, r"501 layers.*at most 500.*\[\[scene.group\]\] with repeat", pl.read_recipe, path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('substrate = "Si"', "substrate = Si", r'line 4: .*quotation marks: write substrate = "Si"'),
+        ("[[scene.layer]]", "[scene.layer]", r"write \[\[scene.layer\]\] with two brackets"),
+        ("lower = 10, upper", "min = 10, max", "thickness.min': write lower"),
+        ('["oxide.csv"]', '"oxide.csv"', r'write files = \["oxide.csv"\]'),
+    ],
+)
+def test_what_is_written_otherwise_elsewhere_is_named(write, old, new, said):
+    with pytest.raises(DataError, match=said):
+        pl.read_recipe(write(FILM.replace(old, new)))

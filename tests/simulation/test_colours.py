@@ -1,14 +1,16 @@
 """Simulated colours against tmm for the film and colour-science for observer, lamp and spaces."""
 
 import colour
+import jax
 import numpy as np
 import pytest
 import tmm
 
 import pellicle as pl
-from pellicle.colour import sensor
+from pellicle.colour import film, sensor
 from pellicle.colour.observers import camera_sensor
 from pellicle.data.colours import CameraMatrix
+from pellicle.errors import UsageError
 
 NM = sensor("1931", "A").wavelength
 ANGLES = [0.0, 40.0, 70.0]
@@ -93,3 +95,18 @@ def test_what_has_no_colour(refuses):
     refuses(ValueError, "`space` must be one of", pl.simulate, scene(), space="hsv")
     refuses(TypeError, "wavelength", pl.simulate, scene(), [500.0], space="srgb")
     refuses(TypeError, "angle", pl.simulate, scene(), [500.0], angle=[1.0])
+
+
+def test_film_colour_takes_what_reflectance_takes(refuses):
+    """By the sum over wavelengths of 1 nm of the reflectance that the tmm package confirms elsewhere."""
+    observed = sensor("1931", "D65")
+    for thickness, layer in ((300.0, "SiO2"), ([100.0, 60.0], ["SiO2", "TiO2"])):
+        with jax.enable_x64(True):
+            spectrum = pl.reflectance(observed.wavelength, thickness, layer, "Si", angle=30.0)
+        expected = np.asarray(spectrum) @ observed.weights
+        np.testing.assert_allclose(
+            pl.film_colour(thickness, layer, "Si", angle=30.0, method="uniform-64").xyz, expected, atol=2e-3
+        )
+    refuses(ValueError, "pl.film_colour", film.film_colour, 300.0, "SiO2", 3.9)
+    refuses(ValueError, "uniform-64", pl.film_colour, [1.0, 2.0], [1.5, 2.0], 3.9, method="gaussians-8")
+    refuses(UsageError, "negative", pl.film_colour, -300.0, "SiO2", "Si")

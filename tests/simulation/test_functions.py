@@ -1,5 +1,6 @@
 """The library's front door: traced through every argument, precision, and what it refuses."""
 
+import re
 import subprocess
 import sys
 from functools import partial
@@ -13,7 +14,9 @@ import pytest
 import pellicle as pl
 from pellicle.dispersion import Cauchy
 from pellicle.dispersion.empirical import Table
+from pellicle.errors import UsageError
 from pellicle.materials import CLEAR, Material
+from pellicle.optics.pair import Pair
 
 FUNCTIONS = {"R": pl.reflectance, "T": pl.transmittance}
 BOTH = pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
@@ -243,3 +246,27 @@ def test_principal_indices_of_a_birefringent_medium(refuses):
         lambda: pl.jones(50.0, 1.0, named, 1.5, angle=9.0),
     ):
         refuses(ValueError, "50", call)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named", "said"),
+    [
+        ((500.0, 100.0, 1.46 - 0.1j, 3.9), {}, "1.46-0.1j has a negative imaginary part"),
+        ((500.0, 100.0, 1.46, np.array([3.9 - 0.1j])), {}, "3.9-0.1j has a negative imaginary part"),
+        ((500.0, -1.0, 1.46, 3.9), {}, "`thickness` must not be negative, got -1 nm"),
+        ((500.0, [10.0, -1.0], [1.46, 2.0], 3.9), {}, "`thickness` must not be negative"),
+        ((0.55, 100.0, 1.46, 3.9), {}, "0.55 is like one in µm: write 550"),
+        ((np.array([np.nan, 500.0]), 100.0, 1.46, 3.9), {}, "`wavelength` must be above zero"),
+        ((500.0, 100.0, 1.46, 3.9), {"angle": 120.0}, "`angle` must be 0 to 90 degrees, got 120"),
+    ],
+)
+def test_impossible_numbers_are_refused(arguments, named, said, refuses):
+    refuses(UsageError, re.escape(said), pl.reflectance, *arguments, **named)
+
+
+def test_an_index_of_a_material_converts_to_complex():
+    silicon = pl.material("Si")
+    expected = complex(pl.refractive_index(550.0, "Si"))
+    assert complex(silicon.index(550.0)) == pytest.approx(expected)
+    assert np.asarray(silicon.index(np.array([550.0]))) == pytest.approx([expected])
+    assert complex(Pair(1.5, None)) == 1.5

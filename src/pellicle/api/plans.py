@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.effects.film_plan import plan as film_plan
 from pellicle.effects.surface_plan import plan as surface_plan
+from pellicle.errors import UsageError
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
@@ -57,6 +59,8 @@ def plan(
     if isinstance(scene, Surface):
         return surface_plan(_viewed(scene, directions), tolerance, keep)
     refuse("a Scene", directions=directions)
+    if np.ndim(tolerance):
+        raise UsageError("`tolerance` is one number; wavelengths belong to the scene, in its pl.Light")
     return film_plan(scene, tolerance, keep)
 
 

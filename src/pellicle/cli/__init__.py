@@ -87,7 +87,8 @@ def main() -> int:
     """Run the command line and return its exit code.
 
     0 good, 2 wrong usage, 3 bad data or a disk that is full, 4 no clear answer, 5 a chain that is too short,
-    130 interrupted. With --json an error is printed on stdout too, as a JSON object.
+    6 a limit of --spec that is not met, 130 interrupted. With --json an error is printed on stdout too, as a
+    JSON object.
     """
     with interruptible():
         code, error = _outcome(sys.argv[1:])
@@ -104,6 +105,11 @@ def _outcome(words: list[str]) -> tuple[int, str]:
     from cyclopts import CycloptsError
 
     try:
+        if sum(word.partition("=")[0] == "--layer" for word in words) > 1:
+            raise UsageError(
+                "--layer is given twice, and flags describe one layer: write a [[scene.layer]] for each into"
+                " a recipe, from the top down, and give it by --recipe"
+            )
         return int(command(words) or 0), ""
     except CycloptsError as error:
         return WRONG_USAGE, str(error)  # cyclopts has printed the error

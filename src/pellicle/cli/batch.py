@@ -30,6 +30,7 @@ from pellicle.cli.session import (
     BAD_DATA,
     GOOD,
     INTERRUPTED,
+    OFF_SPEC,
     TOO_SHORT,
     UNCLEAR,
     check_folder,
@@ -58,7 +59,7 @@ class Batch:
 
     Results of several files that an earlier run left in the folder `out`, from the same data by the same
     scene, settings and version, are printed and not computed again, unless `refit` is true. `kept` counts
-    them.
+    them. Of several files each result is one line (`brief`) unless `verbose`. `spec` are texts of limits.
     """
 
     inputs: Inputs
@@ -67,10 +68,12 @@ class Batch:
     json: bool = False
     jobs: int = 1
     refit: bool = False
+    spec: list[str] | None = None
     verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
     records: list[dict[str, Any]] = field(default_factory=list)
     fits: list[Fit] = field(default_factory=list)
     kept: int = 0
+    brief: bool = False
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
@@ -79,6 +82,7 @@ class Batch:
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
         groups = self.inputs.groups
+        self.brief = len(groups) > 1 and not self.verbose and not self.inputs.repeats
         folders: list[Path | None] = [None] * len(groups)
         if self.out is not None:
             check_folder(self.out)
@@ -170,41 +174,60 @@ class Batch:
         from pellicle.reporting.fit_text import report
         from pellicle.reporting.folders import write_fit
         from pellicle.reporting.json_record import failure, to_json
+        from pellicle.reporting.specification import parse_limits, verdicts
 
         paths, identity = [file.path for file in files], ""
         try:
-            data, scene = measurement(files, self.inputs.joint)
+            data, scene = measurement(files, self.inputs.joint, notes=not (self.brief and self.records))
             if folder is not None:
                 settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
                 if not self.refit and (kept := earlier(folder, identity)):
-                    record, text = kept
                     self.kept += 1
-                    self.records.append(record)
-                    show(record if self.json else text, self.out is not None)
                     say(f"{folder}: from an earlier run")
-                    return GOOD if record["status"] == "converged" else UNCLEAR
+                    return self._printed(*kept)
             with Progress(", ".join(paths) + (f" ({position})" if position else "")) as progress:
                 fit, posterior = self._result(data, scene, folder, progress)
+            record = to_json(fit, posterior)
+            if self.spec:
+                verdicts(record, parse_limits(self.spec))  # which refuses an unknown name
         except ValueError as error:
             message = error_message(error, paths)
             self.records.append(failure(paths if self.inputs.joint else paths[0], message))
             # also where the error is one of usage: the other files go on
             return reported(message, self.records[-1] if self.json else None)
-        record = to_json(fit, posterior)
-        self.records.append(record)
         if self.inputs.repeats:
             self.fits.append(fit)
-        show(record if self.json else report(fit, posterior), self.out is not None)
-        code = GOOD if fit.status == "converged" else UNCLEAR
+        code = self._printed(record, report(fit, posterior))
         if posterior is not None and not posterior.trusted:
-            code = TOO_SHORT
+            code = max(code, TOO_SHORT)
         if folder is None:
             return code
-        recipe = partial(self.inputs.recipe, files)
-        write = partial(write_fit, folder, fit, posterior, identity, self.inputs.described, recipe)
+        recipe, spec = partial(self.inputs.recipe, files), record.get("spec")
+        write = partial(write_fit, folder, fit, posterior, identity, self.inputs.described, recipe, spec)
         failed = "; the result is printed, and the same command writes its files"
         return max(code, written(write, f"{folder}: report, figures and tables written", failed))
+
+    def _printed(self, record: dict[str, Any], text: str) -> int:
+        """Judge a result by the limits of --spec, keep and print it, and return its exit code.
+
+        `text` is its report, of which a batch prints one line unless --verbose is given.
+        """
+        from pellicle.reporting import specification
+
+        record.pop("spec", None)  # of an earlier run
+        if self.spec:
+            limits = specification.parse_limits(self.spec)
+            record["spec"] = specification.verdicts(record, limits)
+            found = specification.lines(record, limits, record["spec"])
+            text = "\n".join([text.rstrip("\n"), "[[Specification]]", *(f"    {line}" for line in found), ""])
+        self.records.append(record)
+        if self.brief:
+            text = specification.one_line(record)
+        show(record if self.json else text, self.out is not None)
+        if specification.FAIL in record.get("spec", {}).values():
+            return OFF_SPEC
+        return GOOD if record["status"] == "converged" else UNCLEAR
 
     def _result(
         self, data: Any, scene: Any, folder: Path | None, progress: Progress

@@ -153,9 +153,9 @@ def _surface(recipe: SurfaceRecipe, out: str, flags: ChartFlags) -> int:
 
 
 def _range(flag: str, text: str, upper: float) -> tuple[float, float]:
-    from pellicle.data.options import parse_range
+    from pellicle.data.options import length_range
 
-    low, high = parse_range(text, flag)
+    low, high = length_range(text, flag)
     if low < 0 or high > upper:
         raise UsageError(f"{flag} must lie in 0 to {upper:g}, got {text}")
     return low, high

@@ -28,6 +28,9 @@ class LightFlags(OptionFlags[FileOptions]):
     """Flags of the light of a film without data."""
 
 
+_OF_DATA = (".csv", ".txt", ".dat", ".xlsx", ".dx", ".png")
+
+
 def explore(
     recipe: Annotated[
         str | None, Parameter(help="TOML file that describes the scene or surface (SiO2 on Si).")
@@ -52,6 +55,11 @@ def explore(
     if recipe is not None and given:
         raise UsageError(
             f"{', '.join(given)} and a recipe exclude each other: describe the scene in the recipe"
+        )
+    if recipe is not None and Path(recipe).suffix.lower() in _OF_DATA:
+        raise UsageError(
+            f"{recipe}: is data, and the explorer takes a recipe, or flags as --layer SiO2 --substrate Si:"
+            " name the file in [data] files of the recipe, or drop it on the page"
         )
     start()
     from pellicle.explorer.server import serve

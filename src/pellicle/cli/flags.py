@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, ge
 from cyclopts import Group, Parameter
 
 from pellicle.data.options import COLOURS as OF_COLOURS
-from pellicle.data.options import CameraOptions, FileOptions, FitOptions, Option, Options, parse_range
+from pellicle.data.options import (
+    CameraOptions,
+    FileOptions,
+    FitOptions,
+    Option,
+    Options,
+    length_range,
+    parse_signal,
+)
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -245,11 +253,17 @@ class BatchFlags(Flags):
     jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1
     refit: Annotated[bool, switch(OUTPUT)] = False
     """Fit all files, also those whose results an earlier run left in --out."""
+    spec: Annotated[list[str] | None, switch(OUTPUT, metavar="NAME=LO:HI")] = None
+    """Limits of a parameter: pass, fail or undecided by its 95 % error; several may be given."""
 
     def checked(self) -> BatchFlags:
         """These flags. Raises UsageError for an impossible number of processes."""
         if self.jobs < 1:
             raise UsageError(f"--jobs must be at least 1, got {self.jobs}")
+        if self.spec:
+            from pellicle.reporting.specification import parse_limits
+
+            parse_limits(self.spec)
         return self
 
 
@@ -314,7 +328,9 @@ class CubeFlags(CubeOnlyFlags):
         options |= vars(self) | {name: options[name] for name in options if getattr(self, name) is None}
         options = {name: value for name, value in options.items() if value is not None}
         if isinstance(self.range, str):
-            options["range"] = parse_range(self.range, "`range`")
+            options["range"] = length_range(self.range, "`range`")
+        if self.signal is not None:
+            options["signal"] = parse_signal(self.signal)
         if isinstance(self.white_reflectance, str):
             light = {name: options[name] for name in ("angle", "polarisation") if name in options}
             options["white_reflectance"] = _reflectance(self.white_reflectance, light)

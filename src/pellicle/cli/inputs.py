@@ -19,7 +19,6 @@ from pellicle.cli.reading import (
     read,
     read_films,
     refuse_camera,
-    sigma,
 )
 from pellicle.data.options import BRDF, FileOptions, FitOptions
 from pellicle.errors import UsageError
@@ -99,6 +98,10 @@ class Inputs:
             raise UsageError("a recipe cannot name one of several sweeps")
         paths = list(dict.fromkeys(file.file for file in files))
         options = self.written | ({"joint": True} if self.joint else {})
+        if isinstance(noise := options.get("noise"), str) and "%" not in noise:
+            sigma = getattr(files[0].read()[0], "sigma", None)
+            if sigma is not None and (sigma == float(noise)).all():  # not in the unit of a file in percent
+                options["noise"] = float(noise)
         if not self.joint and files[0].name:
             options["spectrum"] = files[0].name
         if self.base is None:
@@ -120,6 +123,9 @@ def inputs(
 
     Raises UsageError or DataError where something is missing or wrong.
     """
+    for file in files:
+        if file.lower().endswith(".toml"):
+            raise UsageError(f"{file}: is a recipe, and data were expected: write --recipe {file}")
     scene_flags = scene_flags or SceneFlags()
     reading = FileOptions() if reading_flags is None else reading_flags.options()
     fitting = FitOptions() if fit_flags is None else fit_flags.options()
@@ -295,5 +301,7 @@ def _check_film(reading: FileOptions) -> None:
     """Raise UsageError for options that are wrong for every file of a film."""
     if reading.signal == "brdf":
         raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
+    from pellicle.signals.limits import check_noise
+
     check_words(reading)
-    sigma(reading.noise)
+    check_noise(reading.noise)

@@ -58,25 +58,17 @@ def _read(path: str, options: FileOptions, scene: Scene | None) -> list[Spectrum
     if options.dark is not None:
         raise UsageError("--dark needs --reference: the counts of a sample of known reflectance")
     stated = {name: x for name, x in options.given().items() if name in SpectrumOptions.declared()}
-    stated["noise"] = sigma(options.noise)
+    stated["noise"] = options.noise
     if stack is None:
         return read_spectra(path, calibrated=False if free_scale else None, **stated)
     return [_from_ratio(x, options, stack) for x in read_spectra(path, calibrated=False, **stated)]
 
 
-def sigma(noise: float | str | None) -> float | None:
-    """The standard deviation of a spectrum. Raises UsageError where the noise is a share of the signal."""
-    from pellicle.signals.limits import noise_level
+def sigma(noise: float | str | None, kind: str) -> float | None:
+    """The standard deviation of a `kind` of data. Raises UsageError where it is a share of the signal."""
+    from pellicle.signals.limits import noise_of
 
-    if noise is None:
-        return None
-    level = noise_level(noise)
-    if level.relative:
-        raise UsageError(
-            f"`noise` {level} is a share of the signal, which only BRDF samples can have: give the standard "
-            "deviation of a spectrum as a number, or a sigma column in its file"
-        )
-    return level.value
+    return None if noise is None else noise_of(kind, noise)
 
 
 def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Spectrum:
@@ -106,7 +98,7 @@ def _from_counts(path: str, options: FileOptions, stack: Reference | None) -> Sp
     if options.range is None:
         sample = without_dark_edges(sample, reference, dark)
     known = _reference_reflectance(sample, options, stack)
-    return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise))
+    return reflectance_from_counts(sample, reference, known, dark, noise=sigma(options.noise, "counts"))
 
 
 def _from_ratio(ratio: Spectrum, options: FileOptions, stack: Reference) -> Spectrum:
@@ -219,7 +211,7 @@ def read_films(path: str, reading: FileOptions, angle: float | list[float] | Non
         signal="T" if reading.transmitted else "R",
         angle=reading.angle if isinstance(reading.angle, list) else angle,
         polarisation=reading.polarisation or "unpolarised",
-        noise=sigma(reading.noise),
+        noise=sigma(reading.noise, "colours"),
         **options,
     )
     if reading.spectrum in (None, ALL):

@@ -119,6 +119,7 @@ def _write(
 ) -> None:
     """Simulate one film or surface, and write it to the file `out`."""
     from pellicle.recipes.read import SurfaceRecipe
+    from pellicle.signals.limits import noise_of
 
     noise: Any = (described.tables.data.noise or 0.0) if spread is None else spread
     said = f"{noise:g}" if isinstance(noise, float | int) else noise
@@ -127,11 +128,9 @@ def _write(
     comments = [SYNTHETIC, source]
     if isinstance(described, SurfaceRecipe):
         _write_samples(described, out, noise, how, comments)
-    elif isinstance(noise, str):
-        raise UsageError(
-            f"--noise {noise} is a share of the signal, which BRDF samples can have: give a number"
-        )
-    elif described.tables.data.signal in SPACES:
+        return
+    noise = noise_of("a simulated spectrum", noise) if isinstance(noise, str) else noise
+    if described.tables.data.signal in SPACES:
         _write_colours(described, out, noise, how, comments)
     else:
         _write_spectrum(described, out, noise, how, comments)

@@ -55,6 +55,8 @@ def film_colour(
 
     - `thickness` in nm, `angle` of incidence in degrees.
     - `layer`, `substrate`: numbers n + ik, arrays, or materials (`pl.material("Fe2O3")`); `ambient` is real.
+      `pl.film_colour` also takes names. For several coherent layers `layer` and `thickness` are lists, from
+      the ambient down, with a method of single wavelengths such as `uniform-64`.
     - `method`: see `pellicle.colour.integration_bands`.
     - `illuminant`, `observer`: see `pellicle.colour.sensor`.
 
@@ -82,19 +84,27 @@ def reflectance(
     thickness: Any, layer: Any, substrate: Any, bands: Bands, *, ambient: Any = 1.0, angle: Any = 0.0
 ) -> Float[Array, "... bands"]:
     """Return the reflectance in each band, (..., N); arguments as for `film_colour`."""
-    thickness, theta = (jnp.asarray(x)[..., None] * 1.0 for x in (thickness, jnp.deg2rad(angle)))
+    several = isinstance(layer, list | tuple)
+    layers, thicknesses = (layer, thickness) if several else ([layer], [thickness])
+    if len(thicknesses) != len(layers):
+        raise ValueError(f"`thickness` needs one for each of {len(layers)} layers, not {len(thicknesses)}")
+    *thicknesses, theta = (jnp.asarray(x)[..., None] * 1.0 for x in (*thicknesses, jnp.deg2rad(angle)))
+    thickness = thicknesses[0]
     wavelength = jnp.asarray(bands.wavelength, jnp.result_type(thickness, theta))
     n0, n2 = _index(ambient, wavelength), interface.allow_tunnelling(_index(substrate, wavelength))
     if not is_real(n0):
         raise ValueError("the ambient must not absorb: give it a real index")
-    n1 = _index(layer, wavelength)
+    n1 = _index(layers[0], wavelength)
     if not bands.absorbs and not is_real(n1):
         raise ValueError(
             "the layer absorbs, which belcour-barla does not model: use method gaussians-8 or uniform-64"
         )
-    k0d = 2 * jnp.pi / wavelength * thickness
+    k0d = [2 * jnp.pi / wavelength * d for d in thicknesses]
     if bands.width is None:
-        return response.reflectance(*coherent.responses(n0, [n1], n2, [k0d], theta))
+        media = [_index(medium, wavelength) for medium in layers]
+        return response.reflectance(*coherent.responses(n0, media, n2, k0d, theta))
+    if several:
+        raise ValueError('several layers need single wavelengths: give `method="uniform-64"`')
     if not interface.propagates(layer, ambient, 90.0):  # and so at any angle
         n1 = interface.allow_tunnelling(n1)
     index_slope = _phase_index(layer, n0, n1, theta, wavelength)
@@ -102,7 +112,7 @@ def reflectance(
     damping = jnp.exp(-0.5 * spread * spread)
     both = [
         orders.reflectance(
-            orders.airy_series(n0, n1, n2, k0d, theta, letter), lambda m: damping ** (m * m), bands.orders
+            orders.airy_series(n0, n1, n2, k0d[0], theta, letter), lambda m: damping ** (m * m), bands.orders
         )
         for letter in "sp"
     ]
@@ -113,6 +123,8 @@ def _index(medium: Any, wavelength: Any) -> Number:
     """Return the index in each band; an array of numbers gets an axis for the bands."""
     if isinstance(medium, AbstractDispersion):
         return medium.index(wavelength)
+    if isinstance(medium, str):
+        raise ValueError(f"{medium!r} is a name, for pl.film_colour: here give pl.material({medium!r})")
     return to_pair(jnp.asarray(medium)[..., None] * 1.0)
 
 

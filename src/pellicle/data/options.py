@@ -6,6 +6,7 @@ nothing heavy: `pellicle --help` loads it.
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -44,28 +45,75 @@ def parse_number(text: str, name: str, expected: str = "a number") -> float:
     return value
 
 
+_LENGTHS = {"nm": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "A": 0.1, "Å": 0.1}
+"""Units of a length that a flag may state, in nm."""
+_LENGTH = re.compile(rf"(?P<number>.*?)\s*(?P<unit>{'|'.join(_LENGTHS)})\s*")
+_LIKE_LENGTH = rf"\s*(\d[\d.]*\s*(?:{'|'.join(_LENGTHS)})?)\s*"
+_DASHED = re.compile(rf"{_LIKE_LENGTH}(?:-|–|\.\.| to ){_LIKE_LENGTH}")
+"""A range as people write it: 400-800, 0.4-0.8um, 400 nm to 800 nm."""
+
+
+def parse_length(text: str, name: str, expected: str = "a number") -> float:
+    """Parse a length in nm, or with its unit, as `1.5um`. Raises UsageError as `parse_number` does."""
+    stated = _LENGTH.fullmatch(text)
+    if stated is None:
+        return parse_number(text, name, expected)
+    return parse_number(stated["number"], name, expected) * _LENGTHS[stated["unit"]]
+
+
+def length_range(text: str, name: str) -> tuple[float, float]:
+    """Parse `LO:HI` in nm; a unit may follow both or the second, as in `1:2um`. Raises UsageError."""
+    low, high = _parts(text, name)
+    unit = _LENGTH.fullmatch(high)
+    if unit is not None and _LENGTH.fullmatch(low) is None:
+        low += unit["unit"]
+    return _rising(parse_length(low, name), parse_length(high, name), text, name)
+
+
 def parse_range(text: str, name: str) -> tuple[float, float]:
     """Parse `LO:HI` as two rising numbers. Raises UsageError with the name of the argument."""
-    parts = text.split(":")
+    low, high = _parts(text, name)
+    return _rising(parse_number(low, name), parse_number(high, name), text, name)
+
+
+def is_range(text: str) -> bool:
+    """True for `LO:HI`, also where it is written `LO-HI`."""
+    return ":" in text or _DASHED.fullmatch(text) is not None
+
+
+def _parts(text: str, name: str) -> tuple[str, str]:
+    dashed = _DASHED.fullmatch(text)
+    parts = text.split(":") if dashed is None else dashed.groups()
     if len(parts) != 2:
         raise UsageError(f"{name} must be LO:HI, as in 10:3000, not {text!r}")
-    low, high = parse_number(parts[0], name), parse_number(parts[1], name)
+    return parts[0], parts[1]
+
+
+def _rising(low: float, high: float, text: str, name: str) -> tuple[float, float]:
     if not low < high:
         raise UsageError(f"{name} is reversed or empty: {text!r}; write the smaller number first")
     return low, high
 
 
+_DEGREES = re.compile(r"\s*(°|deg(rees?)?)\s*$")
+
+
 def parse_angles(text: str, name: str) -> float | list[float]:
     """Parse one angle in degrees, or several with commas between them. Raises UsageError."""
-    angles = [parse_number(word, name, "degrees such as 70, or 0,30,60") for word in text.split(",")]
+    words = [_DEGREES.sub("", word) for word in text.split(",")]
+    angles = [parse_number(word, name, "degrees such as 70, or 0,30,60") for word in words]
     return angles[0] if len(angles) == 1 else angles
 
 
-def _number_or_text(text: str, name: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
+_SIGNAL_WORDS = {"reflectance": "R", "reflection": "R", "transmittance": "T", "transmission": "T"}
+_SIGNAL_WORDS |= {"ellipsometry": "psi-delta", "psi,delta": "psi-delta"}
+
+
+def parse_signal(text: str, name: str = "") -> str:
+    """The signal that a word means, `R` for reflectance; another word as it is."""
+    word = text.strip().lower()
+    known = {signal.lower(): signal for signal in (*SIGNALS, "brdf")} | _SIGNAL_WORDS
+    return known.get(word, text)
 
 
 def _wavelength_unit(text: str) -> tuple[str | None, tuple[str, ...]]:
@@ -236,10 +284,11 @@ class SpectrumOptions(Options):
     signal: str | None = _FOR_ALL(
         f"{', '.join(SIGNALS[:-1])} or {SIGNALS[-1]} (that of the file).",
         words=(*SIGNALS, "brdf"),
+        parse=parse_signal,
     )
     polarisation: str | None = _FOR_FILMS("s, p or unpolarised.", words=("s", "p", "unpolarised"))
     range: tuple[float, float] | None = _FOR_SPECTRA(
-        "Wavelengths to use in nm.", metavar="LO:HI", parse=parse_range
+        "Wavelengths to use in nm.", metavar="LO:HI", parse=length_range
     )
     columns: str | Sequence[str] | None = _FOR_ALL(
         "Names of the columns in order, _ to skip.", metavar="NAME,..."
@@ -271,9 +320,10 @@ class ReadingOptions(SpectrumOptions):
     """Options of reading files of data; `[data]` and `[[data.file]]` of a recipe."""
 
     noise: float | str | None = _FOR_ALL(
-        'Standard deviation of every point (degrees for psi-delta), or "2 %" of the BRDF.',
+        'Standard deviation of every point in the unit of the file (degrees for psi-delta), or "2 %" of the '
+        "signal.",
         metavar="SIGMA",
-        parse=_number_or_text,
+        parse=lambda text, name: text,
     )
     region: str | list[int] | list[list[int]] | None = _FOR_COLOURS(
         "X,Y,WIDTH,HEIGHT of a film in a photograph, in pixels; ';' between several."

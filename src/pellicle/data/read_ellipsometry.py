@@ -21,8 +21,15 @@ from pellicle.data.tabular.units import SIGNAL_UNITS
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.folded_delta import can_be_folded, folding_at, folding_note
 from pellicle.signals.generalised import RATIOS, Generalised, delta_sigma
-from pellicle.signals.limits import FOLDED_DELTA, check_depolarisation, check_psi_delta, refuse_first
+from pellicle.signals.limits import (
+    FOLDED_DELTA,
+    check_depolarisation,
+    check_psi_delta,
+    noise_of,
+    refuse_first,
+)
 from pellicle.signals.mueller import ELEMENTS, HIGHEST, Mueller, check_element, sign_notes
+from pellicle.signals.registry import KINDS
 from pellicle.signals.sphere import Angles, from_alpha_beta, from_ncs, from_tan_cos
 
 SIGNAL = "psi-delta"
@@ -95,7 +102,7 @@ def read_ellipsometry(table: Table, chosen: selection.Selection, asked: Reading)
     errors = [rows.columns[column.role] for column in chosen.errors]
     if asked.noise is not None:
         notes += [NOISE_REPLACES] if errors else []
-        errors = [np.full(psi.size, float(asked.noise))]
+        errors = [np.full(psi.size, noise_of("psi and delta", asked.noise))]
     arrays |= dict(zip(("sigma", "delta_sigma"), errors * 2, strict=False))
     if form in (*FOLDED_FORMS, NCS):
         folded = form != NCS
@@ -286,7 +293,8 @@ def read_anisotropic(table: Table, chosen: selection.Selection, asked: Reading) 
     if asked.noise is None:
         rows.check_errors({column.role: column for column in chosen.errors})
     read = _mueller if chosen.signal == Mueller.word else _generalised
-    return read(rows, chosen, asked.noise, notes)
+    noise = None if asked.noise is None else noise_of(KINDS[chosen.signal].noun, asked.noise)
+    return read(rows, chosen, noise, notes)
 
 
 def _mueller(rows: Rows, chosen: selection.Selection, noise: float | None, notes: list[str]) -> Spectrum:

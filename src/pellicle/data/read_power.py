@@ -1,7 +1,7 @@
 """Reading of reflectance, transmittance and counts from a table: their columns, units and checks."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from pellicle.data.detector_overlap import detectors, joined
 from pellicle.data.noisy_edges import noisy_edges, readable_range
 from pellicle.data.repeated_sweeps import one_way
+from pellicle.data.signal_scale import check_percent, signal_scale
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.spectrum_rows import Reading, Rows, axis_unit
 from pellicle.data.tabular import column_selection as selection
@@ -20,10 +21,8 @@ from pellicle.data.tabular.columns import (
     SIGNALS,
     Column,
     listed,
-    unknown_unit,
 )
 from pellicle.data.tabular.table import Table
-from pellicle.data.tabular.units import SIGNAL_UNITS, signal_unit
 from pellicle.errors import DataError, UsageError
 from pellicle.signals.limits import refuse_first
 from pellicle.signals.one_column import OneColumn
@@ -37,8 +36,6 @@ _SEVERAL_COLUMNS = {
     "generalised psi and delta": RATIO_COLUMNS,
 }
 """Roles of the signals that have several columns."""
-_LEAST_ABSORBANCE = -300.0
-"""Absorbances below it would overflow; the signal is refused anyhow, as far above 1."""
 
 
 def power_columns(
@@ -234,10 +231,12 @@ def read_power(table: Table, chosen: selection.Selection, asked: Reading) -> Spe
     axis_unit(table, chosen.axis.wavelength, asked.wavelength_unit)  # asked for before that of the signal
     scale = signal_scale(table, chosen, asked.signal_unit)
     rows = read_signal(table, chosen, asked.wavelength_unit, detectors)
+    check_percent(table, rows, column, asked.signal_unit)
     columns, notes = scale.fractions(**rows.columns), [scale.note(kind, calibrated)]
     if asked.noise is not None:
         notes += ["the given noise replaces the column of standard deviations"] if chosen.errors else []
-        columns["sigma"] = np.full(len(columns["values"]), float(asked.noise))
+        columns["sigma"], note = scale.noise(asked.noise, columns["values"])
+        notes += [note] if note else []
     rows = replace(rows, columns=columns, notes=(*rows.notes, *notes))
     overlap = None if rows.axis.setting is not None else detectors(rows.axis.wavelength)
     if overlap is not None:
@@ -283,64 +282,6 @@ def read_signal(
             quotient = (values - background) / (reference - background)
         values = np.where(reference > background, quotient, np.inf)
     return replace(rows, columns={"values": values} | ({"sigma": sigma[0]} if sigma else {}))
-
-
-@dataclass(frozen=True)
-class Scale:
-    """Units of a file's signal and σ, members of `SIGNAL_UNITS`, and whether file or caller states it."""
-
-    signal: str
-    sigma: str
-    stated: bool
-
-    def fractions(self, values: np.ndarray, sigma: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """Convert the signal (points,) and its σ (points,) to fractions.
-
-        An absorbance A becomes 10⁻ᴬ with the error ln 10 · 10⁻ᴬ σ.
-        """
-        if self.signal == "absorbance":
-            values = 10.0 ** -np.maximum(values, _LEAST_ABSORBANCE)
-        elif self.signal == "percent":
-            values = values / 100
-        fractions = {"values": values}
-        if sigma is not None:
-            factor = np.log(10.0) * values if self.sigma == "absorbance" else 1.0
-            fractions["sigma"] = sigma / 100 if self.sigma == "percent" else factor * sigma
-        return fractions
-
-    def note(self, quantity: str, calibrated: bool) -> str:
-        """Return a sentence on the unit in which the signal was read."""
-        if self.signal == "absorbance":
-            return f"signal unit: absorbance A, converted to {quantity} = 10^-A"
-        if not calibrated:
-            return "signal unit: arbitrary (uncalibrated)"
-        return f"signal unit: {self.signal}" + ("" if self.stated else ", assumed")
-
-
-def signal_scale(table: Table, chosen: selection.Selection, requested: str | None) -> Scale:
-    """Return the scale from the column's name or from `requested`. It is never guessed from values.
-
-    Raises UsageError if `requested` is unknown or contradicts the name, DataError if the name's unit is
-    unknown and none is requested.
-    """
-    asked = None if requested is None else signal_unit(requested)
-    if requested is not None and asked is None:
-        raise UsageError(f"`signal_unit` must be one of {', '.join(SIGNAL_UNITS)}, not {requested!r}")
-    [column] = chosen.values
-    place = f"{table.path}: {table.label(column.position)}"
-    if column.unknown_unit and asked is None:
-        raise DataError(
-            f"{place} {unknown_unit(column)}; state it with "
-            '`signal_unit="fraction"`, `signal_unit="percent"` or `signal_unit="absorbance"`'
-        )
-    if asked and column.unit and asked != column.unit:
-        raise UsageError(
-            f'{place} is in {column.unit}, which contradicts `signal_unit="{asked}"`; leave that out, or '
-            "rename the columns with `columns`"
-        )
-    unit = column.unit or asked
-    sigma_unit = chosen.errors[0].unit if chosen.errors else None
-    return Scale(unit or "fraction", sigma_unit or unit or "fraction", unit is not None)
 
 
 def _check(rows: Rows, chosen: selection.Selection, signal: str, calibrated: bool, unit_stated: bool) -> None:

@@ -54,7 +54,7 @@ def read_spectrum(
     wavelength_unit: str | None = None,
     signal_unit: str | None = None,
     range: tuple[float | int, float | int] | None = None,
-    noise: float | int | None = None,
+    noise: float | int | str | None = None,
     polarisation: str | None = None,
     calibrated: bool | None = None,
     folded: bool | None = None,
@@ -74,7 +74,8 @@ def read_spectrum(
     - `wavelength_unit`: "nm", "um", "A", "eV", "cm-1" or "THz" (else nm), `signal_unit`: "fraction",
       "percent" or "absorbance" (−log₁₀ of the signal); where the file does not state them.
     - `range`: wavelengths to keep, (low, high) in nm. Values outside it are not checked.
-    - `noise`: σ of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's.
+    - `noise`: σ of every point as a fraction, or of Ψ and Δ in degrees; replaces the file's. As a text it is
+      in the unit of the file, "0.4", or a share of the signal, "0.4 %".
     - `polarisation`: "s", "p" or "unpolarised", where the column's name does not state it.
     - `calibrated`: False lifts the limits on the values; by default for an `intensity` column only.
     - `folded`: True where Δ lies in 0 to 180 and its sign is unknown; None finds it by kinks, with a note.

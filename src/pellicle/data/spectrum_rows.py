@@ -37,7 +37,7 @@ _LONG = '`wavelength_unit="cm-1"`, `wavelength_unit="A"`'
 class Reading(SpectrumOptions):
     """Arguments of `read_spectrum`. Raises UsageError for an unknown word."""
 
-    noise: float | int | None = None
+    noise: float | int | str | None = None
     calibrated: bool | None = None
 
     def __post_init__(self) -> None:

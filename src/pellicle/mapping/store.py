@@ -285,8 +285,7 @@ def held(path: Path) -> Iterator[None]:
 
     **Raises:** UsageError where another run holds it.
     """
-    lock = path.resolve()
-    lock = lock.with_name(f".{lock.name}.lock")
+    lock = path.resolve().with_name(f".{path.resolve().name}.lock")
     handle = _locked(lock, path)
     try:
         yield

@@ -89,6 +89,14 @@ class Pair:
     def __repr__(self):
         return f"Pair({self.re}, {self.im})"
 
+    def __complex__(self):
+        return complex(0.0 if self.re is None else self.re, 0.0 if self.im is None else self.im)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        del copy
+        re, im = (0.0 if part is None else np.asarray(part) for part in (self.re, self.im))
+        return np.asarray(re + 1j * im, dtype=dtype)
+
     def __neg__(self):
         return Pair(_minus(self.re), _minus(self.im))
 

@@ -302,6 +302,9 @@ def usage_errors(label: str = "") -> Iterator[None]:
         raise UsageError(f"{label}{error}") from None
 
 
+_CAUCHY = ("cauchy", "cauchy-urbach")
+
+
 @usage_errors()
 def build_model(name: str, values: Values) -> AbstractDispersion:
     """Build a model of `MODELS` from `values`; other parameters are fixed at their defaults.
@@ -309,6 +312,12 @@ def build_model(name: str, values: Values) -> AbstractDispersion:
     Raises UsageError for values that the model forbids.
     """
     given: dict[str, Any] = {key: spec.value for key, spec in MODELS[name].items()} | dict(values)
+    B = given.get("B")
+    if name in _CAUCHY and isinstance(B, float | int) and 0 < abs(B) < 1:
+        raise UsageError(
+            f"{name}: B = {B:g} nm² changes no index, and is like one in µm²: write {1e6 * B:g}, its value in"
+            " nm², or 0"
+        )
     if name in TERMS:
         return oscillators.Oscillators(given.pop("eps_inf"), (KINDS[name](**given),))
     if name == "constant":

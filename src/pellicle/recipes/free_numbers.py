@@ -89,7 +89,7 @@ def _free_index(
             f"cannot free 'n' within {low:g} to {high:g}: it is added to the index of this material; write "
             "n=-0.1:0.1 for an index near the given one, or take the model cauchy for an unknown one"
         )
-    return Shifted(shifted.base, _within(bounds, _free_shift(dispersion)), shifted.k)
+    return Shifted(shifted.base, _within(bounds, _free_shift(shifted.base)), shifted.k)
 
 
 def _start(number: Any) -> float:

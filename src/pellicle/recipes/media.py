@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from pellicle.data.options import parse_number, parse_range
+from pellicle.data.options import is_range, length_range, parse_length, parse_number
 from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.effective_medium import MIXTURES
@@ -45,12 +45,12 @@ _CALL = re.compile(r"\s*([A-Za-z][\w-]*)\s*(?:\((.*)\))?\s*")
 
 def thickness(text: str) -> Free | float:
     """Parse `LO:HI` in nm as a free thickness, or one number as a fixed one. Raises UsageError."""
-    if ":" not in text:
-        fixed = parse_number(text, "`thickness`", "LO:HI in nm, as in 10:3000, or a number")
+    if not is_range(text):
+        fixed = parse_length(text, "`thickness`", "LO:HI in nm, as in 10:3000, or a number")
         if fixed < 0:
             raise UsageError(f"`thickness` must not be negative, got {text} nm")
         return fixed
-    low, high = parse_range(text, "`thickness`")
+    low, high = length_range(text, "`thickness`")
     if low < 0:
         raise UsageError(f"`thickness` must not be negative: its lower bound is {low:g} nm")
     return Free(low, high)
@@ -60,9 +60,9 @@ def free_or_number(text: str, name: str, default: Free) -> Free | float:
     """Parse `free` (the default), `LO:HI` or a number. Raises UsageError."""
     if text == "free":
         return default
-    if ":" in text:
-        return Free(*parse_range(text, name))
-    return parse_number(text, name)
+    if is_range(text):
+        return Free(*length_range(text, name))
+    return parse_length(text, name)
 
 
 def drift(text: str, name: str) -> str | float:

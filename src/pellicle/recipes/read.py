@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -42,6 +43,7 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
     **Raises:** DataError in one sentence: which key, what was expected, the nearest known key; or which layer
     of another program's model a scene cannot express.
     """
+    content = b""
     try:
         content = Path(path).read_bytes()
         loaded = _of_other_program(content, Path(path)) or tomllib.loads(content.decode("utf-8-sig"))
@@ -55,11 +57,26 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
             f"{path}: is not UTF-8 text, and a recipe is a TOML file; data files are arguments of their own"
         ) from None
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{path}: is not TOML, as a recipe must be: {error}") from None
+        unquoted = _unquoted(content.decode("utf-8-sig"), error)
+        raise DataError(f"{path}: {unquoted or f'is not TOML, as a recipe must be: {error}'}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
     except ValueError as error:
         raise DataError(f"{path}: {error}") from None
+
+
+_PLACE = re.compile(r"at line (\d+), column")
+_UNQUOTED = re.compile(r"\s*(?P<key>[\w.-]+)\s*=\s*(?P<value>[A-Za-z][\w./+-]*)\s*(#.*)?")
+
+
+def _unquoted(text: str, error: tomllib.TOMLDecodeError) -> str:
+    """The remedy where a line of a recipe has a text without quotation marks; empty for another error."""
+    if (place := _PLACE.search(str(error))) is None:
+        return ""
+    line = _UNQUOTED.fullmatch(text.splitlines()[int(place[1]) - 1])
+    if line is None:
+        return ""
+    return f'line {place[1]}: a text needs quotation marks: write {line["key"]} = "{line["value"]}"'
 
 
 def _of_other_program(content: bytes, path: Path) -> dict[str, Any] | None:
@@ -88,6 +105,11 @@ def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
         raise UsageError(_first_error(error, _tables_by_key(table))) from None
 
 
+_SYNONYMS = {"min": "lower", "max": "upper", "low": "lower", "high": "upper", "from": "lower", "to": "upper"}
+_SYNONYMS |= {"init": "value", "initial": "value", "guess": "value", "start": "value", "d": "thickness"}
+"""Keys that other programs use, and the key of a recipe."""
+
+
 def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
     """One sentence: an unknown key or an infinity goes before the errors of each branch of a union."""
     errors = error.errors(include_url=False)
@@ -107,7 +129,13 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     if chosen["type"] == "extra_forbidden":
         owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
         known = list(tables.get(owner, tables[""]).model_fields)
+        if (meant := _SYNONYMS.get(where[-1])) in known:
+            return f"unknown key {key!r}: write {meant}; known here: {', '.join(known)}"
         return f"unknown key {key!r}{did_you_mean(where[-1], known)}; known here: {', '.join(known)}"
+    if chosen["type"] == "list_type" and isinstance(chosen["input"], dict):
+        return f"{key} is a list of tables: write [[{key}]] with two brackets"
+    if chosen["type"] == "list_type" and isinstance(chosen["input"], str):
+        return f'{key} is a list: write {where[-1]} = ["{chosen["input"]}"]'
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":

@@ -123,7 +123,7 @@ _Angle = Annotated[
     float | Annotated[list[float], Field(min_length=1)] | FreeTable | None,
     ReadingOptions.declared()["angle"][1],
 ]
-_Noise = Annotated[float | None, Field(gt=0)]
+_Noise = Annotated[Annotated[float, Field(gt=0)] | str | None, ReadingOptions.declared()["noise"][1]]
 
 
 class ReadingTable(_Table, ReadingOptions):  # pyright: ignore[reportGeneralTypeIssues]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pellicle.errors import UsageError
 from pellicle.files import MARKER, new_folder, write_text
 from pellicle.reporting.json_record import indented, to_json, versions, write_result
-from pellicle.reporting.plain_text import csv_rows, written_by
+from pellicle.reporting.plain_text import csv_rows
 from pellicle.reporting.repeats import FILES as REPEATS
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def write_fit(
     fingerprint: str = "",
     described: Mapping[str, Any] | None = None,
     recipe: Callable[[Path], str] | None = None,
+    spec: Mapping[str, str] | None = None,
 ) -> Path:
     """Write a fit, and its posterior if there is one, into a folder.
 
@@ -47,7 +48,7 @@ def write_fit(
     adds posterior.nc, corner.png and predictive.png. Each file appears complete or not at all; files of an
     earlier result are replaced. A `fingerprint` of what was fitted is added to result.json when all files are
     written. `described` is what the scene was built from, a recipe or flags. `recipe` gives the text of
-    recipe.toml, a recipe in a folder that repeats the fit.
+    recipe.toml, a recipe in a folder that repeats the fit. `spec` are the verdicts on limits of parameters.
 
     **Returns:** the folder.
 
@@ -61,7 +62,7 @@ def write_fit(
     from pellicle.reporting.page.fit_pages import fit_page
     from pellicle.reporting.page.repetition import repetition
 
-    record = to_json(fit, posterior)
+    record = to_json(fit, posterior) | ({"spec": dict(spec)} if spec else {})
     if described is not None:
         record[SCENE] = dict(described)
     contents = {REPORT: report(fit, posterior), "fit.csv": fit_csv(fit)}
@@ -139,8 +140,10 @@ def distinct_stems(paths: Sequence[str | os.PathLike[str]], taken: Iterable[str]
 
 def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, Any]]) -> None:
     """Write one row for each file, spectrum or film: path and name within the file, status, verdict, free
-    parameters with errors, rms, reduced χ².
+    parameters with standard errors, that of the noise, the 95 % error and the unit, verdicts on limits, rms,
+    reduced χ².
 
+    The header is the first line, after a mark by which Excel recognises UTF-8.
     `records` are JSON records of fits and failures. An earlier summary in a folder that pellicle wrote is
     replaced. Raises UsageError in a folder with files that pellicle did not write.
     """
@@ -151,7 +154,13 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
         row |= {key: record[key] for key in ("status", "verdict")}
         for name, p in record["parameters"].items():
             if p["free"]:
-                row |= {name: p["value"], f"{name}_stderr": p["stderr"]}
+                row |= {
+                    name: p["value"],
+                    f"{name}_stderr": p["stderr"],
+                    f"{name}_stderr_noise": p["stderr_noise"],
+                }
+                row |= {f"{name}_95": p["expanded"], f"{name}_unit": p["unit"]}
+        row |= {f"{name}_spec": found for name, found in record.get("spec", {}).items()}
         row |= {"rms": record["rms"], "chi2_reduced": record["chi2_reduced"]}
         rows.append(row | {"sha256": data["sha256"] or "", "error": record.get("error", "")})
     ends = ("rms", "chi2_reduced", "sha256", "error")
@@ -159,7 +168,7 @@ def write_summary(path: str | os.PathLike[str], records: Iterable[Mapping[str, A
     header = [*(name for name in union if name not in ends), *ends]
     cells = [[row.get(name, "") for name in header] for row in rows]
     new_folder(Path(path).parent)
-    write_text(path, csv_rows(header, cells, [f"one row per fitted file; {written_by()}"]), overwrite=True)
+    write_text(path, "\ufeff" + csv_rows(header, cells), overwrite=True)
 
 
 def write_index(

@@ -38,14 +38,6 @@ def refuse_first(values: np.ndarray, wrong: np.ndarray, where: Where, reason: st
         raise DataError(f"{where(row)}: {values[row]:g} {reason}")
 
 
-def check_noise(noise: float | None) -> None:
-    """Raise UsageError unless a standard deviation is None, or finite and above zero."""
-    if noise is not None and not 0 < noise < np.inf:
-        raise UsageError(
-            f"`noise` must be a standard deviation above zero, as in `noise=0.005`, got {noise:g}"
-        )
-
-
 class NoiseLevel(NamedTuple):
     """A standard deviation in the unit of the signal, or where `relative` as a share of the signal."""
 
@@ -73,6 +65,27 @@ def noise_level(value: float | str, name: str = "`noise`") -> NoiseLevel:
             f"as in '2 %', not {text!r}"
         )
     return NoiseLevel(number / 100 if relative else number, relative)
+
+
+def noise_of(kind: str, noise: float | str) -> float:
+    """The standard deviation of a signal that has no share of itself. Raises UsageError for a share."""
+    level = noise_level(noise)
+    if level.relative:
+        raise UsageError(
+            f"`noise` {level} is a share of the signal, which {kind} cannot have: give its standard deviation"
+            " as a number"
+        )
+    return level.value
+
+
+def check_noise(noise: float | str | None) -> None:
+    """Raise UsageError unless a standard deviation is None, finite and above zero, or a text of one."""
+    if isinstance(noise, str):
+        noise_level(noise)
+    elif noise is not None and not 0 < noise < np.inf:
+        raise UsageError(
+            f"`noise` must be a standard deviation above zero, as in `noise=0.005`, got {noise:g}"
+        )
 
 
 def check_power(

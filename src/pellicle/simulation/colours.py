@@ -1,5 +1,6 @@
 """Interference colours of a film against thickness and angle, and simulated measurements of them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from pellicle.colour import integration_bands, sensor
 from pellicle.colour.film import Colour
+from pellicle.colour.film import film_colour as colour_of_film
 from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.colour.observers import sensor as observer
 from pellicle.colour.spaces import measured_encoding
@@ -25,11 +27,55 @@ from pellicle.forward_model.plan import Plan
 from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
-from pellicle.scene.layers import Layer
+from pellicle.scene.layers import Layer, medium
+from pellicle.simulation.functions import check_numbers
 from pellicle.simulation.spectra import simulate_signal
 
 BANDS = "uniform-64"
 """Integration over the spectrum: colours within ΔE2000 = 0.02 of steps of 1 nm, for films up to 5 µm."""
+
+
+def film_colour(
+    thickness: Any,
+    layer: Any,
+    substrate: Any,
+    *,
+    ambient: Any = 1.0,
+    angle: Any = 0.0,
+    method: str | None = None,
+    illuminant: str = "D65",
+    observer: str = "1931",
+) -> Colour:
+    """Colour of one or several layers on a half space in unpolarised light.
+
+    **Arguments:** `thickness` in nm, `layer`, `substrate`, `ambient` and `angle` in degrees as
+    `pellicle.reflectance` takes them: names, materials, numbers n + ik, and lists for several layers.
+    `method`: see `pellicle.colour.integration_bands`; "gaussians-8" if None, or "uniform-64" for several
+    layers. `illuminant`, `observer`: see `pellicle.colour.sensor`.
+
+    **Returns:** `Colour`, with `xyz`, `lab`, `linear_srgb` and `srgb`, each in the shape that the arguments
+    broadcast to, and one more axis.
+
+    **Raises:** as `pellicle.reflectance`, and ValueError for an unknown method, observer or illuminant.
+
+    ```python
+    >>> print(pl.film_colour(300.0, "SiO2", "Si").srgb.round(2))
+    [0.3  0.42 0.68]
+
+    ```
+    """
+    several = isinstance(layer, list | tuple)
+    layers, below, above = (_media(x) for x in (layer if several else [layer], [substrate], [ambient]))
+    for d in thickness if several else [thickness]:
+        check_numbers(550.0, d, angle)
+    chosen = method or (BANDS if several else "gaussians-8")
+    how: dict[str, Any] = {"angle": angle, "method": chosen, "illuminant": illuminant, "observer": observer}
+    return colour_of_film(thickness, layers if several else layers[0], below[0], ambient=above[0], **how)
+
+
+def _media(media: Sequence[Any]) -> list[Any]:
+    """Media with materials in place of their names."""
+    return [medium(x) if isinstance(x, str) else x for x in media]
 
 
 def interference_colours(

@@ -5,6 +5,7 @@ them. The precision follows the input, float32 or float64.
 """
 
 import warnings
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -57,6 +58,7 @@ def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, pola
     for name, value in {"wavelength": wavelength, "thickness": thickness, "angle": angle}.items():
         if isinstance(value, str):
             raise UsageError(f"`{name}` must be a number or an array, not {value!r}")
+    check_numbers(wavelength, thickness, angle)
     if _loses_precision(wavelength, thickness, layer, substrate, ambient, angle):
         warnings.warn(
             "float64 input is computed in float32: jax.config.update('jax_enable_x64', True) keeps it",
@@ -89,6 +91,33 @@ def film_arguments(wavelength, thickness, layer, substrate, ambient, angle, pola
     return FilmArguments(wavelength, thicknesses, media, theta, letters, propagating)
 
 
+MICROMETRES = 10.0
+"""Wavelengths in nm below it are of X-rays, which no catalogue covers; in µm they are of light."""
+
+
+def check_numbers(wavelength: Any, thickness: Any, angle: Any) -> None:
+    """Raise UsageError for impossible numbers; traced ones are not known, and pass."""
+    for x in thickness if isinstance(thickness, list | tuple) else [thickness]:
+        if (value := _wrong(x, lambda d: d < 0)) is not None:
+            raise UsageError(f"`thickness` must not be negative, got {value:g} nm")
+    if (value := _wrong(wavelength, lambda nm: ~(nm > 0))) is not None:
+        raise UsageError(f"`wavelength` must be above zero, in nm, got {value:g}")
+    known = not isinstance(wavelength, Tracer) and np.size(wavelength) > 0
+    if known and (longest := np.max(wavelength)) < MICROMETRES:
+        raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in µm: write {1e3 * longest:g}")
+    if (value := _wrong(angle, lambda degrees: ~(np.abs(degrees) <= 90))) is not None:
+        raise UsageError(f"`angle` must be 0 to 90 degrees, got {value:g}")
+
+
+def _wrong(values: Any, test: Callable[[np.ndarray], np.ndarray]) -> Any:
+    """The first of some known numbers that fails a test; None where none does, or they are traced."""
+    if isinstance(values, Tracer):
+        return None
+    array = np.asarray(values)
+    failing = array[test(array)] if array.dtype.kind in "fiu" else array[:0]
+    return failing.flat[0] if failing.size else None
+
+
 def floating(x: Any):
     """Convert to an array of real or complex floats, weakly typed where it is a Python number."""
     return jnp.asarray(x) * 1.0
@@ -102,6 +131,11 @@ def index_at(what: Medium, wavelength) -> Any:
             if hasattr(principal, "check_range"):
                 principal.check_range(np.asarray(wavelength))
         return material.index(wavelength)
+    if not isinstance(what, Tracer) and np.iscomplexobj(what) and np.any(np.imag(what) < 0):
+        gain = np.ravel(what)[np.argmin(np.imag(what))]
+        raise UsageError(
+            f"index {gain:g} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
+        )
     return to_pair(floating(what))
 
 
