@@ -11,6 +11,7 @@ import shlex
 import sys
 import tomllib
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -71,8 +72,6 @@ SLOW = (
     "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
     "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel",  # sampling
-    # one of the studies of test_fits.py
-    "pellicle fit --recipe fits/cauchy_100nm/recipe.toml",
     # draw more than one sphere of eight, and in full size
     *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
     *each("pellicle chart docs/surfaces/figure_{}.toml", "4 5_low 5_high"),
@@ -92,6 +91,7 @@ ELSEWHERE = (
     "make browser-tests",  # needs Chromium; reporting/test_page_in_browser.py, explorer
     "make dist-check",  # installs the wheel for every Python found; .ci/run: make dist
     "make fits",  # test_fits.py: all of them in make slow
+    *each("pellicle fit --recipe fits/{}/recipe.toml", "cauchy_100nm brush_15-1-1"),  # two of them
     *("make slow", "make coverage", "python -m pytest"),  # run these tests
     "make properties",  # properties: the same on thousands of scenes
     "make fuzz",  # data/test_properties.py: a short run
@@ -175,18 +175,23 @@ def missing_results(page: str, outputs: Iterable[str]) -> list[str]:
     ]
 
 
-@pytest.fixture
-def clone(tmp_path_factory, monkeypatch):
-    """Return a function that enters a new writable folder with the contents of a clone."""
-    monkeypatch.setenv("PELLICLE_CACHE", "off")
+@pytest.fixture(scope="module")
+def new_clone(tmp_path_factory):
+    """Return a function that makes a writable folder with the contents of a clone."""
 
-    def enter():
+    def make():
         folder = tmp_path_factory.mktemp("clone")
         for name in ("docs", "fits", "measurements"):
             (folder / name).symlink_to(ROOT / name)
-        monkeypatch.chdir(folder)
+        return folder
 
-    return enter
+    return make
+
+
+@pytest.fixture(scope="module")
+def clone_of(new_clone):
+    """Return a function that finds the folder of a page's commands, with the files that they wrote."""
+    return cache(lambda page: new_clone())
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +204,8 @@ def outputs():
 def run_command(monkeypatch, capsys):
     """Return a function that runs one command, checks its exit code and returns its stdout.
 
-    Spheres are drawn with 64 pixels across, not 260 or 420: rendering them takes most of the time.
+    Spheres are drawn with 64 pixels across, not 260 or 420, and solvers fit one spectrum, not 20: most of the
+    time otherwise.
     """
     for name in ("render", "ball", "bubble"):
         drawn = getattr(renderings, name)
@@ -207,7 +213,8 @@ def run_command(monkeypatch, capsys):
         monkeypatch.setattr(renderings, name, small)
 
     def run(command):
-        monkeypatch.setattr(sys, "argv", shlex.split(command))
+        once = command.startswith("pellicle cost ") and "--datasets" not in command
+        monkeypatch.setattr(sys, "argv", shlex.split(command) + ["--datasets", "1"] * once)
         capsys.readouterr()
         code, streams = main(), capsys.readouterr()
         assert code == (4 if command in EXIT_4 else 0), (command, streams)
@@ -217,19 +224,22 @@ def run_command(monkeypatch, capsys):
 
 
 @pytest.fixture
-def run_page(clone, run_command, outputs):
+def run_page(clone_of, run_command, outputs, monkeypatch):
     """Return a function that runs the commands of a page that have not run, or whose files it reads.
 
     The slow ones only where `slow`.
     """
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
 
     def run(page, slow=False):
-        clone()
+        monkeypatch.chdir(clone_of(page))
         shown = pellicle_commands(page)
         for i, command in enumerate(shown):
             out = command.partition("--out ")[2].partition(" ")[0]
-            is_read_later = out and any(out in later.split() for later in shown[i + 1 :])
-            if (slow or not is_slow(command)) and (is_read_later or command not in outputs):
+            is_missing = (
+                out and not Path(out).exists() and any(out in later.split() for later in shown[i + 1 :])
+            )
+            if (slow or not is_slow(command)) and (is_missing or command not in outputs):
                 outputs[command] = run_command(command)
             elif out:  # the folder of its result is there for the next commands
                 Path(out).parent.mkdir(exist_ok=True)
@@ -330,9 +340,10 @@ def test_slow_commands_run(page, run_page):
         if blocks(page, "python")
     ],
 )
-def test_python_runs(page, clone):
+def test_python_runs(page, new_clone, monkeypatch):
     """The blocks of a page run in order, in one namespace."""
-    clone()
+    monkeypatch.setenv("PELLICLE_CACHE", "off")
+    monkeypatch.chdir(new_clone())
     names: dict[str, object] = {}
     for block in blocks(page, "python"):
         exec(compile(block, page, "exec"), names)
