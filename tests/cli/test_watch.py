@@ -72,10 +72,17 @@ def test_continuity_decides_orders_and_a_jump_is_found(live):
 def test_a_file_that_is_no_spectrum_of_the_series_is_said(live):
     made, _ = live
     told = {name: fit.error for name, fit in made.fits.items() if fit.error}
-    assert set(told) == {"99s.csv", "no_time.csv", "run2_05s.csv", "run_98s.csv"}
+    assert set(told) == {"99s.csv", "no_time.csv", "run2_05s.csv"}
     assert "state no times" in told["no_time.csv"]
     assert "has the time of run_05s.csv" in told["run2_05s.csv"]
-    assert "wavelengths differ" in told["run_98s.csv"]
+
+
+def test_a_file_on_another_grid_is_fitted_and_too_many_grids_are_said(live, tmp_path, monkeypatch):
+    made, _ = live
+    assert abs(made.fits["run_98s.csv"].values[0] - 740) < 12
+    monkeypatch.setattr("pellicle.mapping.live_series._GRIDS", 2)
+    made = made.fit(write(tmp_path / "run_97s.csv", 740.0, nm=NM + 0.7))
+    assert "differ from those of" in made.error
 
 
 def test_the_page_shows_the_files_and_what_is_new(live):

@@ -9,6 +9,7 @@ import xarray
 import pellicle as pl
 from pellicle.cli import app
 from pellicle.errors import UsageError
+from pellicle.reporting.series import write_series
 
 NM, TIME = np.linspace(600, 700, 24), np.arange(80) * 10.0
 GROWN = 200 + 1800 * (1 - np.exp(-TIME / 500))
@@ -101,6 +102,18 @@ def test_a_netcdf_file_and_a_folder_of_files_are_series(grown, tmp_path):
         (tmp_path / "files" / f"{seconds:g}s.csv").write_text(f"wavelength_nm,R\n{rows}\n")
     found = pl.series(tmp_path / "files", SCENE)
     assert list(found.times) == pytest.approx([0, 10, 20, 30])
+
+
+def test_a_series_with_dates_counts_from_the_first(grown, tmp_path):
+    data = cube(GROWN)
+    dates = np.datetime64("2026-05-04T12:30:00", "ns") + (TIME * 1e9).astype("timedelta64[ns]")
+    found = pl.series(data.assign_coords(time=dates), SCENE)
+    np.testing.assert_allclose(found.times, TIME / 60)
+    write_series(tmp_path / "out", found)
+    made = xarray.load_dataset(tmp_path / "out" / "series.nc")
+    assert np.abs(made.time.values - dates).max() <= np.timedelta64(1, "us")
+    raw = xarray.load_dataset(tmp_path / "out" / "series.nc", decode_times=False)
+    assert raw.time.attrs["units"] == "minutes since 2026-05-04T12:30:00.000"
 
 
 def test_what_is_no_series_is_refused(tmp_path):

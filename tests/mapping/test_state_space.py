@@ -90,3 +90,20 @@ def test_a_freely_varying_parameter_has_the_error_of_its_time():
     quadratics = Quadratics((0.4 / sigma**2)[:, None], (1 / sigma**2)[:, None, None], np.zeros((5, 1, 0)))
     found = smooth(t, quadratics, ("freely",), np.zeros(5, bool), 0.1)
     np.testing.assert_allclose(found.variance[:, 0], 1 / (1 / sigma**2 + 1), rtol=1e-10)
+
+
+def test_a_kink_is_followed_by_a_stiff_smoother():
+    """Two straight lines that meet within the step that may bend."""
+    t, sigma = np.arange(40.0), 1e-3
+    true = 0.3 + 0.01 * np.minimum(t, 20.4) - 0.005 * np.maximum(t - 20.4, 0)
+    seen = true + sigma * np.random.default_rng(0).standard_normal(40)
+    quadratics = Quadratics(seen[:, None] / sigma**2, np.full((40, 1, 1), sigma**-2), np.zeros((40, 1, 0)))
+    like = Smoothed(*[np.zeros(0)] * 6, derivatives=2, stiffness=np.array([-12.0]))
+    about = t, quadratics, ("slowly",), np.zeros(40, bool), 0.1, like
+    bent = smooth(*about, kinks=1e-4 * (t == 21))
+    off = (bent.mean - true[:, None]) / np.sqrt(bent.variance)
+    assert np.abs(off).max() < 4
+    np.testing.assert_allclose(
+        bent.rate[[5, 35], 0], [0.01, -0.005], atol=4 * bent.rate_variance.max() ** 0.5
+    )
+    assert np.abs(smooth(*about).mean - true[:, None]).max() > 20 * np.abs(bent.mean - true[:, None]).max()

@@ -10,6 +10,7 @@ import xarray
 import pellicle as pl
 from pellicle.cli import app
 from pellicle.errors import DataError, UsageError
+from pellicle.fitting.batch.data import CODES
 from pellicle.mapping.trace import lost
 from pellicle.mapping.trace_light import Light
 from pellicle.mapping.trace_path import KINK, Candidates, Course, trace_path
@@ -26,9 +27,9 @@ def reflectance(thickness, nm=LASER, n=INDEX):
     return np.abs((upper + lower * turn) / (1 + upper * lower * turn)) ** 2
 
 
-def trace(thickness, nm=(LASER,), noise=0.01, seed=0, gain=2.7, offset=0.13):
+def trace(thickness, nm=(LASER,), noise=0.01, seed=0, gain=2.7, offset=0.13, n=INDEX):
     """Light in volts (times, wavelengths), with noise as a share of its range."""
-    values = np.stack([offset + gain * reflectance(thickness, x) for x in nm], axis=1)
+    values = np.stack([offset + gain * reflectance(thickness, x, n) for x in nm], axis=1)
     values += noise * np.ptp(values, axis=0) * np.random.default_rng(seed).standard_normal(values.shape)
     axes = {"time": ("time", TIME[: len(values)], {"units": "s"}), "wavelength": list(nm)}
     return xarray.Dataset({"R": (("time", "wavelength"), values)}, axes)
@@ -52,6 +53,39 @@ def test_a_laser_follows_a_film_from_a_known_start():
     assert 0.5 < np.sqrt(np.mean(off(found, grown) ** 2)) < 1.7
     rate = np.gradient(grown, TIME) * 60
     assert (np.abs(found["rate"] - rate) < 5 * found["rate_stderr"]).all()
+    made = found.dataset
+    for name, true in {"gain_633_nm": 2.7, "offset_633_nm": 0.13}.items():
+        assert abs(made[name] - true) < 4 * made[f"{name}_stderr_noise"] < 0.05
+    noise = 0.01 * np.ptp(2.7 * reflectance(grown))
+    assert float(made.residual.std()) == pytest.approx(noise, rel=0.1)
+    np.testing.assert_allclose(
+        made.light[:, 0] - made.residual[:, 0], 0.13 + 2.7 * reflectance(grown), atol=noise
+    )
+
+
+def test_a_film_whose_fringes_die_out_goes_on():
+    """A path that turns at each extremum follows the light, too."""
+    grown = 600 * (1 - np.exp(-TIME / 400))
+    found = pl.series(
+        trace(grown, noise=0.015, seed=6, n=2.3 - 0.35j, gain=8.0),
+        pl.Scene(
+            pl.Layer(2.3 + 0.35j, pl.Free(0, 900, first=0.0)),
+            3.88,
+            instrument=pl.Instrument(scale="free", offset="free"),
+        ),
+    )
+    right = np.abs(found["thickness"] - grown) < 20
+    assert (right | (found.dataset.status == CODES["ambiguous"])).all()
+    assert right.mean() > 0.8
+
+
+def test_a_turn_near_an_extremum_is_told_or_left_open():
+    turn = 2 * FRINGE + 3
+    grown = np.where(TIME < 300, turn * TIME / 300, turn - (TIME - 300))
+    found = pl.series(trace(grown, noise=0.02, seed=7), scene(first=0.0))
+    wrong = np.abs(found["thickness"] - grown) > 20
+    told = any("turns abruptly at an extremum" in text for text in found.warnings)
+    assert told or not (wrong & (found.dataset.status == CODES["by-neighbours"])).any()
 
 
 def test_one_laser_without_a_start_decides_no_order():
@@ -112,7 +146,10 @@ def test_a_table_with_a_time_and_wavelengths_is_a_trace(tmp_path, capsys, monkey
     capsys.readouterr()
     (tmp_path / "film.toml").write_text(f'{recipe}[instrument]\nscale = "free"\noffset = "free"\n')
     assert app(["series", "laser.csv", "--recipe", "film.toml", "--out", "grown", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["status"] == {"by-neighbours": 500}
+    record = json.loads(capsys.readouterr().out)
+    assert record["status"] == {"by-neighbours": 500}
+    assert abs(record["parameters"]["gain_633_nm"]["value"] - 2.7) < 0.1
+    assert "residual_633_nm" in (tmp_path / "grown" / "series.csv").read_text().split("\n")[0]
     made = xarray.load_dataset("grown/series.nc")
     assert np.abs(made.thickness - grown).max() < LASER / 200
 

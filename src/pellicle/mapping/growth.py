@@ -184,6 +184,12 @@ def _rates(
     return line.rate, enlarged, line.noise, reduced, line.points, status
 
 
+def first_date(array: DataArray) -> str:
+    """Date of the first time, as ISO 8601, or an empty text where times have no date."""
+    [first] = np.asarray(array.values[:1])
+    return str(first.astype("datetime64[ms]")) if array.dtype.kind == "M" else ""
+
+
 def elapsed(array: DataArray, unit: str | None) -> tuple[np.ndarray, str]:
     """Times since the first one, and their unit."""
     if unit is not None and unit not in _SECONDS:

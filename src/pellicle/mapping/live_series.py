@@ -29,6 +29,8 @@ from pellicle.mapping.series_result import SURE
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
+_GRIDS = 4
+"""Most grids of wavelengths, each with a model of its own, which takes seconds to prepare."""
 _USABLE = str(Status.CONVERGED), BY_NEIGHBOURS
 
 
@@ -101,8 +103,7 @@ class LiveSeries:
         self.unit, self.done = unit, 0
         self.fits: dict[str, LiveFit] = {}
         self._latest: list[_Minima] = []
-        self._model: PixelModel | None = None
-        self._grid: Cube | None = None
+        self._models: list[tuple[Cube, PixelModel]] = []
 
     def restore(self, fits: Iterable[LiveFit]) -> None:
         """Take over the fits of an earlier run."""
@@ -146,19 +147,35 @@ class LiveSeries:
             raise DataError(f"{path}: has no time: complete the table of times")
         if twice := next((fit.file for fit in self.fits.values() if fit.time == time), ""):
             raise DataError(f"{path}: has the time of {twice}, {time:g} {unit}: leave one of them out")
-        if self._model is None:
-            self._model, self._grid = prepare(cube, self.scene, rows=FEW), cube
-        else:
-            assert self._grid is not None
-            cube = _on_grid(cube, self._grid)
-        fits = fit_pixels(self._model, cube, (slice(0, 1),))
+        cube, model = self._prepared(cube)
+        fits = fit_pixels(model, cube, (slice(0, 1),))
         self.origin, self.unit = origin, unit
         return self._chosen(LiveFit(path.name, size, time), fits)
 
+    def _prepared(self, cube: Cube) -> tuple[Cube, PixelModel]:
+        """A cube on the wavelengths of an earlier one, and the model of these, or its own for a new grid.
+
+        Raises DataError for another kind of data, and for yet another grid.
+        """
+        for grid, model in self._models:
+            if (on_grid := _on_grid(cube, grid)) is not None:
+                return on_grid, model
+        if len(self._models) == _GRIDS:
+            raise DataError(
+                f"{cube.path}: its wavelengths differ from those of {self._models[0][0].path} and of"
+                f" {_GRIDS - 1} other grids: give the instrument one grid, or use pellicle fit"
+            )
+        self._models.append((cube, prepare(cube, self.scene, rows=FEW)))
+        return self._models[-1]
+
     def _chosen(self, made: LiveFit, fits: BatchFits) -> LiveFit:
         """The fit with the minimum that is its own best, or the one that continuity decides."""
-        assert self._model is not None
-        depth, status, order, jump = self._model.problem.thickness_axis, STATUSES[fits.status[0]], 0, False
+        depth, status, order, jump = (
+            self._models[0][1].problem.thickness_axis,
+            STATUSES[fits.status[0]],
+            0,
+            False,
+        )
         rival = float(fits.delta_chi2[0, 1])
         thickness = fits.minima[0, :, depth] if depth is not None else np.full(ORDERS, np.nan)
         delta = np.where(np.isfinite(thickness), fits.delta_chi2[0], np.inf)
@@ -199,15 +216,21 @@ class LiveSeries:
         return int(path.chosen[at]), float(path.rival[at]), bool(jump)
 
 
-def _on_grid(cube: Cube, grid: Cube) -> Cube:
-    """A cube on the wavelengths of another one, NaN where it has none. Raises DataError for other ones."""
+def _on_grid(cube: Cube, grid: Cube) -> Cube | None:
+    """A cube on the wavelengths of another one, NaN where it has none, or None if it has others.
+
+    Raises DataError for another kind of data.
+    """
     kinds = [(one.signal, one.polarisation, sorted(one.arrays)) for one in (cube, grid)]
     if kinds[0] != kinds[1] or str(cube.angle) != str(grid.angle):
         raise DataError(
             f"{cube.path}: differs from {grid.path} in signal, polarisation, angle or stated errors: watch"
             " files of one kind"
         )
-    at = rows_on_grid(cube.wavelength, grid.wavelength, cube.path, grid.path)
+    try:
+        at = rows_on_grid(cube.wavelength, grid.wavelength, cube.path, grid.path)
+    except DataError:
+        return None
     if at.size == grid.wavelength.size:
         return cube
     arrays = {}

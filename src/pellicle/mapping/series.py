@@ -23,7 +23,7 @@ from pellicle.fitting.batch import polish
 from pellicle.fitting.batch.data import CODES
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
-from pellicle.mapping.growth import TIME, elapsed
+from pellicle.mapping.growth import TIME, elapsed, first_date
 from pellicle.mapping.lamp import lamp_curve_of
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.order_path import order_path
@@ -71,7 +71,7 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
     _check_times(cube)
     if is_trace(cube):
         trace = trace_of(cube, scene)
-        model = prepare(trace.cube, trace.scene)
+        model = prepare(trace.example, trace.scene)
         made = map_cube(trace.cube, trace.scene, fit=undecided, model=model, **options)
         return smoothed_series(trace.cube, model, made, trace.joined)
     if (lamp := options.pop("lamp_curve", None)) is not None:
@@ -88,15 +88,16 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None 
     **Raises:** UsageError for fewer than three times with data, and where nothing varies.
     """
     dataset = made.dataset.load()
-    time, unit = elapsed(dataset[TIME], None)
+    times = *elapsed(dataset[TIME], None), first_date(dataset[TIME])
+    time = times[0]
     kinds = _kinds(model.parameters)
     if join is None and MONOTONIC in kinds:
         raise UsageError('varies = "monotonic" is of the thickness of a trace: write "slowly" for spectra')
     with jax.enable_x64(True):
         joined = (join or _joined)(model, cube, dataset, time, kinds)
         spectra = Spectra(model, cube, joined.used)
-        left = residuals(spectra, time, joined.smoothed.mean) if join is None else {}
-    found = series_of(made, dataset, model.parameters, (time, unit), joined)
+        left = residuals(spectra, time, joined.smoothed.mean) if join is None else joined.beside
+    found = series_of(made, dataset, model.parameters, times, joined)
     return replace(found, dataset=found.dataset.assign(left))
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
+from pellicle.data.cube import Cube
 from pellicle.fitting.batch import polish
 from pellicle.mapping.growth import TIME
 from pellicle.mapping.series_spectra import Spectra
@@ -13,6 +15,22 @@ from pellicle.mapping.series_spectra import Spectra
 SHOWN, WORST, WAVELENGTH = "time_shown", "time_worst", "wavelength"
 _MOST, _WORST = 400, 3
 """Times of the image at most, and spectra that are kept as the worst."""
+
+
+_ABOUT = {"units": "1", "long_name": "data - fit"}
+
+
+def of_trace(cube: Cube, light: np.ndarray, left: np.ndarray) -> dict[str, tuple[Any, ...]]:
+    """Variables of the `light` of a trace and of what its fit has `left`, both (times, wavelengths)."""
+    with warnings.catch_warnings():  # times without data
+        warnings.simplefilter("ignore", RuntimeWarning)
+        rms = np.sqrt(np.nanmean(left**2, axis=1))
+    return {
+        WAVELENGTH: (WAVELENGTH, cube.wavelength, {"units": "nm"}),
+        "light": ((TIME, WAVELENGTH), light, {"units": "1", "long_name": "light as measured"}),
+        "residual": ((TIME, WAVELENGTH), left, _ABOUT),
+        "residual_rms": (TIME, rms, _ABOUT | {"long_name": "root mean square of data - fit"}),
+    }
 
 
 def residuals(spectra: Spectra, time: np.ndarray, units: np.ndarray) -> dict[str, tuple[Any, ...]]:
@@ -41,12 +59,11 @@ def residuals(spectra: Spectra, time: np.ndarray, units: np.ndarray) -> dict[str
             order = np.argsort(-rms[which])[:_WORST]
             rows = zip(which[order], np.where(known, data.values, np.nan)[order], fit[order], strict=True)
             worst = sorted([*worst, *rows], key=lambda row: -rms[row[0]])[:_WORST]
-    about = {"units": "1", "long_name": "data - fit"}
     found = {
         WAVELENGTH: (WAVELENGTH, cube.wavelength, {"units": "nm"}),
         SHOWN: (SHOWN, time[::step]),
-        "residual": ((SHOWN, WAVELENGTH), image.astype("float32"), about),
-        "residual_rms": (TIME, rms, about | {"long_name": "root mean square of data - fit"}),
+        "residual": ((SHOWN, WAVELENGTH), image.astype("float32"), _ABOUT),
+        "residual_rms": (TIME, rms, _ABOUT | {"long_name": "root mean square of data - fit"}),
     }
     if worst:
         at, data, fit = (np.array(column) for column in zip(*worst, strict=True))

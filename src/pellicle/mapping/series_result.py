@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 SURE = 12.0
 """Least Δχ² of the best path through another minimum for an order that continuity decides."""
-_ERRORS = "", "_stderr", "_stderr_noise"
+ERRORS = "", "_stderr", "_stderr_noise"
 """Ends of the names of a value and its errors."""
 
 
@@ -75,29 +77,32 @@ class Series:
 
 class Joined(NamedTuple):
     """The answer of all times that have data: the path of orders, the smoothed parameters, their kinds of
-    change, and the positions of these times."""
+    change, the positions of these times, times at which a film that turns abruptly fits, too, and variables
+    beside the parameters, as `xarray.Dataset.assign` takes them."""
 
     path: OrderPath
     smoothed: Smoothed
     kinds: tuple[str, ...]
     used: np.ndarray
+    turns: Sequence[float] = ()
+    beside: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
 
 
 def series_of(
     made: Map,
     dataset: Dataset,
     parameters: tuple[Parameter, ...],
-    times: tuple[np.ndarray, str],
+    times: tuple[np.ndarray, str, str],
     joined: Joined,
 ) -> Series:
     """Return the result in the parameters' own units.
 
     **Arguments:** the map of the spectra and its loaded `dataset`; `parameters` of the fits; `times` since
-    the first one and their unit; the answer of all times.
+    the first one, their unit and its date, if known; the answer of all times.
     """
     import xarray
 
-    (time, unit), (path, _, _, used) = times, joined
+    (time, unit, start), path, used = times, joined.path, joined.used
     variables: dict[str, Any] = {}
     for i, parameter in enumerate(parameters):
         variables |= _variables(dataset, parameter, i, joined, unit)
@@ -110,19 +115,20 @@ def series_of(
     }
     variables["status"] = TIME, _status(dataset, path, used), flags
     variables["chi2_reduced"] = TIME, np.asarray(dataset["chi2_reduced"], float), {"units": "1"}
-    axis = {TIME: (TIME, time, {"units": unit, "long_name": "time since the first"})}
+    about = {"units": unit, "long_name": "time since the first"} | ({"start": start} if start else {})
+    axis = {TIME: (TIME, time, about)}
     result = xarray.Dataset(variables, axis)
     # where the order is open a path may jump, and the film need not
     sure = path.breaks & (path.rival > SURE) & (np.roll(path.rival, 1) > SURE)
     breaks = tuple(float(x) for x in time[used][sure])
-    return Series(result, breaks, _warnings(time, unit, used, breaks, result), made)
+    return Series(result, breaks, _warnings(time, unit, joined, breaks, result), made)
 
 
 def _variables(
     dataset: Dataset, parameter: Parameter, i: int, joined: Joined, unit: str
 ) -> dict[str, tuple[Any, Any, dict[str, str]]]:
     """Value, errors and rate of the i-th parameter: axes, values at the times with data, attributes."""
-    _, smoothed, kinds, _ = joined
+    smoothed, kinds = joined.smoothed, joined.kinds
     name, own_unit, span = (
         variable_name(parameter.name),
         parameter.unit or "1",
@@ -133,18 +139,16 @@ def _variables(
     about = {"long_name": parameter.name, "units": own_unit}
     if kinds[i] == SHARED:
         numbers = value[-1], np.hypot(noise[-1], systematic[-1]), noise[-1]
-        return {f"{name}{key}": ((), x, about) for key, x in zip(_ERRORS, numbers, strict=True)}
+        return {f"{name}{key}": ((), x, about) for key, x in zip(ERRORS, numbers, strict=True)}
     columns = value, np.hypot(noise, systematic), noise
-    found: dict[str, Any] = {
-        f"{name}{key}": (TIME, x, about) for key, x in zip(_ERRORS, columns, strict=True)
-    }
+    found: dict[str, Any] = {f"{name}{key}": (TIME, x, about) for key, x in zip(ERRORS, columns, strict=True)}
     if kinds[i] in (SLOWLY, MONOTONIC):
         rate, error = span * smoothed.rate[:, i], span * np.sqrt(smoothed.rate_variance[:, i])
         common = span * np.sqrt(smoothed.rate_systematic[:, i])
         about = {"long_name": f"rate of change of {parameter.name}", "units": f"{own_unit}/{unit}"}
         before = "" if sum(kind in (SLOWLY, MONOTONIC) for kind in kinds) == 1 else f"{name}_"
         columns = rate, np.hypot(error, common), error
-        found |= {f"{before}rate{key}": (TIME, x, about) for key, x in zip(_ERRORS, columns, strict=True)}
+        found |= {f"{before}rate{key}": (TIME, x, about) for key, x in zip(ERRORS, columns, strict=True)}
     return found
 
 
@@ -168,9 +172,9 @@ def _status(dataset: Dataset, path: OrderPath, used: np.ndarray) -> np.ndarray:
 
 
 def _warnings(
-    time: np.ndarray, unit: str, used: np.ndarray, breaks: tuple[float, ...], result: Dataset
+    time: np.ndarray, unit: str, joined: Joined, breaks: tuple[float, ...], result: Dataset
 ) -> tuple[str, ...]:
-    sentences = []
+    used, sentences = joined.used, []
     if breaks:
         where = ", ".join(f"{x:g}" for x in breaks[:6]) + (" and others" if len(breaks) > 6 else "")
         sentences.append(f"the film changes abruptly before {where} {unit}: each part is fitted as a series")
@@ -181,6 +185,12 @@ def _warnings(
     if share := np.mean(codes[used] == CODES[str(Status.AMBIGUOUS)]):
         sentences.append(
             f"the order of {100 * share:.3g} % of the times is not decided, by continuity neither"
+        )
+    if joined.turns:
+        where = ", ".join(f"{x:.4g}" for x in joined.turns[:6])
+        sentences.append(
+            f"a film that turns abruptly at an extremum of the light, as at {where} {unit}, fits as well:"
+            ' `last`, varies = "monotonic" or a second wavelength decides'
         )
     if share := np.mean(codes[used] == CODES[str(Status.MISFIT)]):
         sentences.append(f"the model does not follow the data at {100 * share:.3g} % of the times")

@@ -80,19 +80,22 @@ def smooth(
     breaks: np.ndarray,
     fastest: float,
     like: Smoothed | None = None,
+    kinks: np.ndarray | None = None,
 ) -> Smoothed:
     """Smooth the parameters of a series by all its times.
 
     **Arguments:** `time` (times,), increasing; `quadratics` of the misfits; one of `VARIES` for each
     parameter; `breaks` (times,), True where the slowly varying parameters start anew; `fastest`, the standard
     deviation of a rate then, in the range of a parameter per median step; `like`, an earlier result whose
-    stiffness is kept.
+    stiffness is kept; `kinks` (times,), variances of a change of the rate in the step before each time, in
+    the unit of `fastest`, where that is abrupt.
     """
     shared = np.array([kind == SHARED for kind in kinds])
     own = tuple(kind for kind in kinds if kind != SHARED)
     slow = np.flatnonzero([kind == SLOWLY for kind in own])
     unit = float(np.median(np.diff(time)))
-    series = _Times(np.diff(time, prepend=time[0]) / unit, breaks, quadratics, own, shared, fastest)
+    kinks = np.zeros(len(time)) if kinks is None else kinks
+    series = _Times(np.diff(time, prepend=time[0]) / unit, breaks, kinks, quadratics, own, shared, fastest)
     with jax.enable_x64(True):
         if like is None:
             states, best = _best(series)
@@ -139,11 +142,12 @@ def _stiffness(series: _Times, states: int, slow: int) -> tuple[float, int, np.n
 
 
 class _Times(NamedTuple):
-    """A series: `steps` before each time in units of the median one, breaks, misfits, how the parameters that
-    are not `shared` vary, and the prior of rates."""
+    """A series: `steps` before each time in units of the median one, breaks, kinks, misfits, how the
+    parameters that are not `shared` vary, and the prior of rates."""
 
     steps: np.ndarray
     breaks: np.ndarray
+    kinks: np.ndarray
     quadratics: Quadratics
     kinds: tuple[str, ...]
     shared: np.ndarray
@@ -157,10 +161,9 @@ class _Times(NamedTuple):
         """A series of at most `_ENOUGH` times."""
         first = np.arange(0, len(self.steps), -(-len(self.steps) // _ENOUGH))
         steps = np.diff(np.cumsum(self.steps)[first], prepend=0.0)
-        breaks = np.logical_or.reduceat(self.breaks, first)
-        return self._replace(
-            steps=steps, breaks=breaks, quadratics=Quadratics(*(x[first] for x in self.quadratics))
-        )
+        breaks, kinks = np.logical_or.reduceat(self.breaks, first), np.add.reduceat(self.kinks, first)
+        quadratics = Quadratics(*(x[first] for x in self.quadratics))
+        return self._replace(steps=steps, breaks=breaks, kinks=kinks, quadratics=quadratics)
 
     def arrays(self, states: int) -> tuple[Any, ...]:
         """The misfits as functions of the states at given shared parameters: v, −Λ of both, and pushes
@@ -191,6 +194,11 @@ class _Times(NamedTuple):
             if kind == SLOWLY:
                 at = [i, *range(count + slow * (states - 1), count + (slow + 1) * (states - 1))]
                 move, spread = _wiener(steps, states, 10.0 ** noise[slow])
+                bent = np.flatnonzero(self.kinks)
+                spread[bent, :2] = 0.0
+                spread[bent, :2, :2] = (
+                    _wiener(steps[bent], 2, 1.0)[1] * np.sqrt(self.kinks[bent] / steps[bent])[:, None, None]
+                )
                 move[anew], spread[anew] = 0.0, self.fastest * np.eye(states)
                 transition[np.ix_(range(len(steps)), at, at)] = move
                 root[np.ix_(range(len(steps)), at, at)] = spread

@@ -31,6 +31,25 @@ _OUTSIDE = 25.0
 """Least χ² of a window without any thickness that explains it: a shutter, a saturated detector."""
 
 
+class Start(NamedTuple):
+    """Thickness at times (times,) from which a fit starts, True in `kinks` (times,) if the rate may change
+    abruptly in the step before; and the position up to which the path holds, if it goes on from there."""
+
+    time: np.ndarray
+    thickness: np.ndarray
+    kinks: np.ndarray
+    until: int | None = None
+
+    def along(self, time: np.ndarray) -> np.ndarray:
+        """Thickness at any times, by straight lines."""
+        return np.interp(time, self.time, self.thickness)
+
+    def bent(self, time: np.ndarray) -> np.ndarray:
+        """True at any times (times,) with a kink in the step of this start that leads to them."""
+        step = np.searchsorted(self.time, time)
+        return self.kinks[np.clip(step, 0, len(self.kinks) - 1)] & (step > 0) & (step < len(self.kinks))
+
+
 class Branches(NamedTuple):
     """Candidates of the windows that a thickness explains, at the times `centre` of all windows, of which
     these are `inside`; what the film may do; the best path, the gain and offset (wavelengths, 2), the other
@@ -53,9 +72,26 @@ class Branches(NamedTuple):
         """Thickness of a path at any times, by straight lines."""
         return np.interp(time, self.centre[self.inside], self.thickness(path))
 
+    def start_of(self, path: TracePath, *, turns: bool = False) -> Start:
+        """A path as the start of a fit, which may change its rate abruptly where the path pays for that, or
+        wherever it `turns`, too: at an extremum a turn looks even from window to window."""
+        centre, thickness = self.centre[self.inside], self.thickness(path)
+        kinks = path.kinks.copy()
+        error = self.candidates.stderr[np.arange(len(kinks)), path.chosen]
+        for a in range(2, len(kinks) - 2) if turns else ():
+            away = thickness[[a - 2, a + 2]] - thickness[a]
+            nearest = np.abs(thickness[a - 1 : a + 2] - thickness[a]).max() <= np.abs(away).min()
+            kinks[a] |= np.prod(away) > 0 and nearest and np.all(np.abs(away) > 2 * error[[a - 2, a + 2]])
+        return Start(centre, thickness, kinks | np.roll(kinks, 1))
+
     def nearest(self, time: np.ndarray) -> np.ndarray:
         """The windows of any times."""
         return np.searchsorted(0.5 * (self.centre[1:] + self.centre[:-1]), time)
+
+    def nearest_path(self, path: TracePath, fitted: Start) -> TracePath:
+        """A path by the candidates nearest to thicknesses."""
+        away = np.abs(self.candidates.thickness - fitted.along(self.centre[self.inside])[:, None])
+        return path._replace(chosen=np.nanargmin(away, axis=1))
 
     def gain_of(
         self,

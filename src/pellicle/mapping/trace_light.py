@@ -10,6 +10,7 @@ import numpy as np
 from pellicle.data.cube import Cube
 from pellicle.errors import UsageError
 from pellicle.fitting.robust_losses import MAD_TO_SIGMA
+from pellicle.scene.free import SHARED
 
 _ENOUGH = 2000
 """Times on which other paths are tried: of a longer trace means of neighbouring ones."""
@@ -18,6 +19,9 @@ _JUMP, _SHORT, _EQUAL = 0.15, 0.2, 8
 trace; or that many equal values, of a detector that is saturated or off."""
 _PER_BRANCH, LEAST = 4, 24
 """Windows in the time from one extremum to the next, about, and least number of them."""
+
+MIDDLE = 0.0, 0.5
+"""Gain and offset of 0 in the unit cube."""
 
 
 class Light(NamedTuple):
@@ -34,6 +38,19 @@ class Light(NamedTuple):
     def free(self) -> list[int]:
         """0 and 1, as far as the gain and the offset are free."""
         return [i for i, number in enumerate(self.known) if number is None]
+
+    @property
+    def shared(self) -> list[str]:
+        """Kinds of change of the free gains of all wavelengths, then of the free offsets."""
+        return [SHARED] * (self.values.shape[1] * len(self.free))
+
+    def gains(self, units: np.ndarray, gain: np.ndarray, scales: np.ndarray) -> np.ndarray:
+        """Gains and offsets (wavelengths, 2): the free ones by their parameters in the unit cube, in `scales`
+        (wavelengths, 2)."""
+        found = gain.copy()
+        for i, column in zip(self.free, units.reshape(len(self.free), -1), strict=True):
+            found[:, i] = scales[:, i] * (column - MIDDLE[i])
+        return found
 
     def part(self, which: np.ndarray) -> Light:
         """The light at some of the times."""

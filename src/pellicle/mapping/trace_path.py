@@ -44,11 +44,12 @@ class Candidates(NamedTuple):
 
 class TracePath(NamedTuple):
     """Chosen candidate of each window (windows,), the Δχ² of the best path through another one (windows,),
-    and the price of the path."""
+    the price of the path, and the windows (windows,) at which its rate changes abruptly."""
 
     chosen: np.ndarray
     rival: np.ndarray
     price: float
+    kinks: np.ndarray
 
 
 class Course(NamedTuple):
@@ -123,19 +124,22 @@ def _path(time: np.ndarray, candidates: Candidates, way: int, far: float) -> Tra
         np.minimum.at(backward, before[t - 1], ahead)
         least[t - 1] = np.min(forward[t - 1] + backward, axis=1)
     np.minimum.at(least[0], before[0], forward[1] + backward)
-    chosen = _traced(forward[-1], origin, before)
+    chosen, pairs = _traced(forward[-1], origin, before)
     best = float(forward[-1].min())
     with np.errstate(invalid="ignore"):
         left = np.nan_to_num(least - best, nan=np.inf, posinf=np.inf)
     left[candidates.same(chosen)] = np.inf
-    return TracePath(chosen, left.min(axis=1), best)
+    paid = [price(t)[chosen[t], pairs[t], pairs[t - 1]] for t in range(2, count)]
+    kinks = np.pad(np.array(paid) >= KINK, 1)
+    return TracePath(chosen, left.min(axis=1), best, kinks)
 
 
-def _traced(last: np.ndarray, origin: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """The best path (windows,) back from the prices (candidates, those before) at the `last` window."""
-    chosen = np.empty(len(origin), int)
-    chosen[-1], pair = divmod(int(np.argmin(last)), last.shape[1])
+def _traced(last: np.ndarray, origin: np.ndarray, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The best path (windows,) back from the prices (candidates, those before) at the `last` window, and the
+    place of each candidate's predecessor among those nearest to it (windows,)."""
+    chosen, pairs = np.zeros((2, len(origin)), int)
+    chosen[-1], pairs[-1] = divmod(int(np.argmin(last)), last.shape[1])
     for t in range(len(origin) - 1, 0, -1):
-        chosen[t - 1] = before[t - 1][chosen[t], pair]
-        pair = origin[t][chosen[t], pair]
-    return chosen
+        chosen[t - 1] = before[t - 1][chosen[t], pairs[t]]
+        pairs[t - 1] = origin[t][chosen[t], pairs[t]]
+    return chosen, pairs

@@ -26,9 +26,11 @@ from pellicle.reporting.plain_text import blocks_of, csv_text, facts, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from xarray import Dataset
 
 SCHEMA = "pellicle.series/1"
 NETCDF, CSV, FIGURE = "series.nc", "series.csv", "series.png"
+_SPELLED = {"s": "seconds", "min": "minutes", "h": "hours", "d": "days"}
 _ERRORS = (
     "The standard error (`stderr`) contains effects that all times have in common, such as the error of an"
     " index: use it for a thickness. Changes from time to time have the error of the noise alone"
@@ -58,7 +60,8 @@ def to_json(series: Series) -> dict[str, Any]:
             "schema": SCHEMA,
             "data": {"path": series.map.input},
             "summary": _sentence(series),
-            "times": {"count": len(series.times), "unit": _unit(series), "values": series.times},
+            "times": {"count": len(series.times), "unit": _unit(series), "values": series.times}
+            | ({"start": start} if (start := data[TIME].attrs.get("start")) else {}),
             "status": series.status,
             "parameters": {
                 name: {
@@ -87,15 +90,26 @@ def write_series(folder: str | os.PathLike[str], series: Series) -> Path:
     contents: dict[str, Any] = {REPORT: report(series), CSV: csv_text(_table(series)), FIGURE: figure}
     target = write_result(folder, to_json(series), contents)
     with replacing(target / NETCDF, overwrite=True) as draft:
-        series.dataset.to_netcdf(draft, engine="h5netcdf")
+        dated(series.dataset).to_netcdf(draft, engine="h5netcdf")
     write_text(target / PAGE, _page(series, image.getvalue()), overwrite=True)
     return target
+
+
+def dated(dataset: Dataset) -> Dataset:
+    """The dataset as a file contains it: times count from the date of the first, if that is known."""
+    about = dict(dataset[TIME].attrs)
+    unit, start = _SPELLED.get(str(about["units"])), about.pop("start", "")
+    if not (start and unit):
+        return dataset
+    return dataset.assign_coords(
+        {TIME: (TIME, dataset[TIME].values, about | {"units": f"{unit} since {start}"})}
+    )
 
 
 def draw(series: Series) -> Figure:
     """Draw what varies against time with its errors, the fits of the times alone, and the rates."""
     data, time = series.dataset, series.times
-    decided = is_decided(data["status"].values)
+    decided, of_spectra = is_decided(data["status"].values), SHOWN in data.coords
     cut = np.searchsorted(time, series.breaks)  # no line crosses a break
     panels = []
     for name in [str(n) for n in data.data_vars if data[n].dims and f"{n}_stderr_noise" in data]:
@@ -104,7 +118,7 @@ def draw(series: Series) -> Figure:
         lines = [
             Line(np.insert(time, cut, np.nan), np.insert(value, cut, np.nan), "all times together", "fit")
         ]
-        if name in series.map.dataset and "residual" in data:
+        if name in series.map.dataset and of_spectra:
             alone = np.where(decided, np.asarray(series.map[name], float), np.nan)
             other = np.where(decided, np.nan, value)
             lines = [Line(time, alone, "each time alone", "data", "point"), *lines]
@@ -115,7 +129,8 @@ def draw(series: Series) -> Figure:
     chi = np.asarray(data["chi2_reduced"].values, float)
     if np.any(np.abs(chi[np.isfinite(chi)] - 1) > 1e-6):  # else the noise is that of the residuals
         panels.append(Panel("reduced χ²", [Line(time, chi, "", "data", "point")], height=1.2))
-    if "residual" in data:  # of spectra
+    panels += [] if of_spectra else _light(series)
+    if of_spectra:
         panels.append(
             Panel("rms of residuals", [Line(time, np.asarray(data.residual_rms), "", "data", "point")])
         )
@@ -126,6 +141,20 @@ def draw(series: Series) -> Figure:
     if WORST in data.coords:
         sections.append(Section("wavelength (nm)", [_worst(series)]))
     return matplotlib_figure.draw(sections, f"{Path(series.map.input).name}\n{_sentence(series)}")
+
+
+def _light(series: Series) -> list[Panel]:
+    """The light of a trace with its fit, and what that leaves."""
+    data, lines, left = series.dataset, [], []
+    for i, nm in enumerate(np.asarray(data[WAVELENGTH])):
+        colour = ("data", "blue", "green", "fourth")[i % 4]
+        seen, rest = np.asarray(data.light[:, i]), np.asarray(data.residual[:, i])
+        lines += [
+            Line(series.times, seen, f"{nm:g} nm", colour, "point"),
+            Line(series.times, seen - rest, "" if i else "fit", "fit"),
+        ]
+        left.append(Line(series.times, rest, "", colour, "point"))
+    return [Panel("light", lines, height=1.8, legend="above"), Panel("data − fit", left, height=1.2)]
 
 
 def _worst(series: Series) -> list[Panel]:
@@ -202,6 +231,9 @@ def _table(series: Series) -> Table:
         elif data[name].dims == (TIME,):
             unit = str(data[name].attrs.get("units", "1")).replace("/", "_per_").removesuffix("1")
             columns[f"{name}_{unit}" if unit else name] = np.asarray(data[name].values, float)
+        elif data[name].dims == (TIME, WAVELENGTH):
+            nm = np.asarray(data[WAVELENGTH])
+            columns |= {f"{name}_{x:g}_nm": column for x, column in zip(nm, data[name].values.T, strict=True)}
     return Table(columns)  # spreadsheets take the first line for the names of columns
 
 

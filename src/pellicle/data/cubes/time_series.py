@@ -89,18 +89,22 @@ def file_times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
         ), "the names of the files"
     if time_from == BY_DATE:
         stamps = np.array([file.stat().st_mtime for file in files])
-        return _since_first(stamps), "s", "the dates of the files"
+        return *_since_first(stamps, datetime.UTC), "the dates of the files"
     if time_from == BY_HEADER:
         stamps = np.array([_date(file) for file in files])
-        return _since_first(stamps), "s", "the dates in the files"
+        return *_since_first(stamps, None), "the dates in the files"
     table = Path(time_from)
     if not table.is_file():
         raise UsageError(f"--time-from {time_from}: is no file, and not name, mtime or header")
     return *_stated([file.name for file in files], time_from, files[0]), table.name
 
 
-def _since_first(stamps: np.ndarray) -> np.ndarray:
-    return stamps - stamps.min() if stamps.size > 1 else stamps
+def _since_first(stamps: np.ndarray, zone: datetime.timezone | None) -> tuple[np.ndarray, str]:
+    """Seconds of several files since the first of them, with the unit that names its date in a `zone`."""
+    if stamps.size < 2:
+        return stamps, "s"
+    first = datetime.datetime.fromtimestamp(float(stamps.min()), zone).replace(tzinfo=None)
+    return stamps - stamps.min(), f"seconds since {first.isoformat()}"
 
 
 def numbers_of(names: Sequence[str], path: str, what: str, unit: str | None = None) -> tuple[np.ndarray, str]:

@@ -186,8 +186,9 @@ def _coordinates(
         key = roles.get(str(name)) or str(name)
         values, unit = np.asarray(coordinate.values), _units(coordinate)
         if values.dtype.kind == "M":
-            values, unit = (values - values[0]) / np.timedelta64(1, "s"), "s"
-            notes.append(f"{key!r} in seconds since {str(coordinate.values[0])[:19]}")
+            values = (values - values[0]) / np.timedelta64(1, "s")
+            unit = f"seconds since {str(coordinate.values[0])[:23]}"
+            notes.append(f"{key!r} in {unit[:33]}")
         elif values.dtype.kind == "m":
             values, unit = values / np.timedelta64(1, "s"), "s"
         coords[key] = values
