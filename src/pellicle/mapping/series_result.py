@@ -190,7 +190,7 @@ def _warnings(
         where = ", ".join(f"{x:.4g}" for x in joined.turns[:6])
         sentences.append(
             f"a film that turns abruptly at an extremum of the light, as at {where} {unit}, fits as well:"
-            ' `last`, varies = "monotonic" or a second wavelength decides'
+            ' `last`, varies = "monotonic" or another wavelength decides'
         )
     if share := np.mean(codes[used] == CODES[str(Status.MISFIT)]):
         sentences.append(f"the model does not follow the data at {100 * share:.3g} % of the times")
