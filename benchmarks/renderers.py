@@ -15,6 +15,7 @@ import numpy as np
 import pellicle as pl
 from pellicle.rendering.appearance import Appearance, appearance
 from pellicle.rendering.formula import effective, physical
+from pellicle.rendering.gltf import GLTF_GUARDED
 from pellicle.rendering.targets import target
 
 sys.path.pop(0)  # where another colour.py is
@@ -50,11 +51,12 @@ def cell(errors: list) -> str:
 def main() -> None:
     jax.config.update("jax_enable_x64", True)
     names = [target(name, package_check=False).title for name in TARGETS]
-    head = [f"{name}, {kind}" for name in names for kind in ("as it is", "solved")]
+    head = ["extension's text, as it is", *(f"{name}, {x}" for name in names for x in ("as it is", "solved"))]
     print("| film |", " | ".join(head), "|")
     print("|---|" + "---|" * len(head))
     for film, (scene, span) in films().items():
-        cells, each = [], looks(scene, span)
+        each = looks(scene, span)
+        cells = [cell([physical(GLTF_GUARDED, look).error for look in each])]
         for name in TARGETS:
             formula = target(name, package_check=False).formula
             assert formula is not None

@@ -5,12 +5,14 @@ base is a transmitting dielectric with `KHR_materials_ior` and `KHR_materials_sp
 nm; a map of them is in the green channel of a texture. Both sets of numbers are in the material's `extras`.
 
 The film colour is the approximation of Belcour and Barla that the extension publishes. Fresnel's equations
-are replaced by Schlick's at both faces, polarisation and the base's extinction are left out. three.js,
-Babylon.js and others use the same code.
+are replaced by Schlick's at both faces, polarisation and the base's extinction are left out. three.js and
+Babylon.js use the same code, but for a guard of the base's reflectance (`GLTF_GUARDED`).
 
 Source: Khronos, KHR_materials_iridescence, "Implementation Notes" (2022).
 """
 
+from dataclasses import replace
+from functools import partial
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -50,13 +52,16 @@ _PRODUCT = (1e-5, 0.9999)
 """Bounds of the product of both reflectances in the published code."""
 
 
-def film(index: Any, base: Any, thickness: Any, cosine: Any) -> Any:
-    """Reflectance (..., 3) of a film of one `index` on a base of reflectances (3,) in air, linear sRGB."""
+_GUARD = 1e-4
+"""Reflectance that the extension's own code adds to that of the base, where three.js limits it to 0.9999."""
+
+
+def film(index: Any, below: Any, thickness: Any, cosine: Any) -> Any:
+    """Reflectance (..., 3) of a film of one `index` on a base of indices `below` (3,) in air, linear sRGB."""
     # without a film its index becomes that of air
     ratio = jnp.clip(thickness / 0.03, 0.0, 1.0)
     index = 1 + (index - 1) * ratio**2 * (3 - 2 * ratio)
     inside = jnp.sqrt(1 - (1 - cosine**2) / index**2)
-    below = base_index(base)
     first = schlick(((index - 1) / (index + 1)) ** 2, cosine)[..., None]
     index = jnp.asarray(index)[..., None]
     second = schlick(((below - index) / (below + index)) ** 2, inside[..., None])
@@ -67,10 +72,14 @@ def film(index: Any, base: Any, thickness: Any, cosine: Any) -> Any:
     return jnp.maximum(total, 0.0)
 
 
-def colour(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
-    """Linear sRGB (..., 3): the film's, mixed with the base's own where `factor` is below 1."""
+def colour(numbers: Numbers, thickness: Any, cosine: Any, guard: float = 0.0) -> Any:
+    """Linear sRGB (..., 3): the film's, mixed with the base's own where `factor` is below 1.
+
+    `guard` is added to the base's reflectance where its index is computed.
+    """
     base = jnp.asarray(numbers["base"])
-    with_film = film(jnp.asarray(numbers["ior"]), base, jnp.asarray(thickness), jnp.asarray(cosine))
+    below = base_index(base + guard)
+    with_film = film(jnp.asarray(numbers["ior"]), below, jnp.asarray(thickness), jnp.asarray(cosine))
     bare = schlick(base, jnp.asarray(cosine)[..., None])
     return bare + numbers["factor"] * (with_film - bare)
 
@@ -89,6 +98,11 @@ GLTF = Formula(
     colour,
     physical,
 )
+"""The formula of three.js and Babylon.js."""
+GLTF_GUARDED = replace(
+    GLTF, name="glTF's approximation with the extension's guard", colour=partial(colour, guard=_GUARD)
+)
+"""The formula of the extension's text and of the glTF Sample Viewer: a film on air is too faint."""
 
 
 class Mesh(NamedTuple):
