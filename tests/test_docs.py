@@ -75,6 +75,7 @@ SLOW = (
     # draw more than one sphere of eight, and in full size
     *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
     *each("pellicle chart docs/surfaces/figure_{}.toml", "4 5_low 5_high"),
+    "pellicle chart docs/surfaces/shader_film.toml",
     "pellicle chart measurements/recipes/gold_on_glass_12nm.toml",
     "pellicle chart docs/cost/soap_film.toml --view",  # simulation/test_film_sphere.py: smaller ones
     "pellicle chart docs/surfaces/tempered_steel.toml --out results/steel.png",

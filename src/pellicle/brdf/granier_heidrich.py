@@ -12,6 +12,7 @@ paper. Where it is ambiguous, the reading that is consistent with the rest of it
 - Eq. 9 with t_o is Schlick's formula at the angle inside the layer, as published. It differs from 1 − F
   of light that leaves, and reciprocity fails. The reciprocal variant has F at the half vector in R and
   (1 − F(i))(1 − F(o)) in T.
+- Eq. 14, the average refracted cosine, is 0.835 at n = 1.5, where the paper prints .85; eq. 15 takes 1.
 - The lower boundary reflects everything without a phase shift; the lobes are not normalised.
 
 Energy can exceed one, so the weights are not albedos (`pellicle.brdf.lobes` computes it).
