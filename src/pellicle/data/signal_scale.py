@@ -14,8 +14,6 @@ from pellicle.signals.limits import noise_level
 
 LEAST_SHARED = 0.01
 """Fraction below which a share of the signal is taken of this: there the noise of the dark dominates."""
-_FEWEST_OF_PERCENT = 8
-"""Points of a column of percent below 1 that are doubted: a spectrum may have a few dark ones alone."""
 _LEAST_ABSORBANCE = -300.0
 """Absorbances below it would overflow; the signal is refused anyhow, as far above 1."""
 
@@ -76,14 +74,17 @@ def _contradiction(table: Table, column: Column, unit: str) -> UsageError:
 
 
 def check_percent(table: Table, rows: Rows, column: Column, asked: str | None) -> None:
-    """Raise UsageError for values of 0 to 1 in a column of percent, unless the caller states their unit."""
+    """Raise UsageError for values of 0 to 1 in a column of percent, unless the caller states their unit.
+
+    Exports of an instrument, which its reader remarks on, are in the unit that they state.
+    """
     values = rows.columns["values"]
     if column.unit != "percent":
         return
     if values.max() > 1:
         if asked is not None and signal_unit(asked) == "fraction":
             raise _contradiction(table, column, "fraction")
-    elif asked is None and len(values) >= _FEWEST_OF_PERCENT and values.min() >= 0 and values.max() > 0:
+    elif asked is None and not table.remarks and values.min() >= 0 and values.max() > 0:
         raise UsageError(
             f"{table.path}: {table.label(column.position)} is in percent by its name, and its largest value,"
             f' {values.max():g}, is like a fraction: say with `signal_unit="percent"` or'

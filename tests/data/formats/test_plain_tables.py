@@ -57,9 +57,9 @@ def test_read_without_flags(write, text, signal):
 )
 def test_percent_of_several_samples(write, header):
     delimiter = ";" if ";" in header else ","
-    text = header + "400,0.5,1.0\n500,0.6,1.1\n".replace(",", delimiter)
+    text = header + "400,50.5,11.0\n500,60.5,12.0\n".replace(",", delimiter)
     one, other = read_spectra(write(text), signal="R", spectrum="all")
-    np.testing.assert_allclose([one.values, other.values], [[0.005, 0.006], [0.01, 0.011]])
+    np.testing.assert_allclose([one.values, other.values], [[0.505, 0.605], [0.11, 0.12]])
     assert one.name != other.name
 
 
@@ -96,7 +96,7 @@ def test_angles_that_look_like_optical_constants_are_read_by_name(write):
     ("text", "columns", "wavelength", "values"),
     [
         ("Wavenumber (cm-1),spec (%)\n2000,50\n1000,60\n", "wavelength,R", [5000, 10000], [0.5, 0.6]),
-        ("Photon Energy (eV);%T\n40;0,5\n30;0,6\n", "wavelength,T", [30.996, 41.328], [0.005, 0.006]),
+        ("Photon Energy (eV);%T\n40;50,5\n30;60,5\n", "wavelength,T", [30.996, 41.328], [0.505, 0.605]),
         ("nm,Abs\n400,0.3\n500,0.5\n", "wavelength,T_fraction", [400, 500], [0.3, 0.5]),
         ("nm,Abs\n400,1\n500,2\n", "wavelength,absorbance", [400, 500], [0.1, 0.01]),
         ("XUNITS=1/CM\n2000,0.5\n1000,0.6\n", "wavelength,R", [5000, 10000], [0.5, 0.6]),
