@@ -231,7 +231,7 @@ class _Answer:
         for place, path in found.found.items():
             light = lights[place]
             made, residual = _smoothed(light, path, film, gain, like)
-            known: np.ndarray = np.isfinite(light.values).all(axis=1)
+            known = np.asarray(np.isfinite(light.values).all(axis=1))
             scale = film.grid[-1] - film.grid[0]
             columns = {
                 "thickness": film.grid[0] + scale * made.mean[:, 0],
@@ -300,7 +300,7 @@ def _smoothed(
     """The thickness of a place from all its times together, and the residuals (times, channels)."""
     low, scale = film.grid[0], film.grid[-1] - film.grid[0]
     thickness = path.thickness.copy()
-    known: np.ndarray = np.isfinite(light.values).all(axis=1)
+    known = np.asarray(np.isfinite(light.values).all(axis=1))
     breaks = np.zeros(len(thickness), bool)
     if path.black is not None and path.black > 0:
         near = thickness[max(path.black - 2, 0) : path.black + 2]
