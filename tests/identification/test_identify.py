@@ -45,6 +45,16 @@ def test_films_of_one_index_are_not_told_apart():
     assert "do not decide" in found.verdict
 
 
+def test_a_film_without_dispersion_is_never_certain():
+    """No film of the catalogue is so flat; two layers, or another substrate, often look like one."""
+    values = by_tmm.films("s", NM, (1.0, np.full(NM.size, 1.69 + 0j), index("Si")), [135.0])
+    noise = 0.002 * np.random.default_rng(1).normal(size=NM.size)
+    found = pl.identify(pl.Spectrum(NM, values + noise, "R"), "Si", among=["SiO2", "TiO2", "HfO2"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    thickness = found.best.layers[0].thickness
+    assert abs(thickness.value - 135) < 3 * thickness.stderr < 15
+
+
 def test_bare_silicon_has_no_film():
     found = pl.identify(reflectance(("SiO2", 2.0)), "Si", among=["SiO2", "Si3N4"])
     assert found.best.name in ("bare substrate", "native oxide")

@@ -44,7 +44,33 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
         return Outcome.UNDECIDED
     value, error = _thickest(best)
     lost = not value > SIGNIFICANT * error and value > BARE
-    return Outcome.UNDECIDED if lost else Outcome.IDENTIFIED
+    return Outcome.UNDECIDED if lost or _like_no_film(problem, best) else Outcome.IDENTIFIED
+
+
+def _like_no_film(problem: Problem, x: Weighed) -> bool:
+    """True where a layer has a free index like that of no film, or one without dispersion.
+
+    Of 23 samples two layers or another substrate were told as such a film three times, with residuals of
+    noise.
+    """
+    for i, layer in enumerate(x.structure.layers):
+        numbers = zip(x.structure.numbers, x.x, strict=True)
+        flat = any(
+            n.layer == i and n.name == "B" and v < n.lower + 1e-3 * (n.upper - n.lower) for n, v in numbers
+        )
+        unlike = not _alike_films(problem, index_of(problem, x, i))
+        if layer.modelled and _depths(x)[i] > BARE and (flat or unlike):
+            return True
+    return False
+
+
+def _alike_films(problem: Problem, index: np.ndarray) -> tuple[str, ...]:
+    """Names of films of the catalogue that have nearly this index at the wavelengths of all spectra."""
+    distances = {}
+    for name in problem.views[0].tables:
+        table = np.concatenate([view.tables[name][: view.points] for view in problem.views])
+        distances[name] = float(np.sqrt(np.mean(np.abs(table - index) ** 2)) / np.mean(np.abs(index)))
+    return tuple(x for x in sorted(distances, key=lambda w: distances[w]) if distances[x] < _LIKE)
 
 
 def same(problem: Problem, a: Weighed, b: Weighed) -> bool:
@@ -143,10 +169,5 @@ def _estimates(x: Weighed) -> list[tuple]:
 def _supposed(growth: Growth, x: Weighed, layer: int, numbers: tuple[Estimate, ...]) -> SupposedLayer:
     index = index_of(growth.problem, x, layer)
     n, k = ((float(part.min()), float(part.max())) for part in (index.real, index.imag))
-    distances = {}
-    for name in growth.order:
-        views = growth.problem.views
-        table = np.concatenate([view.tables[name][: view.points] for view in views])
-        distances[name] = float(np.sqrt(np.mean(np.abs(table - index) ** 2)) / np.mean(np.abs(index)))
-    near = tuple(name for name in sorted(distances, key=lambda w: distances[w]) if distances[name] < _LIKE)
+    near = _alike_films(growth.problem, index)
     return SupposedLayer(x.structure.layers[layer].name, near, n, k, numbers)
