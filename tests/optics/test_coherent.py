@@ -76,9 +76,9 @@ def test_a_thickness_is_required_for_each_layer(refuses):
     refuses(ValueError, "one for each of 2 layers", pl.reflectance, WAVELENGTH, [100.0], [1.46, 2.3], 1.5)
 
 
-@pytest.mark.parametrize(("layers", "rough", "most"), [(5, False, 1650), (2, True, 3200)])
-def test_a_stack_is_a_program_of_few_lines(layers, rough, most):
-    """1411 and 2816; 1888 and 3667 where each loop computes roots and the elements of matrices again."""
+@pytest.mark.parametrize(("layers", "rough", "most"), [(5, False, 900), (2, True, 2100)])
+def test_a_stack_is_a_program_of_few_operations(layers, rough, most):
+    """705 and 1736; 1277 and 2780 where each loop computes roots and the elements of matrices again."""
     nm = np.linspace(400.0, 900.0, 64)
     faces = [2 * np.pi / nm * 3.0] + [0.0] * layers if rough else None
     media, angle = [1.5 + 0.01j * i for i in range(layers)], 1.0 if rough else None
@@ -90,4 +90,5 @@ def test_a_stack_is_a_program_of_few_lines(layers, rough, most):
 
     with jax.enable_x64(True):
         compiled = jax.jit(reflectance).lower(np.full(layers, 50.0)).compile()
-    assert str(compiled.as_text()).count("\n") < most
+    # its text also has the frames of the caller
+    assert str(compiled.as_text()).count(" = ") < most

@@ -59,8 +59,8 @@ def film_colour(
     **Raises:** as `pellicle.reflectance`, and ValueError for an unknown method, observer or illuminant.
 
     ```python
-    >>> print(pl.film_colour(300.0, "SiO2", "Si").srgb.round(2))
-    [0.3  0.42 0.68]
+    >>> [round(float(x), 2) for x in pl.film_colour(300.0, "SiO2", "Si").srgb]
+    [0.3, 0.42, 0.68]
 
     ```
     """
