@@ -42,6 +42,12 @@ def test_a_byte_order_mark(write):
         ("a = " + "[" * 5000, "is not a recipe: its brackets are nested too deeply"),
         (SURFACE.replace("model", "modle"), "scene.surface.model is missing"),
         (SURFACE.replace("noise", "noize"), "unknown key 'data.noize' (did you mean 'noise'?)"),
+        (
+            FILM + "[scene.instrument]\nscale = 1\n",
+            "'scene.instrument': write [instrument], a table of its own",
+        ),
+        (FILM + "[instrument]\nroughness = 1\n", "'instrument.roughness': it stands under [[scene.layer]]"),
+        (FILM.replace("[scene]", "[scene]\nscale = 1"), "'scene.scale': it stands under [instrument]"),
         (SURFACE.replace("[data]", "[Data]"), "unknown key 'Data' (did you mean 'data'?)"),
     ],
 )

@@ -108,6 +108,8 @@ def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
 _SYNONYMS = {"min": "lower", "max": "upper", "low": "lower", "high": "upper", "from": "lower", "to": "upper"}
 _SYNONYMS |= {"init": "value", "initial": "value", "guess": "value", "start": "value", "d": "thickness"}
 """Keys that other programs use, and the key of a recipe."""
+_HOMES = {"data": "[data]", "instrument": "[instrument]", "layer": "[[scene.layer]]"}
+"""Tables whose keys are often put elsewhere, as they are written."""
 
 
 def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
@@ -131,6 +133,12 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
         known = list(tables.get(owner, tables[""]).model_fields)
         if (meant := _SYNONYMS.get(where[-1])) in known:
             return f"unknown key {key!r}: write {meant}; known here: {', '.join(known)}"
+        if where[-1] in tables[""].model_fields:
+            return f"unknown key {key!r}: write [{where[-1]}], a table of its own"
+        places = [(name, tables[name]) for name in _HOMES if name in tables]
+        homes = [_HOMES[name] for name, table in places if where[-1] in table.model_fields]
+        if homes:
+            return f"unknown key {key!r}: it stands under {' or '.join(homes)}"
         return f"unknown key {key!r}{did_you_mean(where[-1], known)}; known here: {', '.join(known)}"
     if chosen["type"] == "list_type" and isinstance(chosen["input"], dict):
         return f"{key} is a list of tables: write [[{key}]] with two brackets"
