@@ -44,7 +44,8 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
         return Outcome.UNDECIDED
     value, error = _thickest(best)
     lost = not value > SIGNIFICANT * error and value > BARE
-    return Outcome.UNDECIDED if lost or _like_no_film(problem, best) else Outcome.IDENTIFIED
+    unlike = all(_like_no_film(problem, x) for x in kept)
+    return Outcome.UNDECIDED if lost or unlike else Outcome.IDENTIFIED
 
 
 def _like_no_film(problem: Problem, x: Weighed) -> bool:
@@ -95,9 +96,10 @@ def _alike(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def index_of(problem: Problem, x: Weighed, layer: int) -> Any:
-    """Complex index of a layer at the wavelengths of all spectra."""
+    """Complex index of a layer at the wavelengths of all spectra, with the change that the effects make."""
     views = problem.views
-    return np.concatenate([x.structure.index(layer, x.x[None], v)[0, : v.points] for v in views])
+    index = np.concatenate([x.structure.index(layer, x.x[None], v)[0, : v.points] for v in views])
+    return index * (1 + x.index_changes[layer])
 
 
 def _depths(x: Weighed) -> np.ndarray:
@@ -169,5 +171,8 @@ def _estimates(x: Weighed) -> list[tuple]:
 def _supposed(growth: Growth, x: Weighed, layer: int, numbers: tuple[Estimate, ...]) -> SupposedLayer:
     index = index_of(growth.problem, x, layer)
     n, k = ((float(part.min()), float(part.max())) for part in (index.real, index.imag))
+    own = x.structure.layers[layer]
     near = _alike_films(growth.problem, index)
-    return SupposedLayer(x.structure.layers[layer].name, near, n, k, numbers)
+    if not own.modelled:
+        near = (own.name, *(name for name in near if name != own.name))
+    return SupposedLayer(own.name, near, n, k, numbers)

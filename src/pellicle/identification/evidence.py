@@ -17,7 +17,7 @@ from pellicle.fitting.discrepancy import improbable
 from pellicle.identification.hypothesis import TABLE_UNCERTAINTY
 from pellicle.identification.problem import Attempt, Column, Problem
 from pellicle.identification.signal_view import SLOTS, SignalView
-from pellicle.identification.structure import Structure, half_and_half
+from pellicle.identification.structure import Material, Structure, half_and_half
 from pellicle.scene.uncertainty import Uncertainty
 
 _UNIFORM = 12.0
@@ -56,7 +56,8 @@ class Weighed(NamedTuple):
     """A structure with its evidence.
 
     `x` are its numbers with the effects at their best sizes, `stderr` their errors with these, `stderr_noise`
-    by the noise alone. `remaining` is the ratio of residuals that no effect explains to the noise, `excess`
+    by the noise alone, `index_changes` the relative change of the index of each layer that the effects make.
+    `remaining` is the ratio of residuals that no effect explains to the noise, `excess`
     the named effect that must be largest, and its size in standard uncertainties.
     """
 
@@ -64,6 +65,7 @@ class Weighed(NamedTuple):
     x: np.ndarray
     stderr: np.ndarray
     stderr_noise: np.ndarray
+    index_changes: tuple[float, ...]
     ln_z: float
     remaining: float
     adequate: bool
@@ -112,16 +114,23 @@ def _weighed(problem: Problem, system: System, factor: float, sigma: np.ndarray)
     remaining = float(np.sqrt(np.mean(left**2)))
     implausible = float(np.sum(sizes**2)) > improbable(int(named.sum()))
     worst = int(np.argmax(sizes))
+    of_tables = {x.name: TABLE_UNCERTAINTY * size for x, size in zip(columns, solution[count:], strict=True)}
     return Weighed(
         attempt,
         np.clip(attempt.x + shift, structure.lower, structure.upper),
         np.hypot(error, shift / 2),
         np.minimum(by_noise, error),
+        tuple(of_tables.get(_index_effect(x), 0.0) for x in structure.layers),
         ln_z,
         remaining,
         not implausible and not (remaining > LARGE and _too_large(problem, left * sigma)),
         (columns[worst].name, float(sizes[worst])),
     )
+
+
+def _index_effect(layer: Material) -> str:
+    """Name of the effect of a layer whose index is that of a table."""
+    return f"index of {layer.name}"
 
 
 def _too_large(problem: Problem, left: np.ndarray) -> bool:
@@ -161,7 +170,7 @@ def _of_view(attempt: Attempt, view: SignalView) -> dict[str, np.ndarray]:
 
     for i, layer in zip(layers, structure.layers, strict=True):
         if not layer.modelled:
-            changed(f"index of layer {i}", TABLE_UNCERTAINTY / _PROBE, tilted(i, 1.0), depth)
+            changed(_index_effect(layer), TABLE_UNCERTAINTY / _PROBE, tilted(i, 1.0), depth)
     slope = 2 * (view.wavelength - view.wavelength[0]) / np.ptp(view.wavelength) - 1
     changed("dispersion", allowed.dispersion / _PROBE, tilted(thickest, slope), depth)
     if top > 0:
