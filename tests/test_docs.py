@@ -139,7 +139,7 @@ def commands(text: str) -> list[str]:
     prose = FENCE.sub("", text)
     lines = [*re.findall(r"^    (\S.*)$", prose, re.MULTILINE), *fenced.splitlines()]
     spans = re.findall(r"`([^`\n]+)`", re.sub(r"^    .*$", "", prose, flags=re.MULTILINE))
-    spans = [span for span in spans if not re.fullmatch(r"pellicle [a-z]+", span)]
+    spans = [span for span in spans if not re.fullmatch(r"pellicle [a-z-]+", span)]
     candidates = [re.sub(r"\s+# .*", "", line).strip() for line in [*lines, *spans]]
     found = [line for line in candidates if COMMAND.fullmatch(line) and not PLACEHOLDER.search(line)]
     return list(dict.fromkeys(found))
