@@ -59,7 +59,8 @@ class Batch:
 
     Results of several files that an earlier run left in the folder `out`, from the same data by the same
     scene, settings and version, are printed and not computed again, unless `refit` is true. `kept` counts
-    them. Of several files each result is one line (`brief`) unless `verbose`. `spec` are texts of limits.
+    them. Of several files each result is one line (`brief`) unless `verbose`, and only the first has its
+    notes: a batch of a worker process that does not have it is `later`. `spec` are texts of limits.
     """
 
     inputs: Inputs
@@ -74,6 +75,7 @@ class Batch:
     fits: list[Fit] = field(default_factory=list)
     kept: int = 0
     brief: bool = False
+    later: bool = False
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
@@ -150,7 +152,8 @@ class Batch:
         from pellicle.cli.session import in_order
 
         batches = [
-            replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[]) for files in groups
+            replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[], later=number > 0)
+            for number, files in enumerate(groups)
         ]
         with Progress(f"{len(tasks)} files") as progress:
             progress("fit", 0, len(tasks))
@@ -178,7 +181,8 @@ class Batch:
 
         paths, identity = [file.path for file in files], ""
         try:
-            data, scene = measurement(files, self.inputs.joint, notes=not (self.brief and self.records))
+            notes = not (self.brief and (self.later or self.records))
+            data, scene = measurement(files, self.inputs.joint, notes)
             if folder is not None:
                 settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
