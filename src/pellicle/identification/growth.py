@@ -69,7 +69,7 @@ def needed(x: Weighed) -> bool:
 
 @dataclass
 class Growth:
-    """What was tried of one problem, and its weights so far, the best first."""
+    """Attempts at one problem, and their weights so far, the best first."""
 
     problem: Problem
     deadline: float = np.inf

@@ -164,7 +164,7 @@ class DecidingSignal:
 
 @dataclass(frozen=True, repr=False)
 class Identification(ReportMixin):
-    """What spectra of one sample say about its layers.
+    """Result of an identification: hypotheses of the layers of one sample.
 
     `hypotheses` are those that the data leave, the best first, and `excluded` the others that were tried,
     the nearest first. `data` are the spectra as they were compared, `noise` their noise: standard deviations

@@ -41,7 +41,7 @@ REFERENCES = ("substrate", "Al")
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of an identification: substrate, light, materials, seconds and what may be varied."""
+    """Options of an identification: substrate, light, materials, seconds, and mistakes to look for."""
 
     substrate: Substrate
     ambient: Any

@@ -25,7 +25,7 @@ from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME
 from pellicle.mapping.movie_light import BLACK, FilmLight, film_light, is_gone, noise_of, parts_of
 from pellicle.mapping.movie_paths import FAR, TURN, Paths, PlacePath, levels, paths_of
-from pellicle.mapping.series_result import SURE
+from pellicle.mapping.series_result import SURE, decided_share, status_counts
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.thinning_law import Law, thinning_laws
 from pellicle.mapping.trace import lost
@@ -81,15 +81,12 @@ class MovieResult:
     @property
     def status(self) -> dict[str, int]:
         """Number of thicknesses of each status that occurs."""
-        counts = np.bincount(self.dataset["status"].values.ravel(), minlength=len(STATUSES))
-        return {word: int(counts[code]) for word, code in CODES.items() if counts[code]}
+        return status_counts(self.dataset["status"].values)
 
     @property
     def decided(self) -> float:
         """Share of the places and times with data whose order is decided."""
-        status = self.status
-        known = sum(status.values()) - status.get(NO_DATA, 0)
-        return (status.get(str(Status.CONVERGED), 0) + status.get(BY_NEIGHBOURS, 0)) / max(known, 1)
+        return decided_share(self.status)
 
     def where(self, place: int) -> str:
         """Words for a place, in pixels."""

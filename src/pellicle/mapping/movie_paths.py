@@ -144,7 +144,7 @@ def _begun(
 
 
 def _ends(light: Light, centre: np.ndarray, film: FilmLight, black: int | None) -> list[tuple[int, Normal]]:
-    """What is known of the windows at the times `centre` (windows,) of a place, by their positions from the
+    """Knowledge of the windows at the times `centre` (windows,) of a place, by their positions from the
     end: it ends as a black film, and was thin before that."""
     if black is None:
         return []

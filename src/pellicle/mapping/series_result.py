@@ -29,6 +29,18 @@ ERRORS = "", "_stderr", "_stderr_noise"
 """Ends of the names of a value and its errors."""
 
 
+def status_counts(codes: np.ndarray) -> dict[str, int]:
+    """Count the codes (...,) of each status that occurs."""
+    counts = np.bincount(codes.ravel(), minlength=len(STATUSES))
+    return {word: int(counts[code]) for word, code in CODES.items() if counts[code]}
+
+
+def decided_share(status: Mapping[str, int]) -> float:
+    """Share of the counts with data that have one answer, of their own or by continuity."""
+    known = sum(status.values()) - status.get(NO_DATA, 0)
+    return (status.get(str(Status.CONVERGED), 0) + status.get(BY_NEIGHBOURS, 0)) / max(known, 1)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Series:
     """Thickness and rate of a film against time.
@@ -55,15 +67,12 @@ class Series:
     @property
     def status(self) -> dict[str, int]:
         """Number of times of each status that occurs."""
-        counts = np.bincount(self.dataset["status"].values, minlength=len(STATUSES))
-        return {word: int(counts[code]) for word, code in CODES.items() if counts[code]}
+        return status_counts(self.dataset["status"].values)
 
     @property
     def decided(self) -> float:
         """Share of the times with data that have one answer, of their own or by continuity."""
-        status = self.status
-        known = sum(status.values()) - status.get(NO_DATA, 0)
-        return (status.get(str(Status.CONVERGED), 0) + status.get(BY_NEIGHBOURS, 0)) / max(known, 1)
+        return decided_share(self.status)
 
     def __getitem__(self, name: str) -> Any:
         return self.dataset[variable_name(name)]

@@ -53,8 +53,8 @@ class TracePath(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What a film does: `turn` is the price, as Δχ², of a film that both grows and thins, infinite for one
-    that does not; a step longer than `far` (nm) is a jump, whose length has a price, too."""
+    """Expected course of a film: `turn` is the price, as Δχ², of one that both grows and thins, infinite
+    where none does; a step longer than `far` (nm) is a jump, whose length has a price, too."""
 
     turn: float = 0.0
     far: float = np.inf

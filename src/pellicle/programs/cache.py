@@ -125,7 +125,7 @@ LIMIT = 256 * 2**20
 """Size of the folder (bytes) above which its oldest files are removed. A program takes 0.05 to 1 MB."""
 
 Calls: TypeAlias = Literal["few", "some", "many"]
-"""How often one fit calls a program: once or twice, in a loop or for many candidates, for every pixel."""
+"""Calls of a program in one fit: once or twice, in a loop or for many candidates, for every pixel."""
 
 _SOME: Options = {"xla_cpu_use_fusion_emitters": False, "xla_cpu_parallel_codegen_split_count": "1"}
 _FEW: Options = {"xla_backend_optimization_level": "0", "xla_llvm_disable_expensive_passes": True}
