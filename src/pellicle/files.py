@@ -65,19 +65,19 @@ def replacing(path: str | os.PathLike[str], *, overwrite: bool = False) -> Itera
         temporary.unlink(missing_ok=True)
 
 
-def check_new(target: Path, *, overwrite: bool = False) -> None:
+def check_new(target: Path, *, overwrite: bool = False, name: str = "path") -> None:
     """Raise UsageError where a file is a folder, exists without `overwrite`, or has no folder to be in.
 
-    For writers that take long before they write.
+    For writers that take long before they write. `name` is the argument that has the path.
     """
     if target.is_dir():
-        raise UsageError(f"{target}: is a folder, not a file; choose another `path`")
+        raise UsageError(f"{target}: is a folder, not a file; choose another `{name}`")
     if target.exists() and not overwrite:
-        raise UsageError(f"{target}: exists and is not overwritten; choose another `path` or remove it")
+        raise UsageError(f"{target}: exists and is not overwritten; choose another `{name}` or remove it")
     if not target.parent.is_dir():
         raise UsageError(
             f"{target}: cannot be written (there is no folder {target.parent}); make it, or choose another"
-            " `path`"
+            f" `{name}`"
         )
 
 

@@ -52,6 +52,17 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     assert {"pellicle", "jax"} <= set(found["versions"])
 
 
+def test_a_figure_for_a_paper(pellicle, spectrum_file, scene, tmp_path):
+    file, figure = spectrum_file(), tmp_path / "oxide.pdf"
+    ran = pellicle("fit", file, *scene, "--figure", figure, code=0)
+    assert figure.read_bytes().startswith(b"%PDF")
+    assert f"{figure}: written" in ran.err
+    again = pellicle("fit", file, *scene, "--figure", figure, code=2)
+    assert "choose another --figure" in again.err
+    of_two = pellicle("fit", file, spectrum_file("two.csv"), *scene, "--figure", tmp_path / "b.pdf", code=2)
+    assert "--figure is of one fit" in of_two.err
+
+
 def test_several_files_in_order_and_one_that_cannot_be_read(pellicle, spectrum_file, scene, tmp_path):
     """A folder for each fit, and a summary of all."""
     bad, out = tmp_path / "bad.csv", tmp_path / "all"

@@ -11,6 +11,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.data.read_spectrum import read_spectrum
+from pellicle.errors import UsageError
 from pellicle.fitting.curves import Index
 from pellicle.fitting.reported_layer import principal_indices
 from pellicle.fitting.result import Profile
@@ -41,6 +42,16 @@ def test_a_png_of_a_readable_size_and_nothing_else(fit, tmp_path):
     assert 900 <= height <= 1800
     assert 20_000 < (tmp_path / "figure.png").stat().st_size < 1_000_000
     assert os.listdir(tmp_path) == ["figure.png"]
+
+
+def test_a_figure_for_a_journal_has_its_width_no_title_and_no_scan(fit):
+    drawn = draw(fit, 86)
+    assert labels(drawn) == ["reflectance", "data − fit", "n"]
+    assert drawn.get_suptitle() == ""
+    assert drawn.get_figwidth() == pytest.approx(86 / 25.4)
+    assert drawn.axes[0].yaxis.label.get_size() == 7
+    with pytest.raises(UsageError, match="width_mm"):
+        draw(fit, 3.4)  # of inches
 
 
 def test_panels_and_what_they_show(fit):

@@ -25,7 +25,7 @@ from pellicle.accuracy.case import Case, Program, Variant, compiled
 from pellicle.fitting.film.problem import Measured, make
 from pellicle.fitting.problem import Form, Problem
 from pellicle.fitting.progress import Progress
-from pellicle.fitting.result import PlotMixin
+from pellicle.fitting.report_methods import PlotMixin
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import free_leaves
 

@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from pellicle.scene.film import Scene
     from pellicle.scene.surface import Surface
 
+JOURNAL_MM = 86.0
+"""Width of a column of most journals of physics."""
+
 
 @dataclass
 class Batch:
@@ -61,6 +64,7 @@ class Batch:
     scene, settings and version, are printed and not computed again, unless `refit` is true. `kept` counts
     them. Of several files each result is one line (`brief`) unless `verbose`, and only the first has its
     notes: a batch of a worker process that does not have it is `later`. `spec` are texts of limits.
+    `figure` is the path of a figure of one fit.
     """
 
     inputs: Inputs
@@ -70,6 +74,7 @@ class Batch:
     jobs: int = 1
     refit: bool = False
     spec: list[str] | None = None
+    figure: str | None = None
     verbose: bool = field(default_factory=lambda: LOG.isEnabledFor(INFO))
     records: list[dict[str, Any]] = field(default_factory=list)
     fits: list[Fit] = field(default_factory=list)
@@ -84,6 +89,12 @@ class Batch:
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
         groups = self.inputs.groups
+        if self.figure is not None:
+            from pellicle.reporting.matplotlib_figure import figure_path
+
+            if len(groups) > 1:
+                raise UsageError("--figure is of one fit: give one file or --joint, or --out for all figures")
+            figure_path(self.figure, "figure")
         self.brief = len(groups) > 1 and not self.verbose and not self.inputs.repeats
         folders: list[Path | None] = [None] * len(groups)
         if self.out is not None:
@@ -205,6 +216,8 @@ class Batch:
         code = self._printed(record, report(fit, posterior))
         if posterior is not None and not posterior.trusted:
             code = max(code, TOO_SHORT)
+        if self.figure is not None:
+            code = max(code, written(partial(_write_figure, self.figure, fit), f"{self.figure}: written"))
         if folder is None:
             return code
         recipe, spec = partial(self.inputs.recipe, files), record.get("spec")
@@ -247,6 +260,13 @@ class Batch:
         posterior = sample(data, scene, chain=chain, progress=progress, **options)
         posterior = replace(posterior, fit=with_flags(posterior.fit))
         return posterior.fit, posterior
+
+
+def _write_figure(path: str, fit: Fit) -> None:
+    from pellicle.reporting.figures import draw_fit
+    from pellicle.reporting.matplotlib_figure import save_figure
+
+    save_figure(draw_fit(fit, JOURNAL_MM), path, dpi=300)
 
 
 def _captured(task: tuple[Batch, Path | None]) -> tuple[int, Batch, str, str]:

@@ -255,6 +255,8 @@ class BatchFlags(Flags):
     """Fit all files, also those whose results an earlier run left in --out."""
     spec: Annotated[list[str] | None, switch(OUTPUT, metavar="NAME=LO:HI")] = None
     """Limits of a parameter: pass, fail or undecided by its 95 % error; several may be given."""
+    figure: Annotated[str | None, flag(OUTPUT, metavar="NAME.pdf")] = None
+    """Figure for a paper, 86 mm wide: data, fit, residuals, n and k (.pdf, .svg or .png)."""
 
     def checked(self) -> BatchFlags:
         """These flags. Raises UsageError for an impossible number of processes."""

@@ -27,7 +27,8 @@ from pellicle.fitting.curves import BIREFRINGENCE
 from pellicle.fitting.linear_system import Effect, Evidence
 from pellicle.fitting.marginal import Ranking, by_remaining, left_weights, marginal
 from pellicle.fitting.noise import student
-from pellicle.fitting.result import Estimate, Fit, Part, ReportMixin, Status
+from pellicle.fitting.report_methods import ReportMixin
+from pellicle.fitting.result import Estimate, Fit, Part, Status
 from pellicle.forward_model.plan import GENERAL
 from pellicle.scene.film import Scene
 

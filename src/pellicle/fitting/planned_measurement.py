@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pellicle.fitting.comparison import STRONG
-from pellicle.fitting.result import ReportMixin
+from pellicle.fitting.report_methods import ReportMixin
 
 R, T, PSI_DELTA = "R", "T", "psi-delta"
 _SHOWN = 2

@@ -12,7 +12,8 @@ from logging import getLogger
 import numpy as np
 
 from pellicle.errors import UsageError
-from pellicle.fitting.result import Estimate, Fit, ReportMixin, Status
+from pellicle.fitting.report_methods import ReportMixin
+from pellicle.fitting.result import Estimate, Fit, Status
 from pellicle.fitting.status import describe
 
 log = getLogger(__name__)

@@ -1,20 +1,12 @@
-"""Results of a fit: small frozen records with plain numbers, and methods that show results.
-
-Reports are made in `pellicle.reporting`, a folder above this one. The methods `report`, `plot` and `save`,
-and HTML for notebooks, import it by name when they are called, as pandas imports its plotting backends; it is
-the only import against the order of the folders.
-"""
+"""Results of a fit: small frozen records with plain numbers."""
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,43 +15,12 @@ from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.curves import NORMAL, BrdfCurve, ColourCurve, Curve, Index, at_each_wavelength
 from pellicle.fitting.noise import student
+from pellicle.fitting.report_methods import FitMixin
 from pellicle.fitting.reported_layer import reported_layer, reported_medium
 from pellicle.forward_model.plan import Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.names import layer_name
 from pellicle.scene.surface import Surface
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_PRESENT = "pellicle.reporting.present"
-
-
-class ReportMixin:
-    """Text, files and HTML of a result."""
-
-    def report(self) -> str:
-        """Return the full report as plain text, as `pellicle.report` does."""
-        return import_module(_PRESENT).report(self)
-
-    def save(self, folder: str | os.PathLike[str]) -> Path:
-        """Write report, JSON record, tables and figures into `folder`, which is made if it is absent.
-
-        Raises UsageError where the folder holds files that pellicle did not write, or cannot be written.
-        """
-        return import_module(_PRESENT).save(self, folder)
-
-    def _repr_html_(self) -> str:
-        return import_module(_PRESENT).html(self)
-
-
-class PlotMixin(ReportMixin):
-    """Text, files, HTML and figure of a result."""
-
-    def plot(self) -> Figure:
-        """Return a Matplotlib figure, which a notebook shows and `figure.savefig(path)` writes."""
-        return import_module(_PRESENT).plot(self)
-
 
 LEVEL = 0.95
 """Level of confidence of expanded uncertainties."""
@@ -251,7 +212,7 @@ class LayerTest:
 
 
 @dataclass(frozen=True, repr=False)
-class Fit(PlotMixin):
+class Fit(FitMixin):
     """The outcome of fitting spectra or BRDF samples of one sample: `parts`, one for each.
 
     `rms` is None where the spectra have no unit in common. `scene` is what was fitted, one for each spectrum

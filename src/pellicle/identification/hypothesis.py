@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.result import Estimate, ReportMixin
+from pellicle.fitting.report_methods import ReportMixin
+from pellicle.fitting.result import Estimate
 from pellicle.recipes.dispersion_models import MODELS, build_model
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import atexit
 import os
-import shutil
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +12,7 @@ import numpy as np
 from pellicle.errors import DataError
 from pellicle.files import replacing
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.fitting.result import PlotMixin
+from pellicle.fitting.report_methods import PlotMixin
 from pellicle.mapping.store import DONE, IDENTITY, STATUS, variable_name, write_dataset, zarr_package
 
 if TYPE_CHECKING:
@@ -179,11 +177,3 @@ class Map(PlotMixin):
         # in this thread: HDF5 writes one block at a time, and blocks that wait take memory
         with replacing(path, overwrite=overwrite) as draft, config.set(scheduler="synchronous"):
             data.to_netcdf(draft, engine="h5netcdf")
-
-    def remove_at_exit(self, folder: str) -> Map:
-        """Remove a temporary `folder` when Python ends, and return the map.
-
-        Not earlier: arrays of `dataset` read it when they are computed, and outlive this object.
-        """
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        return self

@@ -1,10 +1,12 @@
 """Maps of cubes: preparation, and fits of all blocks of pixels, here or in several worker processes."""
 
+import atexit
 import hashlib
 import json
 import logging
 import math
 import os
+import shutil
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -85,10 +87,12 @@ def map_cube(
         "model": model,
         "fit": fit,
     }
-    made = run_map(cube, scene, out, **options)
-    if neighbours:
-        made = made.by_neighbours()
-    return made if folder is None else made.remove_at_exit(folder)
+    try:
+        made = run_map(cube, scene, out, **options)
+        return made.by_neighbours() if neighbours else made
+    finally:
+        if folder is not None:  # not now: arrays of `Map.dataset` read it, and outlive the map
+            atexit.register(shutil.rmtree, folder, ignore_errors=True)
 
 
 def run_map(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
+from pellicle.errors import UsageError
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
 from pellicle.fitting.depth_profiles import FittedProfile, fitted_profiles
 from pellicle.fitting.result import Fit, Part, Profile, Rival
@@ -27,9 +28,32 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_fit(fit: Fit) -> Figure:
-    """Draw data, fit and residuals of each part, misfit against thickness, n and k, and graded layers."""
-    return draw(sections(fit), title(fit))
+COLUMN_HEIGHT = 0.6
+"""Height of a panel of a journal's figure, as a share of that of a report."""
+LETTERS = 7.0
+"""Size of the letters of a journal's figure in points."""
+
+
+def draw_fit(fit: Fit, width_mm: float | None = None) -> Figure:
+    """Draw data, fit and residuals of each part, misfit against thickness, n and k, and graded layers.
+
+    With a `width_mm`, such as 86 of a journal's column, without title and misfit, in letters of 7 points.
+    Raises UsageError for a width in which no panel has room.
+    """
+    if width_mm is None:
+        return draw(sections(fit), title(fit))
+    if not 40 <= width_mm <= 400:
+        raise UsageError(f"`width_mm` must lie in 40 to 400 mm, got {width_mm:g}")
+    from matplotlib import rc_context
+
+    searched = misfit(fit) if fit.layer_test is None else None
+    lower = [
+        replace(s, rows=[[replace(p, height=p.height * COLUMN_HEIGHT) for p in row] for row in s.rows])
+        for s in sections(fit)
+        if searched is None or s.abscissa != searched.abscissa
+    ]
+    with rc_context({"font.size": LETTERS, "lines.linewidth": 1.0, "axes.linewidth": 0.6}):
+        return draw(lower, "", width_mm / 25.4)
 
 
 def draw_spectrum(spectrum: Spectrum) -> Figure:

@@ -1,9 +1,11 @@
-"""Tables of a fit: data, model and residuals; n and k; profiles of graded layers."""
+"""Tables of a fit: data, model and residuals; n and k; profiles of graded layers; for pandas and xarray."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
 from pellicle.data.tabular.columns import DIRECTIONS
+from pellicle.errors import needs
 from pellicle.fitting.curves import BIREFRINGENCE
 from pellicle.fitting.depth_profiles import FittedProfile
 from pellicle.fitting.result import Fit, Part
@@ -18,6 +21,10 @@ from pellicle.reporting.drawable import Table
 from pellicle.reporting.plain_text import csv_text, written_by
 from pellicle.reporting.quantities import colours_in_words, colours_of, quantities
 from pellicle.signals.one_column import OneColumn
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 _JOINT = ("file", "signal", "wavelength_nm", "angle_deg", "data", "model", "residual", "sigma", "azimuth_deg")
 
@@ -84,6 +91,48 @@ def profile_csv(fit: Fit, profiles: Sequence[FittedProfile]) -> str:
     for name in ("fraction", "fraction_stderr", "n", "n_stderr", "k", "k_stderr"):
         columns[name] = np.concatenate([getattr(p, name) for p in profiles])
     return _text(fit, about, columns)
+
+
+_PARAMETER = ("value", "stderr", "stderr_noise", "expanded", "lower", "upper", "free", "at_bound", "unit")
+"""Columns of a table of parameters: attributes of `Estimate`."""
+
+
+def dataframe(fit: Fit) -> DataFrame:
+    """The parameters of a fit, one a row. Raises UsageError without pandas."""
+    with needs("maps", "tables of parameters need"):
+        import pandas as pd
+    rows = {p.name: [getattr(p, name) for name in _PARAMETER] for p in fit.parameters.values()}
+    frame = pd.DataFrame.from_dict(rows, orient="index", columns=_PARAMETER)
+    return frame.rename_axis("parameter")
+
+
+def dataset(fit: Fit) -> Dataset:
+    """Data, model, residual and σ of each quantity, n and k, and the parameters of a fit of one spectrum.
+
+    The dimension is `wavelength` (nm), or `point` where a wavelength occurs at several angles or azimuths.
+    Raises UsageError without xarray, ValueError and TypeError as `Fit.curve` does.
+    """
+    data, curve = fit.spectrum, fit.curve
+    with needs("maps", "datasets of fits need"):
+        import xarray as xr
+    nm = curve.wavelength
+    along = "wavelength" if np.unique(nm).size == nm.size else "point"
+    degrees = {"units": "degree"} if data.kind.degrees else {}
+    variables: dict[str, Any] = {}
+    for q in quantities(data, curve):
+        columns = {"": q.data, "_model": q.model, "_residual": q.residual, "_sigma": q.sigma}
+        variables |= {f"{q.name}{end}": (along, x, degrees) for end, x in columns.items() if x is not None}
+    variables |= {name: (along, getattr(curve, name)) for name in ("n", "k", "n_stderr", "k_stderr")}
+    coordinates: dict[str, Any] = {"wavelength": (along, nm, {"units": "nm"})}
+    for name, values in (("angle", data.angle), ("azimuth", data.azimuth)):
+        if values is not None:
+            coordinates[name] = along, values, {"units": "degree"}
+    every = fit.parameters.values()
+    coordinates |= {"parameter": [p.name for p in every], "unit": ("parameter", [p.unit for p in every])}
+    variables |= {name: ("parameter", [getattr(p, name) for p in every]) for name in _PARAMETER[:-1]}
+    about = {"status": str(fit.status), "verdict": fit.verdict, "chi2_reduced": fit.chi2_reduced}
+    about |= {"source": data.path, "sha256": data.sha256 or "", "history": written_by()}
+    return xr.Dataset(variables, coordinates, about)
 
 
 def _one_column(fit: Fit, part: Part) -> str:

@@ -80,15 +80,15 @@ def save_figure(
     return target
 
 
-def figure_path(path: str | os.PathLike[str]) -> Path:
-    """The path of a figure that is to be written.
+def figure_path(path: str | os.PathLike[str], name: str = "path") -> Path:
+    """The path of a figure that is to be written, which is the argument `name`.
 
     **Raises:** UsageError for another file type, and where no new file can be written there.
     """
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
-        raise UsageError(f"`path` {target}: expected a name ending in {', '.join(FORMATS)}")
-    check_new(target)
+        raise UsageError(f"`{name}` {target}: expected a name ending in {', '.join(FORMATS)}")
+    check_new(target, name=name)
     return target
 
 

@@ -16,7 +16,8 @@ from pellicle.fitting.evaluation import curves
 from pellicle.fitting.film.colour_view import ColoursView
 from pellicle.fitting.film.view import SpectrumView
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.result import Fit, Part, PlotMixin, Status
+from pellicle.fitting.report_methods import PlotMixin
+from pellicle.fitting.result import Fit, Part, Status
 from pellicle.sampling.chain import Checks
 from pellicle.sampling.density import Modes
 
