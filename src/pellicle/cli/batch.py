@@ -221,7 +221,10 @@ class Batch:
         if folder is None:
             return code
         recipe, spec = partial(self.inputs.recipe, files), record.get("spec")
-        write = partial(write_fit, folder, fit, posterior, identity, self.inputs.described, recipe, spec)
+        described = dict(self.inputs.described or {})
+        if self.sampler is not None:
+            described["sampler"] = {name: x for name, x in vars(self.sampler).items() if x is not None}
+        write = partial(write_fit, folder, fit, posterior, identity, described, recipe, spec)
         failed = "; the result is printed, and the same command writes its files"
         return max(code, written(write, f"{folder}: report, figures and tables written", failed))
 

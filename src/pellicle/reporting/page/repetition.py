@@ -22,16 +22,21 @@ def repetition(
 ) -> list[tuple[str, str]]:
     """Descriptions and texts of the command and the recipe of a fit; only the recipe for a fit in Python.
 
-    `described` is what the scene was built from: a recipe's path, or flags. `recipe_in` gives the text of a
-    recipe in a folder that repeats a fit by flags.
+    `described` is what the scene was built from, a recipe's path or flags, with the flags of a sampler.
+    `recipe_in` gives the text of a recipe in a folder that repeats a fit by flags.
     """
     if described is None:
         return _written(fit)
     files = list(dict.fromkeys(part.data.path for part in fit.parts if part.data.path))
-    words = ["pellicle", "fit", *files]
+    sampler = described.get("sampler")
+    words = ["pellicle", "fit" if sampler is None else "sample", *files]
     recipe = described.get("recipe")
     words += [] if recipe is None else ["--recipe", str(recipe)]
-    for name, value in {**described.get("flags", {}), **described.get("reading", {})}.items():
+    for name, value in {
+        **described.get("flags", {}),
+        **described.get("reading", {}),
+        **(sampler or {}),
+    }.items():
         flag = f"--{name.replace('_', '-')}"
         words += [flag] if value is True else [flag, _word(value)]
     joint = ["--joint"] if len(files) > 1 and recipe is None else []

@@ -1,0 +1,160 @@
+"""Command and recipe that repeat a fit: the same data and the same scene, whichever option was given."""
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pellicle.cli import app
+from pellicle.cli.flags import SamplerFlags, SceneFlags
+from pellicle.cli.inputs import Inputs, inputs
+from pellicle.data.fingerprint import fingerprint
+from pellicle.data.options import FileOptions, FitOptions
+from pellicle.fitting.result import Fit, Part
+from pellicle.reporting.page.repetition import repetition
+
+FILM = "film.csv --layer SiO2 --substrate Si --thickness 10:800"
+PLATE = "film.csv --layer TiO2 --substrate BK7 --thickness 10:800"
+COLOUR = "colours.csv --layer SiO2 --substrate Si --thickness 10:800"
+CAMERA = COLOUR.replace("colours", "raw") + " --signal rgb"
+PHOTOGRAPH = "film.png --layer SiO2 --substrate Si --thickness 10:800 --signal srgb --region 0,0,4,4"
+ANGLES = "ellipsometry.csv --layer SiO2 --substrate Si --thickness 10:800 --angle 70"
+OPTIONS = {
+    "observer": (COLOUR, "1964"),
+    "illuminant": (COLOUR, "A"),
+    "lamp": (COLOUR, "lamp.csv"),
+    "sensitivities": (CAMERA, "camera.csv"),
+    "chart": (CAMERA, "chart.csv"),
+    "gamma": (f"{CAMERA} --sensitivities camera.csv", "2.2"),
+    "white_balance": (f"{CAMERA} --sensitivities camera.csv", "free"),
+    "white": (PHOTOGRAPH, "4,4,3,3"),
+    "flat_field": (PHOTOGRAPH, "white.png"),
+    "transmitted": (COLOUR, None),
+    "spectrum": ("several.csv --layer SiO2 --substrate Si --thickness 10:800 --signal R", "second"),
+    "signal": (PLATE.replace("film", "unnamed"), "T"),
+    "polarisation": (f"{FILM} --angle 60", "s"),
+    "range": (FILM, "500:700"),
+    "columns": ("several.csv --layer SiO2 --substrate Si --thickness 10:800", "wavelength,_,R"),
+    "wavelength_unit": (
+        "frequencies.csv --layer SiO2 --substrate Si --thickness 10:800 --columns wavelength,R",
+        "THz",
+    ),
+    "signal_unit": (FILM, "percent"),
+    "folded": (ANGLES, None),
+    "transmission": (ANGLES.replace("Si ", "BK7 "), None),
+    "analyser": ("fourier.csv --layer SiO2 --substrate Si --thickness 10:800 --angle 70", "30"),
+    "elements": ("mueller.csv --layer SiO2 --substrate Si --thickness 10:800 --angle 70", "m12,m33"),
+    "noise": (FILM, "0.4"),
+    "region": (PHOTOGRAPH.rpartition(" --region")[0], "1,1,3,3"),
+    "points": (PHOTOGRAPH.rpartition(" --region")[0], "5,5"),
+    "angle": (FILM, "70"),
+    "reference": ("counts.csv --layer SiO2 --substrate Si --thickness 10:800", "reference.csv"),
+    "reference_material": ("counts.csv --layer SiO2 --substrate Si --reference reference.csv", "BK7"),
+    "dark": ("counts.csv --layer SiO2 --substrate Si --reference reference.csv", "dark.csv"),
+    "loss": (FILM, "huber"),
+    "tolerance": (FILM, "0.01"),
+    "layer": (FILM.replace("--layer SiO2", ""), "cauchy(1.5,4000)"),
+    "substrate": (FILM.replace("--substrate Si", ""), "3.9+0.02j"),
+    "ambient": (FILM, "1.33"),
+    "thickness": (FILM.replace("--thickness 10:800", ""), "20:400"),
+    "free": (FILM, "n=-0.1:0.1"),
+    "back": (PLATE, "1.33"),
+    "plate_mm": (f"{PLATE} --back air", "0.5"),
+    "back_collected": (f"{PLATE} --back air", "0.1:0.9"),
+    "back_reflections": (f"{PLATE} --back air", "2"),
+    "scale": (FILM, "free"),
+    "offset": (FILM, "slow"),
+    "bandwidth": (FILM, "1:8"),
+    "uncertainty": (FILM, "none"),
+}
+"""A command for each option, and the value of the option that changes it; None for one without a value."""
+ELSEWHERE = {"spot": "data/formats/test_accurion.py"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Path:
+    """A folder with a file of each kind, in which commands run."""
+    nm = np.linspace(450.0, 750.0, 31)
+    rise = np.arange(nm.size)
+
+    def table(name: str, head: str, *columns: np.ndarray) -> None:
+        rows = (",".join(f"{x:.6g}" for x in row) for row in zip(*columns, strict=True))
+        (tmp_path / name).write_text("\n".join([head, *rows, ""]))
+
+    table("film.csv", "wavelength_nm,reflectance", nm, 0.5 + 0.01 * rise)
+    table("frequencies.csv", "x,R", 299792.458 / nm, 0.2 + 0.001 * rise)
+    table("unnamed.csv", "wavelength_nm,light", nm, 0.2 + 0.001 * rise)
+    table("several.csv", "wavelength_nm,first,second", nm, 0.2 + 0.001 * rise, 0.4 - 0.001 * rise)
+    table("ellipsometry.csv", "wavelength_nm,psi,delta", nm, 30 + 0.1 * rise, 100.0 + rise)
+    table("fourier.csv", "wavelength_nm,alpha,beta", nm, -0.1 - 0.001 * rise, 0.2 + 0.001 * rise)
+    elements = [0.1 * np.sin(rise + j) for j in range(4)]
+    table("mueller.csv", "wavelength_nm,m12,m33,m34,m21", nm, *elements)
+    table("counts.csv", "wavelength_nm,counts", nm, 9000 + 10.0 * rise)
+    table("reference.csv", "wavelength_nm,counts", nm, 20000.0 + rise)
+    table("dark.csv", "wavelength_nm,counts", nm, 100.0 + 0 * rise)
+    table("colours.csv", "R,G,B", *np.array([[120.0, 90, 60], [110, 95, 80]]).T)
+    table("raw.csv", "R,G,B", *np.array([[0.2, 0.1, 0.05], [0.21, 0.12, 0.08]]).T)
+    wide = np.linspace(380.0, 780.0, 41)
+    bells = [np.exp(-(((wide - centre) / 30) ** 2)) for centre in (600, 540, 470)]
+    table("lamp.csv", "wavelength_nm,power", wide, wide)
+    table("camera.csv", "wavelength_nm,R,G,B", wide, *bells)
+    patches = np.random.default_rng(0).uniform(0.05, 0.9, (12, 3))
+    matrix = np.array([[0.4, 0.2, 0.1], [0.3, 0.7, 0.1], [0.2, 0.1, 0.9]])
+    table("chart.csv", "R,G,B,X,Y,Z", *patches.T, *(patches @ matrix).T)
+    image = pytest.importorskip("PIL.Image")
+    values = np.random.default_rng(1).integers(60, 200, (8, 8, 3), dtype=np.uint8)
+    image.fromarray(values).save(tmp_path / "film.png")
+    image.fromarray(np.maximum(values, 200)).save(tmp_path / "white.png")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def parsed(command: str) -> Inputs:
+    """Data and scenes of a command, as `pellicle fit` takes them."""
+    _, bound, _ = app.parse_args(shlex.split(command), print_error=False, exit_on_error=False)
+    given: dict[str, Any] = {"recipe": None, **bound.arguments}
+    flags = [given.get(name) for name in ("scene", "reading", "fitting")]
+    return inputs(list(given.get("data", ())), given["recipe"], *flags, given.get("joint", False))
+
+
+def told(made: Inputs) -> str:
+    """Hash of data, scenes and settings of the fits of a command."""
+    read = [(one.read(), one.scene) for one in made.files]
+    return fingerprint([data for data, _ in read], [scene for _, scene in read], made.loss, made.tolerance)
+
+
+def test_every_option_has_a_case():
+    declared = {*FileOptions.declared(), *FitOptions.declared(), *SceneFlags.__dataclass_fields__}
+    assert declared == {*OPTIONS, *ELSEWHERE}
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_command_and_recipe_keep_an_option(option, folder):
+    command, value = OPTIONS[option]
+    flag = f"--{option.replace('_', '-')}"
+    made = parsed(f"fit {command} {flag}" + (f" {shlex.quote(value)}" if value else ""))
+    [first] = made.groups[0]
+    part, shown = object.__new__(Part), object.__new__(Fit)  # of a fit only the paths count
+    vars(part)["data"], vars(shown)["parts"] = first.read()[0], (part,)
+    (_, again), (_, recipe) = repetition(shown, made.described, lambda where: made.recipe([first], where))
+    assert told(parsed(again.removeprefix("pellicle "))) == told(made)
+    (folder / "again.toml").write_text(recipe, "utf-8")
+    assert told(parsed("fit --recipe again.toml")) == told(made)
+    try:
+        without = told(parsed(f"fit {command}"))
+    except ValueError:
+        return  # it is needed
+    assert without != told(made)
+
+
+def test_a_posterior_is_repeated_by_its_own_command(folder):
+    made = parsed(f"fit {FILM}")
+    part, shown = object.__new__(Part), object.__new__(Fit)
+    vars(part)["data"], vars(shown)["parts"] = made.files[0].read()[0], (part,)
+    sampler = {"walkers": 40, "seed": 7}
+    [(_, again), *_] = repetition(shown, {**made.described, "sampler": sampler}, lambda where: "")
+    command, bound, _ = app.parse_args(shlex.split(again)[1:], print_error=False, exit_on_error=False)
+    assert command.__name__ == "sample"
+    assert bound.arguments["chain"] == SamplerFlags(walkers=40, seed=7)
