@@ -32,6 +32,11 @@ def test_a_film_is_named_and_written_as_a_recipe(pellicle, film, tmp_path):
     recipe = pl.read_recipe(out / "1.toml")
     assert recipe.scene().layers[0].thickness.start == pytest.approx(value)
     assert (out / "report.txt").read_text().startswith("[[Verdict]]\n    identified: A film of index 1.45")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert found["verdict"] in page
+    assert '<a href="1.toml">1.toml</a>' in page
+    assert all(f"Show {x['name']}</button>" in page for x in [*found["hypotheses"], *found["excluded"]])
+    assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_what_is_missing_is_said(pellicle, film):

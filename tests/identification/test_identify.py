@@ -34,6 +34,15 @@ def test_an_oxide_is_identified_by_its_index():
     assert found.verdict.startswith("A film of index 1.45 to 1.47, as SiO2, 30")
     assert "Excluded: " in found.verdict
     assert {"alumina", "Y2O3"} <= {x.name for x in found.excluded}
+    html = found._repr_html_()
+    assert html.count("<tr>") == 2
+    assert "<b>identified</b>: A film of index" in html
+    data, residuals, evidence = found.plot().axes
+    points, curve = data.lines
+    assert np.abs(points.get_ydata() - curve.get_ydata()).max() < 0.02
+    assert np.allclose(residuals.lines[0].get_ydata(), points.get_ydata() - curve.get_ydata())
+    assert evidence.lines[1].get_ydata().tolist() == [0.0]
+    assert min(evidence.lines[2].get_ydata()) > 5
 
 
 def test_films_of_one_index_are_not_told_apart():

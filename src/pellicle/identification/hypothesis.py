@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
-from pellicle.fitting.report_methods import ReportMixin
+from pellicle.fitting.report_methods import PlotMixin
 from pellicle.fitting.result import Estimate
 from pellicle.recipes.dispersion_models import MODELS, build_model
 from pellicle.scene.film import Scene
@@ -164,7 +164,7 @@ class DecidingSignal:
 
 
 @dataclass(frozen=True, repr=False)
-class Identification(ReportMixin):
+class Identification(PlotMixin):
     """Result of an identification: hypotheses of the layers of one sample.
 
     `hypotheses` are those that the data leave, the best first, and `excluded` the others that were tried,

@@ -1,6 +1,6 @@
 """Panels of measured data, and of data, fit and residuals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
 from pellicle.data.spectrum import Spectrum
+from pellicle.fitting.curves import Curve
 from pellicle.fitting.result import Part
 from pellicle.reporting.drawable import SERIES, Band, Line, Panel, Place, Section, Style, Table, stroke
 from pellicle.reporting.quantities import Quantity, abscissa, colours_of, display, lines_of, quantities
@@ -65,6 +66,32 @@ def measured(spectrum: Spectrum) -> Section:
                 bands.append(Band(at, low, stroke(x, q.data + q.sigma, rows)[1], "±σ", colour, listed=False))
         panels.append(_values(q, lines, bands, "above" if q is columns[0] else ""))
     return Section(label, _in_rows(spectrum, columns, panels))
+
+
+def compared(spectrum: Spectrum, curves: Mapping[str, Curve]) -> Section:
+    """Data with the curves of a few models by their names, and the residuals of each."""
+    x, label = abscissa(spectrum)
+    every = {name: quantities(spectrum, curve) for name, curve in curves.items()}
+    first, missed, panels = next(iter(every.values())), [], []
+    table = {label: x}
+    for i, q in enumerate(first):
+        lines = [Line(x, q.data, "data", "points", "point")]
+        table[q.label] = q.data
+        for number, (name, columns) in enumerate(every.items()):
+            about = {"colour": SERIES[number % len(SERIES)], "width": 1.2, "model": True}
+            model, residual = columns[i].model, columns[i].missed
+            assert model is not None
+            assert residual is not None
+            table[f"{q.label} of {name}"] = model
+            for rows, _ in lines_of(spectrum):
+                style: Any = {"style": "dashed" if number else "solid"}
+                lines.append(Line(*stroke(x, model, rows, q.turns), name, **about, **style))
+                style = {"style": q.drawn[2], "listed": False}
+                missed.append(Line(*stroke(x, residual, rows), name, **about, **style))
+        panels.append([_values(q, lines, [], "" if i else "above")])
+    degrees = " (degrees)" if "degrees" in first[0].label else ""
+    rest = Panel(f"data − model{degrees}", missed, height=1.5, zero=True)
+    return Section(label, [*panels, [rest]], table=Table(table))
 
 
 def _spectrum(spectrum: Spectrum, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:

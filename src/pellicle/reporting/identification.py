@@ -1,4 +1,4 @@
-"""Report, JSON record and folder of an identification, with a recipe for each hypothesis that is left."""
+"""Report, JSON record, page and folder of an identification, with a recipe for each hypothesis left."""
 
 from __future__ import annotations
 
@@ -9,36 +9,48 @@ from typing import Any
 
 from pellicle.files import new_folder
 from pellicle.fitting.status import describe
-from pellicle.identification.hypothesis import Hypothesis, Identification, SupposedLayer
+from pellicle.identification.hypothesis import Hypothesis, Identification, Outcome, SupposedLayer
 from pellicle.recipes.write import recipe_text
-from pellicle.reporting.folders import REPORT
+from pellicle.reporting.folders import PAGE, REPORT
+from pellicle.reporting.identification_figures import SHOWN, draw, evidence_figure, file_names, of_spectrum
 from pellicle.reporting.json_record import failed, parameter_record, strict, taken, versions, write_result
+from pellicle.reporting.page.document import Table, page
 from pellicle.reporting.plain_text import INDENT, blocks_of, table, wrapped
 
 SCHEMA = "pellicle.identify/1"
-_SHOWN = 12
-"""Excluded hypotheses in a report."""
+_TONES = {Outcome.IDENTIFIED: "good", Outcome.UNDECIDED: "warn"}
+"""Class of the page's style for each outcome; of the others it is "bad"."""
 
 
 def report(found: Identification) -> str:
     """Format the verdict and a table of hypotheses: evidence, residuals, numbers."""
-    names = ", ".join(x.path.replace("\\", "/").rsplit("/", 1)[-1] or "spectrum" for x in found.data)
     points = sum(len(x) for x in found.data)
+    names = ", ".join(file_names(found))
     verdict = [*wrapped(f"{found.status.value}: {found.verdict}"), *wrapped(f"{names}: {points} points")]
-    rows = [("", "hypothesis", "probability", "Δ ln Z", "residuals", "numbers")]
-    least = max((x.ln_z for x in (*found.hypotheses, *found.excluded)), default=0.0)
-    for x in (*found.hypotheses, *found.excluded[:_SHOWN]):
-        left = x in found.hypotheses
-        numbers = ", ".join(describe(own) for own in x.parameters.values())
-        share = f"{x.probability:.2g}" if left else ""
-        rows.append(("*" * left, x.name, share, f"{x.ln_z - least:.1f}", f"{x.remaining:.3g}", numbers))
+    rows = [("", *HEAD)]
+    rows += [("*" * (x in found.hypotheses), x.name, *cells) for x, cells in rows_of(found)]
     notes = [
         "* left by the data",
-        "residuals that no systematic effect explains are in units of the noise",
+        _RESIDUALS,
         *(f"not tried: {x.material}, {x.why}" for x in found.not_tried),
     ]
     body = [*table(rows), "", *(INDENT + note for note in notes)]
     return blocks_of([("Verdict", verdict), ("Hypotheses", body)])
+
+
+HEAD = "hypothesis", "probability", "Δ ln Z", "residuals", "numbers"
+_RESIDUALS = "residuals that no systematic effect explains are in units of the noise"
+
+
+def rows_of(found: Identification) -> list[tuple[Hypothesis, tuple[str, str, str, str]]]:
+    """Each hypothesis that is shown, with its probability, evidence, residuals and numbers in words."""
+    every, rows = (*found.hypotheses, *found.excluded), []
+    least = max((x.ln_z for x in every), default=0.0)
+    for i, x in enumerate(every[: len(found.hypotheses) + SHOWN]):
+        numbers = ", ".join(describe(own) for own in x.parameters.values())
+        share = f"{x.probability:.2g}" if i < len(found.hypotheses) else ""
+        rows.append((x, (share, f"{x.ln_z - least:.1f}", f"{x.remaining:.3g}", numbers)))
+    return rows
 
 
 def to_json(found: Identification) -> dict[str, Any]:
@@ -84,14 +96,41 @@ def _layer(layer: SupposedLayer) -> dict[str, Any]:
 
 
 def write_identification(folder: str | os.PathLike[str], found: Identification) -> Path:
-    """Write report.txt, result.json and a recipe of each hypothesis that is left, `1.toml` and on.
+    """Write report.txt, report.html, figure.png, result.json and a recipe of each hypothesis that is left,
+    `1.toml` and on.
 
     Returns the folder. Raises UsageError for a folder with other files.
     """
     target = new_folder(folder)
-    contents = {REPORT: report(found)}
+    contents = {REPORT: report(found), PAGE: identification_page(found)}
     files = [x.path for x in found.data if x.path]
     options = {"joint": True} if len(files) > 1 else {}
     for number, x in enumerate(found.hypotheses, 1):
         contents[f"{number}.toml"] = recipe_text(x.scene(), target, files=files, reading=options)
-    return write_result(target, to_json(found), contents)
+    return write_result(target, to_json(found), contents | {"figure.png": draw(found)})
+
+
+def identification_page(found: Identification) -> str:
+    """Format an identification as a page: its data with the curves of hypotheses, the evidence of each,
+    recipes of those that are left, what was not tried, and what to measure next."""
+    spectra, evidence = [of_spectrum(found, i) for i in range(len(found.data))], evidence_figure(found)
+    rows = [
+        {"name": x.name, "number": i, "left": i < len(found.hypotheses), "cells": cells}
+        for i, (x, cells) in enumerate(rows_of(found))
+    ]
+    left_out = [(x.material, x.why) for x in found.not_tried]
+    would = [(x.signal, f"{x.angle:g}°", f"{x.delta_ln_z:.3g}") for x in found.would_decide]
+    return page(
+        "identification.html",
+        ", ".join(file_names(found)),
+        [*spectra, evidence],
+        tone=_TONES.get(found.status, "bad"),
+        **taken(found, "status", "verdict"),
+        data_figures=spectra,
+        evidence=evidence,
+        head=HEAD,
+        rows=rows,
+        note=_RESIDUALS,
+        not_tried=Table("Materials that were not tried", ("material", "why"), left_out),
+        would_decide=Table("Measurements that would decide", ("signal", "angle", "Δ ln Z to expect"), would),
+    )

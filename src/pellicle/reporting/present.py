@@ -24,6 +24,7 @@ from pellicle.reporting import (
     fit_text,
     folders,
     identification,
+    identification_figures,
     measurement_plan,
     photograph_map,
     plans,
@@ -54,7 +55,9 @@ _WAYS: dict[type, _Ways] = {
         lambda folder, posterior: folders.write_fit(folder, posterior.fit, posterior),
     ),
     Comparison: _Ways(comparison.report, None, comparison.write_comparison),
-    Identification: _Ways(identification.report, None, identification.write_identification),
+    Identification: _Ways(
+        identification.report, identification_figures.draw, identification.write_identification
+    ),
     Repeats: _Ways(repeats.report, None, repeats.write_repeats),
     Plan: _Ways(plans.report),
     MeasurementPlan: _Ways(measurement_plan.report),
@@ -84,7 +87,9 @@ def _way(result: object, name: str, wanted: str) -> Callable[..., Any]:
     return way
 
 
-def report(result: Fit | Posterior | Comparison | Repeats | Plan | Cost | Map | ThicknessMap) -> str:
+def report(
+    result: Fit | Posterior | Comparison | Identification | Repeats | Plan | Cost | Map | ThicknessMap,
+) -> str:
     """Format a result as plain text.
 
     **Arguments:** `result` of `pl.fit`, `pl.sample`, `pl.compare`, `pl.fitting.repeats`, `pl.plan`, `pl.cost`
@@ -104,12 +109,12 @@ def report(result: Fit | Posterior | Comparison | Repeats | Plan | Cost | Map | 
     return _way(result, "report", "report; fits, posteriors and plans")(result)
 
 
-def plot(result: Fit | Posterior | Cost | Map | ThicknessMap) -> Figure:
+def plot(result: Fit | Posterior | Identification | Cost | Map | ThicknessMap) -> Figure:
     """Draw a result.
 
     **Arguments:** `result` of `pl.fit` (data, fit, residuals; of films also misfit against thickness, n and
-    k), `pl.sample` (corner plot), `pl.cost` (error against time) or `pl.map` (of a cube: the first
-    parameter, its standard error, status and histogram).
+    k), `pl.identify` (data, curves and evidence of hypotheses), `pl.sample` (corner plot), `pl.cost` (error
+    against time) or `pl.map` (of a cube: the first parameter, its standard error, status and histogram).
 
     **Returns:** a Matplotlib figure, which a notebook shows and `figure.savefig(path)` writes.
 
@@ -135,8 +140,8 @@ def save(
     return _way(result, "write", "files; fits, posteriors and costs")(folder, result)
 
 
-def html(result: Fit | Posterior | Comparison | Repeats | Cost | Map) -> str:
-    """Format a result for a notebook: verdict, a table of free parameters, and the report to unfold."""
+def html(result: Fit | Posterior | Comparison | Identification | Repeats | Cost | Map) -> str:
+    """Format a result for a notebook: verdict, a table of its numbers or hypotheses, the report to unfold."""
     match result:
         case Fit():
             head, columns = f"<b>{result.status}</b>: {escape(result.verdict)}", ("", "value", "± 1σ", "unit")
@@ -145,6 +150,12 @@ def html(result: Fit | Posterior | Comparison | Repeats | Cost | Map) -> str:
             head, columns = escape(verdict(result)), ("", "median", "2.5 %", "97.5 %", "unit")
             every = result.parameters.values()
             rows = [(m.name, *(f"{x:.6g}" for x in (m.q50, m.q025, m.q975)), m.unit) for m in every]
+        case Identification():
+            head, columns = (
+                f"<b>{result.status}</b>: {escape(result.verdict)}",
+                ("", *identification.HEAD[1:]),
+            )
+            rows = [(x.name, *cells) for x, cells in identification.rows_of(result) if x in result.hypotheses]
         case _:
             return f"<pre>{escape(report(result))}</pre>"
     heads = "".join(f"<th>{column}</th>" for column in columns)
