@@ -109,7 +109,7 @@ def test_a_recipe_of_a_surface_is_shown_too(explore):
         (["none.toml"], 3, "none.toml"),
         (["film.toml", "--layer", "SiO2"], 2, "exclude each other"),
         (["--angle", "65,x"], 2, "degrees such as 70"),
-        (["--angle", "65,95"], 2, "0 to 90 degrees"),
+        (["--angle", "65,95"], 2, "0 to 89.9 degrees"),
         (["--angle", ",".join(map(str, range(60, 74)))], 2, "up to 12 angles of incidence"),
         (["--layer", "Si02"], 2, "Si02"),
         (["--layer", "Si/Chandler-Horowitz"], 3, "share no wavelengths"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pellicle.cli.flags import SceneFlags
 from pellicle.cli.inputs import inputs
 from pellicle.errors import DataError
 from pellicle.scene.instrument import Drift
@@ -53,6 +54,19 @@ def asked(monkeypatch):
 
     monkeypatch.setattr("pellicle.api.fits.fit", fit)
     return calls
+
+
+@pytest.mark.parametrize("wanted", ["wafer", "wafer/*.csv"])
+def test_folders_and_patterns_are_their_files_in_natural_order(wanted, spectrum_file, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wafer").mkdir()
+    for number in (10, 2, 1):
+        spectrum_file(f"wafer/site {number}.csv")
+    (tmp_path / "wafer" / "notes.md").write_text("cleaned on Monday")
+    found = inputs([wanted], None, SceneFlags(layer="SiO2", substrate="Si"))
+    assert [Path(file.path).name for file in found.files] == [f"site {i}.csv" for i in (1, 2, 10)]
+    with pytest.raises(DataError, match="no file of data is there"):
+        inputs(["wafer/*.txt"], None, SceneFlags(layer="SiO2", substrate="Si"))
 
 
 def test_files_with_their_own_words(pellicle, files, scene_recipe, asked):

@@ -87,8 +87,8 @@ def test_the_base_of_a_surface_is_fixed(write):
     ("angle", "said"),
     [
         ('"x"', r"data\.angle: .* a valid number"),
-        ("95", r"data\.angle: .* 0 to 90 degrees, got 95"),
-        ("[10, 95]", r"data\.angle: .* 0 to 90 degrees, got 95"),
+        ("95", r"data\.angle: .* 0 to 89.9 degrees, got 95"),
+        ("[10, 95]", r"data\.angle: .* 0 to 89.9 degrees, got 95"),
         ('[10, "x"]', r"data\.angle\.1: .* a valid number, .*got 'x'"),
         ("[]", r"data\.angle: .* at least 1 item"),
     ],

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from glob import glob
 from logging import getLogger
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +23,7 @@ from pellicle.cli.reading import (
     refuse_camera,
 )
 from pellicle.data.options import BRDF, FileOptions, FitOptions
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.data.brdf_samples import BrdfSamples
@@ -34,6 +36,8 @@ if TYPE_CHECKING:
 log = getLogger(__name__)
 
 LEAST_SQUARES = "least-squares"
+_NO_DATA = {".toml", ".md", ".pdf", ".svg", ".html", ".json", ".ipynb", ".py", ".docx", ".log"}
+"""Suffixes of files beside data in a folder, which are left out."""
 
 
 class Input(NamedTuple):
@@ -126,6 +130,7 @@ def inputs(
     for file in files:
         if file.lower().endswith(".toml"):
             raise UsageError(f"{file}: is a recipe, and data were expected: write --recipe {file}")
+    files = [path for file in files for path in _matching(file)]
     scene_flags = scene_flags or SceneFlags()
     reading = FileOptions() if reading_flags is None else reading_flags.options()
     fitting = FitOptions() if fit_flags is None else fit_flags.options()
@@ -150,6 +155,27 @@ def inputs(
     joint = joint or result.joint
     result = replace(result, joint=joint, fitting=options, described=described, written=written)
     return result if repeats is None or not (repeats or result.repeats) else _as_repeats(result)
+
+
+def _matching(file: str) -> list[str]:
+    """The files of a folder, or of a pattern such as wafer/*.csv, which shells of Windows leave as it is, in
+    natural order: 2 before 10. Any other path is itself."""
+    path = Path(file)
+    if path.is_dir():
+        inside = [each for each in path.iterdir() if each.is_file() and not each.name.startswith((".", "~"))]
+        found = [str(each) for each in inside if each.suffix.lower() not in _NO_DATA]
+        if len(found) < len(inside):
+            say(f"{file}: {len(found)} files of data; {len(inside) - len(found)} others are left out")
+    elif path.exists() or not any(mark in file for mark in "*?["):
+        return [file]
+    else:
+        found = glob(file, recursive=True)
+    if not found:
+        raise DataError(
+            f"{file}: no file of data is there; name files, as in wafer/*.csv, or a folder of them"
+        )
+    numbered = partial(re.split, r"(\d+)")
+    return sorted(found, key=lambda name: [int(x) if x.isdigit() else x for x in numbered(name)])
 
 
 def _as_repeats(files: Inputs) -> Inputs:

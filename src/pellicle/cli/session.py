@@ -60,6 +60,9 @@ def start(keep: bool = True) -> None:
     if disk_usage(folder).free < ROOM:
         say(f"{folder}: the disk is full, so new compiled programs are not kept and each run is slower")
         filterwarnings("ignore", "Error writing persistent compilation cache")  # of JAX, one for each program
+    filterwarnings(
+        "ignore", "Error reading persistent compilation cache"
+    )  # damaged; compiled and written again
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)

@@ -333,7 +333,7 @@ class ReadingOptions(SpectrumOptions):
     )
     angle: float | list[float] | None = _FOR_FILMS(
         "Angle of incidence in degrees (0); 0,30,60 where regions of a photograph show one film.",
-        **{"metavar": "DEG", "parse": parse_angles, "least": 0, "most": 90, "unit": "degrees"},
+        **{"metavar": "DEG", "parse": parse_angles, "least": 0, "most": 89.9, "unit": "degrees"},
     )
     reference: str | None = _FOR_SPECTRA(
         "Raw counts of a bare reference; DATA are then raw counts too.", is_file=True

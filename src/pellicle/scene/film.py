@@ -178,6 +178,9 @@ class Scene(eqx.Module):
             object.__setattr__(self, name, part)
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
+        names = [x.name for x in self.layers if x.name]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise UsageError(f"two layers are named {twice[0]!r}: give each a name of its own")
         if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):
             raise ValueError("two interfaces are adjacent: an interface mixes the media at its sides")
         thick = [x.material for x in self.layers if isinstance(x, Plate)]

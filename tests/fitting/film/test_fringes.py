@@ -31,8 +31,9 @@ def test_the_frequency_is_the_thickness(thickness):
         3 + np.sin(900 * X) + 0.01 * NOISE,  # one fringe
         1 + 0.05 * np.cos(2 * np.pi * 1500.0 * X) + 0.3 * NOISE,
         np.cos(2 * np.pi * 1500.0 * X) + np.cos(2 * np.pi * 2210.0 * X),  # no period
+        np.zeros_like(X),
     ],
-    ids=["noise", "one fringe", "below the noise", "two periods"],
+    ids=["noise", "one fringe", "below the noise", "two periods", "no light"],
 )
 def test_no_clear_fringes(values):
     assert fringes(X, values) is None

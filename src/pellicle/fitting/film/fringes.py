@@ -103,9 +103,8 @@ def _with_trend(
         return None
     at = float(thickness[np.argmax(np.where(allowed, np.abs(spectrum), 0.0))])
     amplitude = _amplitude(even, level, at)
-    if abs(amplitude) < _NOISES * noise or abs(amplitude) ** 2 / 2 < _SHARE * np.average(
-        level**2, weights=window
-    ):
+    seen = abs(amplitude) > _NOISES * noise  # not so where both are 0
+    if not seen or abs(amplitude) ** 2 / 2 < _SHARE * np.average(level**2, weights=window):
         return None
     spacing, scatter = _extrema(even, level, at)
     if not scatter < _REGULAR or abs(spacing * at * 2 - 1) > _REGULAR:
