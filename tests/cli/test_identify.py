@@ -1,5 +1,7 @@
 """`pellicle identify`: JSON, recipes that a fit takes, and messages."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,25 @@ def test_a_film_is_named_and_written_as_a_recipe(pellicle, film, tmp_path):
     assert '<a href="1.toml">1.toml</a>' in page
     assert all(f"Show {x['name']}</button>" in page for x in [*found["hypotheses"], *found["excluded"]])
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_files_at_several_angles_are_one_sample(pellicle, tmp_path):
+    nm, out = np.linspace(420, 880, 60), tmp_path / "out"
+    paths = []
+    for angle in (10, 60):
+        scene = pl.Scene(pl.Layer("SiO2", 300.0), "Si", light=pl.Light(angle=angle))
+        paths.append(tmp_path / f"at_{angle}.csv")
+        measured = pl.simulate(scene, nm, noise=0.002, seed=angle)
+        rows = zip(nm, measured.values, strict=True)
+        paths[-1].write_text("wavelength_nm,R\n" + "".join(f"{x},{y}\n" for x, y in rows))
+    flags = ("--substrate", "Si", "--among", "SiO2,Si3N4", "--json", "--out", out)
+    [found] = pellicle("identify", *paths, "--angle", "10,60", *flags, code=0).objects
+    value, stderr, _ = found["hypotheses"][0]["layers"][0]["thickness"]
+    assert abs(value - 300) < 3 * stderr
+    assert (out / "1.toml").read_text().count("[[data.file]]") == 2
+    assert re.findall(r"angle = (.+)", (out / "1.toml").read_text()) == ["10", "60"]
+    told = pellicle("identify", *paths, "--angle", "10,50,60", "--substrate", "Si", code=2).err
+    assert "--angle has 3 angles for 2 files" in told
 
 
 def test_what_is_missing_is_said(pellicle, film):

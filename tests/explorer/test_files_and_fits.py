@@ -147,3 +147,24 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     assert layer.roughness == 2.0
     assert isinstance(width, Free)
     assert width.lower == 0.0
+
+
+def test_a_film_is_identified_and_shown(session):
+    """The scene has an oxide, and the data are of titania."""
+    assert session.answer("identify", {})["error"].startswith("there are no data to identify")
+    titania = pl.simulate(pl.Scene(pl.Layer("TiO2", 80.0), "Si"), NM, noise=0.002, seed=1)
+    session.answer("data", {"name": "t.csv", "text": csv("wavelength_nm,R", NM, titania.values)})
+    assert session.answer("hypothesis", {"number": 0})["error"].startswith("no hypothesis 0")
+    found = session.answer("identify", {})
+    assert found["status"] in found["summary"]
+    numbers = {x["name"]: i for i, x in enumerate(found["hypotheses"])}
+    answer = session.answer("hypothesis", {"number": numbers["TiO2"]})
+    assert answer["scene_changed"]
+    about = session.answer("scene", {})
+    [thickness] = [x["value"] for x in about["controls"] if x["name"] == "thickness"]
+    assert abs(thickness - 80) < 3
+    assert about["data"]["curves"] == answer["curves"]
+    [curve] = session.answer("view", {"want": ["curves"], "wait": True})["curves"]
+    assert np.abs(np.interp(NM, curve["x"], curve["y"]) - titania.values).max() < 0.02
+    session.answer("data", {"name": "film.csv", "text": GOOD})
+    assert "error" in session.answer("hypothesis", {"number": 0})  # of other data

@@ -82,6 +82,36 @@ def test_a_reflectance_relative_to_silicon_is_at_most_undecided():
     assert alone.verdict.startswith("No hypothesis that was tried describes the data")
 
 
+def test_a_wrong_back_face_is_at_most_undecided():
+    """Light from the front face alone, stated to be that of a plate."""
+    spectrum = reflectance(("CdS", 80.0), substrate="BK7")
+    found = pl.identify(spectrum, "BK7", back="air", among=["CdS", "SiO2", "ZnS"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert "If no light from the back face was measured, the same layers describe the data" in found.verdict
+    right = pl.identify(spectrum, "BK7", among=["CdS", "SiO2", "ZnS"], layers=1)
+    assert right.status is Outcome.IDENTIFIED
+    assert abs(right.best.layers[0].thickness.value - 80) < 3 * right.best.layers[0].thickness.stderr < 5
+
+
+def test_time_that_ends_is_said():
+    found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si", budget=0)
+    assert found.verdict.endswith("The budget of 0 s ended before all was tried.")
+    assert found.not_tried[-1].why == "the budget of 0 s had ended"
+    assert len(found.hypotheses) + len(found.excluded) < 3
+
+
+@pytest.mark.slow  # compiles the program of psi and delta
+def test_another_convention_of_delta_is_named():
+    angle = np.full(NM.size, 70.0)
+    psi, delta = by_tmm.psi_delta(*by_tmm.ncs(NM, (1.0, index("SiO2"), index("Si")), [100.0], angle).T)
+    noise = 0.1 * np.random.default_rng(1).normal(size=(2, NM.size))
+    spectrum = pl.Spectrum(NM, psi + noise[0], "psi-delta", delta=(180 - delta + noise[1]) % 360, angle=angle)
+    found = pl.identify(spectrum, "Si", among=["SiO2", "Si3N4"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert "another convention of delta (180 - delta in place of delta)" in found.best.condition
+    assert found.best.layers[0].thickness.value == pytest.approx(100, abs=3)
+
+
 @pytest.mark.slow  # two layers
 def test_two_layers_are_found_unasked():
     found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si")

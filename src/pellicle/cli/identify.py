@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -15,6 +16,9 @@ from pellicle.cli.reading import check_words, is_of_colours, read
 from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
 from pellicle.data.options import FileOptions, parse_number
 from pellicle.errors import UsageError
+
+if TYPE_CHECKING:
+    from pellicle.data.spectrum import Spectrum
 
 
 def identify(
@@ -43,6 +47,8 @@ def identify(
     Example: pellicle identify unknown.csv --substrate Si --out found
 
     Example: pellicle identify R.csv T.csv --substrate BK7 --back air --family oxide
+
+    Example: pellicle identify R8.csv R60.csv --angle 8,60 --substrate Si
     """
     paths, options = list(data), (reading or FileFlags()).options()
     if not paths:
@@ -79,12 +85,17 @@ def _identify(
         if name in given:
             given[name] = medium(given[name], name=f"`{name}`")
     below = medium(substrate, name="`substrate`")
-    if options.angle is not None:
+    several = options.angle if isinstance(options.angle, list) else []
+    if several and len(several) != len(paths):
+        raise UsageError(
+            f"--angle has {len(several)} angles for {len(paths)} files: give one, or one for each"
+        )
+    if options.angle is not None and not several:
         given["angle"] = options.angle
     try:
-        if colours := [path for path in paths if is_of_colours(path, options)]:
-            raise UsageError(f"{colours[0]}: colours cannot be identified: give a spectrum")
-        spectra = [spectrum for path in paths for spectrum in read(path, options)]
+        spectra = [spectrum for path in paths for spectrum in _spectra(path, options)]
+        if several:
+            spectra = [_at(several[paths.index(x.path)], x) for x in spectra]
         found = identified(spectra, below, **given)
         if plan:
             from pellicle.identification.next_measurement import with_next_measurement
@@ -98,8 +109,24 @@ def _identify(
     code = GOOD if found.status == "identified" else UNCLEAR
     if out is None:
         return code
-    write = partial(write_identification, Path(out), found)
+    stated = {name: x for name, x in options.given().items() if x is not None and name != "angle"}
+    tables = [{"path": path, "angle": angle} for path, angle in zip(paths, several, strict=False)]
+    write = partial(write_identification, Path(out), found, stated, tables)
     return max(code, written(write, f"{out}: report and recipes written"))
+
+
+def _spectra(path: str, options: FileOptions) -> list[Spectrum]:
+    """Spectra of a file. Raises UsageError for one of colours."""
+    if is_of_colours(path, options):
+        raise UsageError(f"{path}: colours cannot be identified: give a spectrum")
+    return read(path, options)
+
+
+def _at(angle: float, spectrum: Spectrum) -> Spectrum:
+    """The spectrum at an angle of incidence, unless its file states one."""
+    import numpy as np
+
+    return spectrum if spectrum.angle is not None else replace(spectrum, angle=np.full(len(spectrum), angle))
 
 
 def _allowed(allow: str | None) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Hashable, Sequence
 from itertools import count
 from queue import PriorityQueue
-from typing import Any
+from typing import Any, TypeVar
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
@@ -13,6 +13,7 @@ from pellicle.fitting.film.fit import fit
 from pellicle.fitting.result import Fit
 from pellicle.scene.film import Scene
 
+Result = TypeVar("Result")
 NOW, SOON = 0, 1
 """Order of compilation: what a view waits for, and what the next view may need."""
 
@@ -89,11 +90,17 @@ class FitRun:
 
     def run(self, data: Sequence[Spectrum], scene: Scene) -> Fit | None:
         """Fit a scene to spectra; None where it was stopped. Raises UsageError while another fit runs."""
+        return self.alone(
+            lambda: fit(data[0] if len(data) == 1 else list(data), scene, progress=self._report)
+        )
+
+    def alone(self, work: Callable[[], Result]) -> Result | None:
+        """Return what `work` returns, None where it was stopped. Raises UsageError while a fit runs."""
         if not self._running.acquire(blocking=False):
             raise UsageError("a fit is running: stop it, or wait for its result")
         try:
             self._stop.clear()
-            return fit(data[0] if len(data) == 1 else list(data), scene, progress=self._report)
+            return work()
         except _Stopped:
             return None
         finally:

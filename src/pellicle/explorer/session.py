@@ -31,7 +31,9 @@ from pellicle.explorer.answers import (
 from pellicle.explorer.background import NOW, SOON, Compiler, FitRun
 from pellicle.explorer.controls import fitted_names, scene_with, with_value
 from pellicle.explorer.programs import ANGLE, asked_angles, measured_angles
+from pellicle.explorer.unknown_film import identification, identification_to_json
 from pellicle.explorer.views import FilmView, SurfaceExplorerView
+from pellicle.identification.hypothesis import Hypothesis
 from pellicle.recipes.python_text import python_program
 from pellicle.recipes.write import recipe_text
 from pellicle.scene.film import Scene
@@ -83,6 +85,7 @@ class Session:
         self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
+        self._hypotheses: tuple[Hypothesis, ...] = ()  # those that the data leave
         self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "scene": self._scene,
             "view": self._view,
@@ -90,6 +93,8 @@ class Session:
             "fit": self._fit,
             "fit_status": lambda body: self._fit_run.status(),
             "fit_stop": lambda body: self._fit_run.stop(),
+            "identify": self._identify,
+            "hypothesis": self._take_hypothesis,
             "recipe": self._recipe,
         }
 
@@ -133,7 +138,7 @@ class Session:
             view.measured([])
         spectra = _measured_spectra(body, self.folder, view.scene.light.signal)
         changed = self._view_of(body).measured(spectra)
-        self.spectra, self._reading = spectra, {}
+        self.spectra, self._reading, self._hypotheses = spectra, {}, ()
         if changed is None:
             return self._data_shown()
         self.view = changed
@@ -168,6 +173,27 @@ class Session:
             answer["values"]["angle"] = float(stated[0])
         curves = fitted_curves(fit, view.against_angle)
         return {**answer, "curves": [curve_to_json(curve) for curve in curves]}
+
+    def _identify(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        view = self._view_of(body)
+        if not self.spectra or isinstance(view, SurfaceExplorerView):
+            raise UsageError("there are no data to identify: open a file first")
+        values = self._values(view, body)
+        found = self._fit_run.alone(lambda: identification(self.spectra, view.scene, values))
+        assert found is not None  # nothing stops it
+        self._hypotheses = found.hypotheses
+        return identification_to_json(found)
+
+    def _take_hypothesis(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Show the scene of a hypothesis, by its `number` in the answer of `identify`."""
+        number = body.get("number")
+        if type(number) is not int or number not in range(len(self._hypotheses)):
+            raise UsageError(f"no hypothesis {number!r}: ask which film it is first")
+        view = FilmView(self._hypotheses[number].scene())
+        self.view = view.measured(self.spectra) or view
+        if self._ahead:
+            self.prepare()
+        return {**self._data_shown(), "scene_changed": True}
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self._view_of(body)

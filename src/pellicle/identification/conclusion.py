@@ -42,7 +42,7 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
     best = kept[0]
     if best.remaining > NOISY or not all(same(problem, best, x) for x in kept[1:]):
         return Outcome.UNDECIDED
-    value, error = _thickest(best)
+    value, error = thickest(best)
     lost = not value > SIGNIFICANT * error and value > BARE
     unlike = all(_like_no_film(problem, x) for x in kept)
     return Outcome.UNDECIDED if lost or unlike else Outcome.IDENTIFIED
@@ -77,7 +77,7 @@ def _alike_films(problem: Problem, index: np.ndarray) -> tuple[str, ...]:
 def same(problem: Problem, a: Weighed, b: Weighed) -> bool:
     """True where two structures are one sample in other words: thicknesses alike within errors, and indices
     of all layers but very thin ones."""
-    (da, ea), (db, eb) = _thickest(a), _thickest(b)
+    (da, ea), (db, eb) = thickest(a), thickest(b)
     ea, eb = (min(e, 0.1 * d) if math.isfinite(e) else 0.1 * d for e, d in ((ea, da), (eb, db)))
     thin = [_others(x) for x in (a, b)]
     if abs(da - db) > _SAME_THICKNESS * math.hypot(ea, eb) or abs(thin[0] - thin[1]) > _THIN:
@@ -106,7 +106,7 @@ def _depths(x: Weighed) -> np.ndarray:
     return x.structure.thicknesses(x.x[None])[0]
 
 
-def _thickest(x: Weighed) -> tuple[float, float]:
+def thickest(x: Weighed) -> tuple[float, float]:
     """Thickness of the thickest layer and its standard error."""
     thicknesses = [
         (v, e) for n, v, e in zip(x.structure.numbers, x.x, x.stderr, strict=True) if n.name == "thickness"

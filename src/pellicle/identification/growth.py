@@ -93,7 +93,9 @@ class Growth:
         return enough or time.monotonic() > self.deadline
 
     def add(self, layers: Sequence[Material], starts: Iterable[np.ndarray], *effects: str) -> None:
-        """Polish a structure from starts (numbers,) and keep it."""
+        """Polish a structure from starts (numbers,) and keep it, unless time is up."""
+        if self.attempts and time.monotonic() > self.deadline:
+            return
         structure = Structure(tuple(layers), effects)
         self.attempts.append(polished(self.problem, structure, list(starts)))
 
@@ -188,7 +190,8 @@ def _pairs(growth: Growth) -> None:
     found = []
     for upper in tops:
         for lower in tops:
-            if upper == lower or (upper not in partners and lower not in partners):
+            late = time.monotonic() > growth.deadline
+            if late or upper == lower or (upper not in partners and lower not in partners):
                 continue
             pairs = zip(growth.tables(upper), growth.tables(lower), strict=True)
             costs = scan(growth.scanned, [list(pair) for pair in pairs], grid)

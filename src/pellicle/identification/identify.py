@@ -12,11 +12,13 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.fringes import fringes
+from pellicle.fitting.film.other_readings import conventions
 from pellicle.identification import conclusion, films, words
+from pellicle.identification.evidence import Weighed, weigh
 from pellicle.identification.growth import Growth, grown
 from pellicle.identification.hypothesis import Identification, NotTried, Outcome
 from pellicle.identification.problem import Problem
-from pellicle.identification.search import THICK
+from pellicle.identification.search import THICK, polished
 from pellicle.identification.signal_view import (
     MOST_POINTS,
     SCANNED_POINTS,
@@ -66,6 +68,17 @@ def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> I
         check(spectrum, request)
     spectra = [covered(spectrum, request.around()) for spectrum in spectra]
     deadline = time.monotonic() + request.budget
+    found = _identified(spectra, request, began, deadline)
+    if time.monotonic() < deadline:
+        return found
+    ended = f"The budget of {request.budget:g} s ended before all was tried."
+    rest = NotTried("further structures", f"the budget of {request.budget:g} s had ended")
+    return replace(found, verdict=f"{found.verdict} {ended}", not_tried=(*found.not_tried, rest))
+
+
+def _identified(
+    spectra: Sequence[Spectrum], request: Request, began: float, deadline: float
+) -> Identification:
     growth, left_out = _grown(spectra, request, deadline, request.layers)
     kept = conclusion.survivors(growth.weighed)
     folded = _folded(spectra)
@@ -75,8 +88,12 @@ def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> I
         growth = again if kept else growth
     if kept:
         status = conclusion.outcome(growth.problem, kept)
-        return _record(growth, kept, status, "", left_out, request, began)
+        better = _better_face(growth.problem, kept[0], spectra, request)
+        found = _record(growth, kept, Outcome.UNDECIDED if better else status, "", left_out, request, began)
+        return replace(found, verdict=f"{found.verdict} {better}") if better else found
     for condition, other in _conditions(spectra, request):
+        if time.monotonic() > deadline:
+            break
         again, _ = _grown(*other, deadline, 1)
         found = [x for x in conclusion.survivors(again.weighed) if x.remaining < conclusion.NOISY]
         if found:
@@ -176,17 +193,51 @@ def _conditions(
             if len(known) == len(spectra):
                 named = getattr(mirror, "name", "the substrate")
                 yield f"the reflectance was measured relative to {named}", (known, request)
+    if "calibration" in request.conditions:
+        for words, other in conventions(spectra, [np.inf] * len(spectra)):
+            of: Any = other
+            yield f"the file has another convention of delta ({words} in place of delta)", (of, request)
+    face = _other_face(spectra, request)
+    if face is not None:
+        yield face[0], (spectra, face[1])
+
+
+def _other_face(spectra: Sequence[Spectrum], request: Request) -> tuple[str, Request] | None:
+    """The statement on the back face that is not made, and the request with it; None where there is none."""
+    below = request.substrate
     if "plate" not in request.conditions:
-        return
+        return None
     index: Any = SignalView(spectra[0], request.around()).index_of(below.material)
     if below.back is None and float(np.mean(index.imag)) < 1e-4:
-        plate = replace(request, substrate=replace(below, back=medium("air")))
-        yield "light from the back face was measured too", (spectra, plate)
-    elif below.back is not None and all(x.signal != "T" for x in spectra):
-        yield (
-            "no light from the back face was measured",
-            (spectra, replace(request, substrate=replace(below, back=None))),
+        plate = replace(below, back=medium("air"))
+        return "light from the back face was measured too", replace(request, substrate=plate)
+    if below.back is not None and all(x.signal != "T" for x in spectra):
+        return "no light from the back face was measured", replace(
+            request, substrate=replace(below, back=None)
         )
+    return None
+
+
+def _better_face(problem: Problem, best: Weighed, spectra: Sequence[Spectrum], request: Request) -> str:
+    """Sentence on the other statement of the back face where the best structure has far more evidence with
+    it, else empty: 80 nm of CdS on glass were told as 83 nm where a back face was stated that was not there.
+    """
+    face = _other_face(spectra, request)
+    if face is None:
+        return ""
+    other, _ = _problem(spectra, face[1])
+    if not all(x.name in other.views[0].tables or x.modelled for x in best.structure.layers):
+        return ""
+    [stated] = weigh(problem, [best.attempt], {})
+    [instead] = weigh(other, [polished(other, best.structure, [best.attempt.x])], {})
+    gain = instead.ln_z - stated.ln_z
+    if gain < conclusion.DECIDED or not instead.adequate:
+        return ""
+    depth, error = conclusion.thickest(instead)
+    return (
+        f"If {face[0]}, the same layers describe the data better (Δ ln Z {gain:.0f}), with a thickness of"
+        f" {depth:.4g} ± {error:.2g} nm."
+    )
 
 
 def _times_mirror(spectrum: Spectrum, mirror: Any, request: Request) -> Spectrum | None:

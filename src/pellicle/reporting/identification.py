@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pellicle.files import new_folder
@@ -95,18 +96,26 @@ def _layer(layer: SupposedLayer) -> dict[str, Any]:
     return taken(layer, "material", "like", "n", "k") | {"thickness": thickness}
 
 
-def write_identification(folder: str | os.PathLike[str], found: Identification) -> Path:
+def write_identification(
+    folder: str | os.PathLike[str],
+    found: Identification,
+    reading: Mapping[str, Any] = MappingProxyType({}),
+    tables: Sequence[Mapping[str, Any]] = (),
+) -> Path:
     """Write report.txt, report.html, figure.png, result.json and a recipe of each hypothesis that is left,
     `1.toml` and on.
 
+    `reading` has the options by which the files were read, and `tables` those of each file where they differ.
     Returns the folder. Raises UsageError for a folder with other files.
     """
     target = new_folder(folder)
     contents = {REPORT: report(found), PAGE: identification_page(found)}
-    files = [x.path for x in found.data if x.path]
-    options = {"joint": True} if len(files) > 1 else {}
+    files = list(dict.fromkeys(x.path for x in found.data if x.path))
+    options = dict(reading) | ({"joint": True} if len(files) > 1 else {})
     for number, x in enumerate(found.hypotheses, 1):
-        contents[f"{number}.toml"] = recipe_text(x.scene(), target, files=files, reading=options)
+        contents[f"{number}.toml"] = recipe_text(
+            x.scene(), target, files=[] if tables else files, reading=options, tables=tables
+        )
     return write_result(target, to_json(found), contents | {"figure.png": draw(found)})
 
 

@@ -263,7 +263,7 @@ export async function explore(element, call, options = {}) {
   function showData(data) {
     Object.assign(plot, { data: data.curves, before: [], fitted: [] });
     notes.replaceChildren(...data.notes.map((text) => make("li", {}, text)));
-    fit.disabled = false;
+    fit.disabled = which.disabled = false;
     element.classList.add("with-data");
   }
 
@@ -272,7 +272,7 @@ export async function explore(element, call, options = {}) {
   const stop = make("button", { type: "button", hidden: true, onclick: () => ask("fit_stop") }, "Stop");
 
   async function runFit() {
-    fit.disabled = true;
+    fit.disabled = which.disabled = true;
     stop.hidden = false;
     const focused = document.activeElement === document.body;
     if (focused) stop.focus(); // the button that had it is disabled
@@ -284,7 +284,7 @@ export async function explore(element, call, options = {}) {
     const free = controls.filter((each) => each.free.checked).map((each) => each.about.name);
     const answer = await ask("fit", { values: values(), ...(free.length ? { free } : {}) });
     clearInterval(progress);
-    fit.disabled = false;
+    fit.disabled = which.disabled = false;
     if (document.activeElement === stop) fit.focus();
     stop.hidden = true;
     fitted.textContent = "";
@@ -299,6 +299,32 @@ export async function explore(element, call, options = {}) {
     if (answer.summary) fitted.append(make("details", {}, make("summary", {}, "Summary of the fit"), make("pre", { tabindex: 0 }, answer.summary)));
   }
 
+  // ---- which film ----
+  const which = make("button", { type: "button", class: "fit", disabled: true, onclick: identify, title: "Looks for the films on this substrate that describe the data" }, "Which film?");
+
+  async function identify() {
+    fit.disabled = which.disabled = true;
+    fitted.textContent = "Trying films on this substrate …";
+    const answer = await ask("identify", { values: values() });
+    fit.disabled = which.disabled = false;
+    which.focus();
+    fitted.textContent = "";
+    if (answer.error) return;
+    const rows = answer.hypotheses.map(({ name, text }, number) => make("li", {},
+      make("button", { type: "button", onclick: () => takeHypothesis(number) }, `Show ${name}`), ` ${text}`));
+    fitted.replaceChildren(make("p", {}, `${answer.status}: ${answer.verdict}`), make("ol", { class: "hypotheses", "aria-label": "Films that the data leave" }, ...rows),
+      make("details", {}, make("summary", {}, "All that was tried"), make("pre", { tabindex: 0 }, answer.summary)));
+  }
+
+  /** Shows the scene of a hypothesis, whose free numbers can then be moved and fitted. */
+  async function takeHypothesis(number) {
+    const answer = await ask("hypothesis", { number });
+    if (answer.error || !(await takeScene(new URLSearchParams()))) return;
+    tellChange();
+    await plot.draw(false);
+    refresh();
+  }
+
   // ---- recipe, Python, link ----
   const dialog = textDialog(id);
   async function showText(kind, title, name) {
@@ -308,7 +334,7 @@ export async function explore(element, call, options = {}) {
   const reset = () => (angles !== null ? takeAngles(null, {}) : setAll(Object.fromEntries(controls.map(({ about }) => [about.name, about.value]))));
   const button = (text, onclick) => make("button", { type: "button", onclick }, text);
   const link = button("Copy link", () => copyText(window.location.href, link, element));
-  const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, fit, stop,
+  const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, fit, stop, which,
     button("Recipe", () => showText("toml", "Recipe", "recipe.toml")),
     button("Python", () => showText("python", "Python", "film.py")),
     ...(options.changed ? [link] : []), button("Reset", reset));
