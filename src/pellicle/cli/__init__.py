@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 
 from pellicle.cli.chart import chart
 from pellicle.cli.cost import cost, plan
+from pellicle.cli.doctor import doctor
 from pellicle.cli.explore import explore
 from pellicle.cli.export import export
 from pellicle.cli.fit import compare, fit, sample
@@ -50,6 +51,7 @@ COMMANDS = (
     watch,
     materials,
     demo,
+    doctor,
 )
 for function in COMMANDS:
     app.command(function)
