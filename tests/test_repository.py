@@ -30,6 +30,15 @@ def test_the_citation_file_is_complete():
         assert reference.get("doi", family) in sources, reference["title"]
 
 
+def test_the_paper_cites_what_its_bibliography_has():
+    paper, known = (ROOT / "paper" / name for name in ("paper.md", "paper.bib"))
+    text = paper.read_text("utf-8")
+    listed = re.findall(r"^@\w+\{(\w+)", known.read_text("utf-8"), re.MULTILINE)
+    assert set(re.findall(r"@(\w+)", text)) == set(listed)
+    for figure in re.findall(r"\]\((\S+\.png)\)", text):
+        assert (paper.parent / figure).exists(), figure
+
+
 PAGES = [
     *(ROOT / x for x in ("README.md", "CONTRIBUTING.md", "fits/README.md")),
     *(ROOT / "docs").rglob("*.md"),
