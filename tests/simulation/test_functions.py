@@ -68,6 +68,13 @@ def test_holomorphic_style_gradient_of_a_complex_index(function):
     assert complex(slope) == pytest.approx(complex(dn, -dk), rel=1e-12)
 
 
+def test_wavelengths_of_jax_are_known_in_a_program():
+    """An array that a program closes over is no argument of it, but JAX traces what is computed of it."""
+    wavelength = jnp.array([500.0, 600.0])
+    traced = jax.eval_shape(lambda d: pl.reflectance(wavelength, d, 1.46, 3.9), 300.0)
+    assert traced.shape == (2,)
+
+
 @BOTH
 def test_arguments_broadcast(function):
     wavelength, thickness = np.linspace(400, 800, 5), np.array([[10.0], [300.0]])

@@ -103,7 +103,8 @@ def check_numbers(wavelength: Any, thickness: Any, angle: Any) -> None:
     if (value := _wrong(wavelength, lambda nm: ~(nm > 0))) is not None:
         raise UsageError(f"`wavelength` must be above zero, in nm, got {value:g}")
     known = not isinstance(wavelength, Tracer) and np.size(wavelength) > 0
-    if known and (longest := np.max(wavelength)) < MICROMETRES:
+    # of NumPy's copy: JAX would trace the maximum of its own array, too, inside a program
+    if known and (longest := np.max(np.asarray(wavelength))) < MICROMETRES:
         raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in µm: write {1e3 * longest:g}")
     if (value := _wrong(angle, lambda degrees: ~(np.abs(degrees) <= 90))) is not None:
         raise UsageError(f"`angle` must be 0 to 90 degrees, got {value:g}")
