@@ -301,10 +301,12 @@ LONG_BLOCKS = (
     "docs/howto/mueller.md",
     "docs/howto/posterior.md",
     "docs/howto/repeats.md",
+    "docs/howto/samples.md",
+    "docs/howto/series.md",
     "docs/howto/uncertainty.md",
     "docs/reference/colour.md",
 )
-"""Pages whose Python blocks compile for 2 to 5 s each: run in `make slow`."""
+"""Pages whose Python blocks compile for 2 to 12 s each: run in `make slow`."""
 
 
 @pytest.mark.slow  # two minutes

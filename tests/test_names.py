@@ -86,7 +86,7 @@ def test_every_public_name_is_in_the_reference():
     assert len(LISTED) == len(set(LISTED))
 
 
-COMPILED = ("depth_profile", "fit", "solve", "field", "jones", "mueller")
+COMPILED = ("depth_profile", "fit", "solve", "field", "jones", "mueller", "repeats")
 """Their examples compile for a second or more."""
 
 
