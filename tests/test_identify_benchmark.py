@@ -79,8 +79,20 @@ def test_scores_of_a_trivial_identifier(bench):
     assert score(by_group["no film"], trivial(by_group["no film"], "identified")) == ("right", True)
 
 
+def test_layers_of_one_index_are_one_film(bench):
+    score, cases = bench.scoring.score, {x.name: x for x in bench.suite.cases(1)}
+    case = cases["two layers | PMMA on SiO2 1 | psi-delta on Si"]
+    (n, depth), *rest = bench.scoring.films(case)
+    one = SimpleNamespace(material="SiO2", n=(n, n), thickness=SimpleNamespace(value=depth, stderr=1.0))
+    found = SimpleNamespace(status="identified", hypotheses=[SimpleNamespace(layers=[one], remaining=1.0)])
+    assert (rest, score(case, found)) == ([], ("right", True))
+    assert depth == pytest.approx(sum(x.thickness for x in case.specimen.layers))
+    assert score(case, trivial(case, "undecided"))[0] == "listed"
+    assert len(bench.scoring.films(cases["two layers | SiO2 on TiO2 1 | R on Si"])) == 2
+
+
 def test_shares_of_a_run(bench):
-    about = {"close": True, "truth": "", "answer": "", "verdict": "", "seconds": 1.0}
+    about = {"films": 2, "close": True, "truth": "", "answer": "", "verdict": "", "seconds": 1.0}
     made = [
         bench.scoring.Answer(f"{i}", group, "identified", outcome, True, **about)
         for i, (group, outcome) in enumerate([("clean", "right"), ("clean", "wrong"), ("there", "listed")])

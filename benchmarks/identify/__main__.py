@@ -17,7 +17,7 @@ from typing import Any
 
 import decisions
 import numpy as np
-from scoring import Answer, described, failures, goals, score, table, truth_of, write_csv
+from scoring import Answer, described, failures, films, goals, score, table, truth_of, write_csv
 from specimens import Specimen, clean, measured
 from suite import HELD_OUT, SEED, Case, cases
 
@@ -51,7 +51,7 @@ def answer(case: Case, seed: int) -> Answer:
         outcome, layers = score(case, found)
     close = found is not None and bool(found.hypotheses) and found.hypotheses[0].remaining < NOISE_LIKE
     return Answer(
-        *(case.name, case.group, status, outcome, layers, close, truth_of(case)),
+        *(case.name, case.group, status, outcome, layers, len(films(case)), close, truth_of(case)),
         answer="" if found is None else described(found),
         verdict=verdict,
         seconds=time.perf_counter() - began,

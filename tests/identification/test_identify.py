@@ -64,6 +64,19 @@ def test_a_film_without_dispersion_is_never_certain():
     assert abs(thickness.value - 135) < 3 * thickness.stderr < 15
 
 
+def test_a_wrong_angle_is_named_and_never_certain():
+    """100 nm of oxide, of which Ψ and Δ were measured at 68° and stated at 70°."""
+    ncs = by_tmm.ncs(NM, (1.0, index("SiO2"), index("Si")), [100.0], 68.0)
+    psi = np.rad2deg(np.arctan2(np.hypot(ncs[:, 1], ncs[:, 2]), ncs[:, 0])) / 2
+    delta = np.rad2deg(np.arctan2(ncs[:, 2], ncs[:, 1])) % 360
+    noise = 0.03 * np.random.default_rng(1).normal(size=(2, NM.size))
+    data = pl.Spectrum(NM, psi + noise[0], "psi-delta", delta=delta + noise[1], angle=np.full(NM.size, 70.0))
+    found = pl.identify(data, "Si", among=["SiO2", "MgF2", "alumina"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert "angle of incidence" in found.verdict
+    assert any(abs(x.layers[0].thickness.value - 100) < 2 for x in found.hypotheses)
+
+
 def test_bare_silicon_has_no_film():
     found = pl.identify(reflectance(("SiO2", 2.0)), "Si", among=["SiO2", "Si3N4"])
     assert found.best.name in ("bare substrate", "native oxide")

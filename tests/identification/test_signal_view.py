@@ -44,6 +44,10 @@ def test_two_structures_in_slots(signal, angle):
         else:
             expected = by_tmm.films("sp", NM, indices, depths, angle, signal)
         np.testing.assert_allclose(row, expected, atol=1e-10)
+    layers = slots(own)[0][0, -2:]
+    grid = own.simulate_grid(layers, np.array([10.0, DEPTHS[0]]), np.array([20.0, DEPTHS[1], 300.0]))
+    np.testing.assert_allclose(grid[4], found[0], atol=1e-10)
+    assert grid.shape[0] == 6
 
 
 @pytest.mark.parametrize("signal", ["R", "T"])
@@ -71,3 +75,6 @@ def test_a_metric_is_the_inverse_of_noise_and_columns():
     metric = Metric(sigma, columns)
     np.testing.assert_allclose(metric.gram(a, b), a.T @ inverse @ b, rtol=1e-9)
     np.testing.assert_allclose(metric.costs(a.T), np.diag(a.T @ inverse @ a), rtol=1e-9)
+    normal, gradient = metric.grams(a.T[None], b[None, :, 0])
+    np.testing.assert_allclose(normal[0], a.T @ inverse @ a, rtol=1e-9)
+    np.testing.assert_allclose(gradient[0], a.T @ inverse @ b[:, 0], rtol=1e-9)

@@ -11,14 +11,21 @@ import numpy as np
 
 from pellicle.fitting.result import Estimate
 from pellicle.identification.evidence import Weighed
-from pellicle.identification.growth import BARE, SIGNIFICANT, Growth, needed
+from pellicle.identification.growth import BARE, NOISE_LIKE, SIGNIFICANT, Growth, needed
 from pellicle.identification.hypothesis import Hypothesis, Outcome, SupposedLayer
 from pellicle.identification.problem import Problem
 
 DECIDED = 5.0
 """Δ ln Z that excludes a hypothesis: odds of 150 to 1."""
+_DEMANDED = 12.0
+"""Δ ln Z to the best single film from which a second layer is needed, however thick."""
 NOISY = 2.0
 """Ratio of unexplained residuals to noise above which nothing is identified."""
+USUAL = 3.0
+"""Times its usual size that an effect may have in what is identified: a polymer on nitride was told as two
+oxides with an angle 3.6 times as wrong as usual."""
+MISSTATED = 0.3
+"""Shift of the angle of incidence (degrees) above which it was stated wrongly: six times a usual error."""
 _LIKE = 0.02
 """Relative difference of two indices that name one film: that of pages of one material."""
 _SAME_THICKNESS, _THIN = 3.0, 10.0
@@ -29,10 +36,16 @@ def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
     """Structures that describe the data and are not excluded by their evidence, the best first.
 
     The evidence chooses: where the best does not describe the data and no rival as good does, none is left.
+    Two layers may be needed while neither their thicknesses nor their indices are known: they are left where
+    no other is.
     """
-    pool = [x for x in weighed if needed(x)] or list(weighed)
-    near = [x for x in pool if pool[0].ln_z - x.ln_z < DECIDED]
-    return [x for x in near if x.adequate]
+    single = max((x.ln_z for x in weighed if len(x.structure.layers) == 1), default=-math.inf)
+    vague = [x for x in weighed if needed(x) or (x.ln_z > single + _DEMANDED and not x.structure.effects)]
+    for pool in ([x for x in weighed if needed(x)] or list(weighed), vague):
+        near = [x for x in pool if pool[0].ln_z - x.ln_z < DECIDED and x.adequate]
+        if near:
+            return near
+    return []
 
 
 def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
@@ -42,25 +55,29 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
     best = kept[0]
     if best.remaining > NOISY or not all(same(problem, best, x) for x in kept[1:]):
         return Outcome.UNDECIDED
-    value, error = thickest(best)
-    lost = not value > SIGNIFICANT * error and value > BARE
+    parts = list(zip(best.structure.numbers, best.x, best.stderr, strict=True))
+    off = any(n.name == "angle_shift" and abs(v) > MISSTATED for n, v, _ in parts)
+    lost = any(n.name == "thickness" and v > BARE and not v > SIGNIFICANT * e for n, v, e in parts)
+    strained = best.excess[1] > USUAL
     unlike = all(_like_no_film(problem, x) for x in kept)
-    return Outcome.UNDECIDED if lost or unlike else Outcome.IDENTIFIED
+    return Outcome.UNDECIDED if off or strained or lost or unlike else Outcome.IDENTIFIED
 
 
 def _like_no_film(problem: Problem, x: Weighed) -> bool:
-    """True where a layer has a free index like that of no film, or one without dispersion.
+    """True where a layer has a free index without dispersion, or one that leaves more than noise, or one like
+    that of no film and from one R or T.
 
     Of 23 samples two layers or another substrate were told as such a film three times, with residuals of
-    noise.
+    noise; ψ and Δ have two numbers at each wavelength.
     """
+    lone = len(problem.views) == 1 and problem.views[0].channels == 1
     for i, layer in enumerate(x.structure.layers):
         numbers = zip(x.structure.numbers, x.x, strict=True)
         flat = any(
             n.layer == i and n.name == "B" and v < n.lower + 1e-3 * (n.upper - n.lower) for n, v in numbers
         )
-        unlike = not _alike_films(problem, index_of(problem, x, i))
-        if layer.modelled and _depths(x)[i] > BARE and (flat or unlike):
+        unlike = lone and not _alike_films(problem, index_of(problem, x, i))
+        if layer.modelled and _depths(x)[i] > BARE and (flat or unlike or x.remaining > NOISE_LIKE):
             return True
     return False
 

@@ -17,11 +17,13 @@ from pellicle.fitting.discrepancy import improbable
 from pellicle.identification.hypothesis import TABLE_UNCERTAINTY
 from pellicle.identification.problem import Attempt, Column, Problem
 from pellicle.identification.signal_view import SLOTS, SignalView
-from pellicle.identification.structure import Material, Structure, half_and_half
+from pellicle.identification.structure import OXIDE, Material, Structure, half_and_half
 from pellicle.scene.uncertainty import Uncertainty
 
 _UNIFORM = 12.0
 """Inverse variance of a number of which the data see nothing, in units of its range."""
+_CHOICE = 3.5
+"""Price of a further layer, in ln Z, for being one of the films that are tried: ln of their number."""
 _PROBE = 0.002
 """Relative change of an index by which its effect is computed."""
 NATIVE = 2.0
@@ -40,9 +42,23 @@ class System(NamedTuple):
     data: np.ndarray
 
     def solved(self, factor: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Information, solution, and what is left of the residuals, with noise enlarged by `factor` (σ²)."""
+        """Information, solution, and what is left of the residuals, with noise enlarged by `factor` (σ²).
+
+        A number that would leave its bounds stays there, and the others make up for it.
+        """
         information = self.matrix.T @ self.matrix / factor + np.diag(self.prior)
-        solution = np.linalg.solve(information, self.matrix.T @ self.data / factor)
+        gradient = self.matrix.T @ self.data / factor
+        structure, x = self.attempt.structure, self.attempt.x
+        room = np.stack([structure.lower - x, structure.upper - x]) / (structure.upper - structure.lower)
+        solution, held = np.linalg.solve(information, gradient), np.zeros(len(gradient), bool)
+        for _ in range(len(x)):
+            inside = np.clip(solution[: len(x)], *room)
+            beyond = np.flatnonzero(np.abs(inside - solution[: len(x)]) > 1e-12)
+            if not beyond.size:
+                break
+            solution[beyond], held[beyond] = inside[beyond], True
+            rest = gradient[~held] - information[np.ix_(~held, held)] @ solution[held]
+            solution[~held] = np.linalg.solve(information[np.ix_(~held, ~held)], rest)
         return information, solution, self.data - self.matrix @ solution
 
     @property
@@ -102,6 +118,7 @@ def _weighed(problem: Problem, system: System, factor: float, sigma: np.ndarray)
     chi2 = float(left @ left / factor + solution @ (prior * solution))
     ln_z = -0.5 * (chi2 + np.linalg.slogdet(information)[1] - np.sum(np.log(prior)))
     ln_z -= 0.5 * len(data) * math.log(factor) + float(np.sum(np.log(sigma)))
+    ln_z -= _CHOICE * max(sum(layer.most > OXIDE for layer in structure.layers) - 1, 0)
     # errors: numbers are bounded by the data alone, effects by their sizes
     loose = np.concatenate([np.full(count, 1e-3), np.ones(len(columns))])
     own = max(1.0, float(left @ left) / factor / max(len(data) - count, 1))

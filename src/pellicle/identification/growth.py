@@ -5,31 +5,34 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from pellicle.identification import pairs
 from pellicle.identification.evidence import NATIVE, Weighed, weigh
 from pellicle.identification.hypothesis import EFFECTS
 from pellicle.identification.problem import Attempt, Column, Problem
 from pellicle.identification.search import minima, polished, scan, thickness_grid
-from pellicle.identification.structure import Material, Structure
+from pellicle.identification.structure import OXIDE, Material, Structure
 from pellicle.recipes.dispersion_models import MODELS
 
 NOISE_LIKE = 1.3
 """Ratio of unexplained residuals to noise up to which growth ends."""
 BARE = 15.0
 """Largest thickness (nm) of the native oxide on a bare substrate."""
-PARTNERS = ("SiO2", "SU-8", "alumina", "Si3N4", "TiO2")
-"""Materials of a second layer, of indices from 1.46 to 2.5: beside each of them a free index is fitted, since
-a wide grid of two free indices chooses wrongly."""
 SIGNIFICANT = 3.5
 """Total standard errors that a further number must differ from 0 by."""
+_LOOSE = 0.1
+"""Error, as a share of its range, from which a number on a bound is unknown and not held there: A of a Cauchy
+film of 20 nm in R."""
 _FLEXIBLE = 4
 """Numbers up to which one film that describes the data needs no two layers as rivals: an absorbing film of
 five described 60 nm of titania on 300 nm of oxide."""
-_TABLES, _PAIRS = 8, 4
-"""Structures that a scan lets through."""
+WRONG_ANGLES = (-3.0, -2.5, -2.0, -1.5, -1.0, 1.0, 1.5, 2.0, 2.5, 3.0)
+"""Errors of an angle of incidence (degrees) that was stated wrongly; a shift of half a degree is fitted."""
+_TABLES, _MOST_TABLES, _CLOSE = 8, 16, 15.0
+"""Films of the catalogue that a scan lets through: so many, and up to so many within this χ² of the best. In
+R all films of 30 nm look alike."""
 _STARTS: dict[str, list[dict[str, float]]] = {
     "cauchy": [
         {"A": a, "B": min(1.2e4 * (a - 1) ** 2, 9e4)}
@@ -55,14 +58,15 @@ _STARTS: dict[str, list[dict[str, float]]] = {
 
 
 def needed(x: Weighed) -> bool:
-    """True where the data need every layer beside a first and every effect, and no model rests on a bound."""
+    """True where the data need each further layer and each effect, and no model is held by a bound."""
     layers = len(x.structure.layers)
     for number, value, error in zip(x.structure.numbers, x.x, x.stderr, strict=True):
-        reach = 1e-6 * (number.upper - number.lower)
+        reach, held = 1e-6 * (number.upper - number.lower), error < _LOOSE * (number.upper - number.lower)
         extra = number.name in EFFECTS or number.name == "k0" or (layers > 1 and number.name == "thickness")
         if extra and abs(value) < SIGNIFICANT * error:
             return False
-        if value > number.upper - reach or (number.name == "A" and value < number.lower + reach):
+        low = number.name == "A" and value < number.lower + reach
+        if held and (low or value > number.upper - reach):
             return False
     return True
 
@@ -107,6 +111,18 @@ class Growth:
         """The problem with the points of a scan."""
         return self.problem.coarse or self.problem
 
+    def likely_shift(self) -> float:
+        """Error of the stated angle of incidence (degrees) with which a film of the catalogue is nearest."""
+        grid, problem = thickness_grid(self.problem), self.scanned
+        costs = {
+            shift: min(
+                float(scan(problem, [[x] for x in self.tables(name)], grid[:, None], shift).min())
+                for name in self.order[:_TABLES]
+            )
+            for shift in WRONG_ANGLES
+        }
+        return min(costs, key=lambda shift: costs[shift])
+
     def tables(self, name: str) -> list[np.ndarray]:
         """Index of a material at the points of a scan, in each view."""
         return [view.tables[name] for view in self.scanned.views]
@@ -124,9 +140,9 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
             growth.add([growth.film(model)], _model_starts(growth, model, 3))
     if not growth.done(_FLEXIBLE):
         _effects(growth)
-    if layers > 1 and not growth.done(_FLEXIBLE):
-        _pairs(growth)
-        _named(growth)
+    enough = growth.done(_FLEXIBLE)
+    if layers > 1 and time.monotonic() < deadline:
+        pairs.grow(growth, settled=enough)
     growth.weighed = weigh(problem, growth.attempts, growth.columns)
     return growth
 
@@ -139,7 +155,10 @@ def _single_films(growth: Growth, names: Sequence[str]) -> None:
         at = minima(costs, 2)
         ranks[name] = float(costs[at[0]]), grid[at]
     growth.order = sorted(ranks, key=lambda name: ranks[name][0])
-    for name in growth.order[:_TABLES]:
+    close = [
+        x for x in growth.order[_TABLES:_MOST_TABLES] if ranks[x][0] < ranks[growth.order[0]][0] + _CLOSE
+    ]
+    for name in [*growth.order[:_TABLES], *close]:
         growth.add([growth.film(name)], ranks[name][1][:, None])
 
 
@@ -168,73 +187,10 @@ def _effects(growth: Growth) -> None:
         bases.append(others[0])
     tried: dict[str, tuple[float, ...]] = {"roughness": (3.0, 12.0), "thickness_spread": (5.0, 20.0)}
     if any(view.oblique for view in growth.problem.views):
-        tried["angle_shift"] = (-0.5, 0.5)
+        tried["angle_shift"] = (-2.0, -0.4, 0.4, 2.0)
     for base in bases:
         x, layers = base.attempt.x, base.structure.layers
         for effect, starts in tried.items():
             growth.add(layers, [np.append(x, value) for value in starts], effect)
         if growth.oxidised and layers[-1].name != "SiO2" and "SiO2" in growth.order:
-            growth.add([*layers, Material("SiO2", 60.0)], [np.append(x, value) for value in (3.0, 15.0)])
-
-
-def _pairs(growth: Growth) -> None:
-    """Two layers: the best by a scan, and a free index above or below each partner."""
-    most = growth.problem.thickest
-    thick = np.arange(20.0, min(most, 1200.0), 16.0)
-    thin = np.array([6.0, 12, 18, 25, 35, 50, 65, 80, 100, 130, 160, 200, 250])
-    near, far = (np.stack([x.ravel() for x in np.meshgrid(*pair, indexing="ij")], 1)
-                 for pair in ((thick, thin), (thin, thick)))  # fmt: skip
-    grid = np.concatenate([near, far])
-    partners = [x for x in PARTNERS if x in growth.order]
-    tops = list(dict.fromkeys([*growth.order[:3], *partners]))
-    found = []
-    for upper in tops:
-        for lower in tops:
-            late = time.monotonic() > growth.deadline
-            if late or upper == lower or (upper not in partners and lower not in partners):
-                continue
-            pairs = zip(growth.tables(upper), growth.tables(lower), strict=True)
-            costs = scan(growth.scanned, [list(pair) for pair in pairs], grid)
-            best = int(np.argmin(costs))
-            found.append((float(costs[best]), grid[best], upper, lower))
-    found.sort(key=lambda x: x[0])
-    for _, depth, upper, lower in found[:_PAIRS]:
-        growth.add([growth.film(upper), growth.film(lower)], [depth])
-    seen = set()
-    for rank, (_, depth, *names) in enumerate(found[: 2 * _PAIRS]):
-        for i in (0, 1):
-            for partner in dict.fromkeys([names[1 - i], *(partners if rank == 0 else ())]):
-                if (i, partner) in seen:
-                    continue
-                seen.add((i, partner))
-                free = _as_cauchy(growth.tables(names[i])[0])
-                layers = [growth.film("cauchy"), growth.film(partner)]
-                start = [np.array([depth[i], *free]), depth[1 - i : 2 - i]]
-                growth.add(
-                    layers if i == 0 else layers[::-1], [np.concatenate(start if i == 0 else start[::-1])]
-                )
-
-
-def _named(growth: Growth) -> None:
-    """Tables in place of the free index of the best pairs, where two are near it."""
-    growth.weighed = weigh(growth.problem, growth.attempts, growth.columns)
-    view, tried = growth.problem.views[0], {x.structure for x in growth.attempts}
-    pairs = [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]
-    for x in pairs[:_PAIRS]:
-        layers, depths = x.structure.layers, x.structure.thicknesses(x.x[None])[0]
-        for i, layer in enumerate(layers):
-            index = x.structure.index(i, x.x[None], view)[0]
-            distance = {name: float(np.mean(np.abs(view.tables[name] - index))) for name in growth.order}
-            near = sorted(distance, key=lambda name: distance[name])[:3] if layer.name == "cauchy" else []
-            for own in (growth.film(name) for name in near):
-                pair = (*layers[:i], own, *layers[i + 1 :])
-                if Structure(pair) not in tried and pair[0] != pair[1]:
-                    tried.add(Structure(pair))
-                    growth.add(pair, [depths])
-
-
-def _as_cauchy(index: Any) -> tuple[float, float]:
-    """A and B of a free index near a table's."""
-    mean = float(np.mean(index.real))
-    slope = float(np.clip(1.2e4 * (mean - 1) ** 2, 0.0, 9e4))
-    return float(np.clip(mean - slope / 3.6e5, 1.26, 2.8)), slope
+            growth.add([*layers, Material("SiO2", OXIDE)], [np.append(x, value) for value in (3.0, 15.0)])

@@ -15,7 +15,7 @@ from pellicle.fitting.film.fringes import fringes
 from pellicle.fitting.film.other_readings import conventions
 from pellicle.identification import conclusion, films, words
 from pellicle.identification.evidence import Weighed, weigh
-from pellicle.identification.growth import Growth, grown
+from pellicle.identification.growth import Growth, grown, needed
 from pellicle.identification.hypothesis import Identification, NotTried, Outcome
 from pellicle.identification.problem import Problem
 from pellicle.identification.search import THICK, polished
@@ -91,7 +91,7 @@ def _identified(
         better = _better_face(growth.problem, kept[0], spectra, request)
         found = _record(growth, kept, Outcome.UNDECIDED if better else status, "", left_out, request, began)
         return replace(found, verdict=f"{found.verdict} {better}") if better else found
-    for condition, other in _conditions(spectra, request):
+    for condition, other in _conditions(spectra, request, growth):
         if time.monotonic() > deadline:
             break
         again, _ = _grown(*other, deadline, 1)
@@ -126,7 +126,7 @@ def _record(
     hypotheses = conclusion.hypotheses(growth, kept, condition)
     excluded = conclusion.hypotheses(growth, rest, condition)
     substrate = getattr(request.substrate.material, "name", "the substrate")
-    nearest = growth.weighed[0]
+    nearest = next((x for x in growth.weighed if needed(x)), growth.weighed[0])
     noise = problem.short_range_noise(problem.data - nearest.attempt.values)
     channels = np.split(noise, np.cumsum([view.channels for view in problem.views])[:-1])
     return Identification(
@@ -181,7 +181,7 @@ def _optical_path(spectrum: Spectrum) -> float:
 
 
 def _conditions(
-    spectra: Sequence[Spectrum], request: Request
+    spectra: Sequence[Spectrum], request: Request, growth: Growth
 ) -> Iterator[tuple[str, tuple[Sequence[Spectrum], Request]]]:
     """Usual mistakes in what is stated: each in words, with spectra and request without it."""
     below = request.substrate
@@ -197,6 +197,13 @@ def _conditions(
         for words, other in conventions(spectra, [np.inf] * len(spectra)):
             of: Any = other
             yield f"the file has another convention of delta ({words} in place of delta)", (of, request)
+    if "calibration" in request.conditions and any(view.oblique for view in growth.problem.views):
+        off = growth.likely_shift()
+        than = "larger" if off > 0 else "smaller"
+        yield (
+            f"the angle of incidence is {abs(off):g}° {than} than stated",
+            _at_another_angle(spectra, request, off),
+        )
     face = _other_face(spectra, request)
     if face is not None:
         yield face[0], (spectra, face[1])
@@ -238,6 +245,21 @@ def _better_face(problem: Problem, best: Weighed, spectra: Sequence[Spectrum], r
         f"If {face[0]}, the same layers describe the data better (Δ ln Z {gain:.0f}), with a thickness of"
         f" {depth:.4g} ± {error:.2g} nm."
     )
+
+
+def _at_another_angle(
+    spectra: Sequence[Spectrum], request: Request, off: float
+) -> tuple[Sequence[Spectrum], Request]:
+    """Spectra and request with angles of incidence `off` degrees from those stated."""
+    stated = np.asarray(request.light.angle, float)
+    light = replace(request.light, angle=np.where(stated > 0, np.clip(stated + off, 0.0, 89.9), 0.0)[()])
+    turned = [
+        x
+        if x.angle is None
+        else replace(x, angle=np.where(x.angle > 0, np.clip(x.angle + off, 0.0, 89.9), 0.0))
+        for x in spectra
+    ]
+    return turned, replace(request, light=light)
 
 
 def _times_mirror(spectrum: Spectrum, mirror: Any, request: Request) -> Spectrum | None:

@@ -54,6 +54,13 @@ class Metric:
         a, b = (x.T / self.sigma for x in (a, b))
         return a @ b.T - (a @ self._basis.T) @ (b @ self._basis.T).T
 
+    def grams(self, slopes: np.ndarray, residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sᵀ C⁻¹ S and Sᵀ C⁻¹ r of slopes (rows, numbers, values) and residuals (rows, values)."""
+        a, b = slopes / self.sigma, residuals / self.sigma
+        low, low_b = a @ self._basis.T, b @ self._basis.T
+        normal = a @ np.swapaxes(a, 1, 2) - low @ np.swapaxes(low, 1, 2)
+        return normal, np.einsum("rnv,rv->rn", a, b) - np.einsum("rnv,rv->rn", low, low_b)
+
     def costs(self, residuals: np.ndarray) -> np.ndarray:
         """χ² (rows,) of residuals (rows, values)."""
         scaled = residuals / self.sigma

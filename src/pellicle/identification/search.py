@@ -28,10 +28,12 @@ def thickness_grid(problem: Problem) -> np.ndarray:
     return np.union1d(np.geomspace(1.0, min(300.0, most), 40), np.arange(2.0, most, step))
 
 
-def scan(problem: Problem, indices: Sequence[list[np.ndarray]], depth: np.ndarray) -> np.ndarray:
+def scan(
+    problem: Problem, indices: Sequence[list[np.ndarray]], depth: np.ndarray, shift: float = 0.0
+) -> np.ndarray:
     """χ² (rows,) of layers with thicknesses `depth` (rows, layers); `indices` are theirs in each view.
 
-    An index is (padded points,), the same for all rows.
+    An index is (padded points,), the same for all rows; `shift` (degrees) is added to the angle of incidence.
     """
     costs = []
     for first in range(0, len(depth), MANY):
@@ -40,7 +42,7 @@ def scan(problem: Problem, indices: Sequence[list[np.ndarray]], depth: np.ndarra
         for view, own in zip(problem.views, indices, strict=True):
             media = [np.ones_like(own[0])] * (_SCANNED - len(own)) + own
             index = np.broadcast_to(np.stack(media), (len(rows), _SCANNED, view.wavelength.size))
-            values.append(view.simulate(index, np.pad(rows, ((0, 0), (_SCANNED - len(own), 0)))))
+            values.append(view.simulate(index, np.pad(rows, ((0, 0), (_SCANNED - len(own), 0))), shift))
         costs.append(problem.metric.costs(np.concatenate(values, axis=1) - problem.data))
     return np.concatenate(costs)
 

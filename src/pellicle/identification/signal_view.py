@@ -34,26 +34,41 @@ MOST_POINTS, SCANNED_POINTS = 160, 64
 SIGNALS = ("R", "T", "psi-delta")
 
 
-@partial(jax.jit, static_argnames=("signal", "polarisations", "plate_mm"))
-def _rows(
-    index: Any, thickness: Any, media: Any, wavelength: Any, angle: Any, *, signal: str,
-    polarisations: str, plate_mm: float | None,
-) -> Any:  # fmt: skip
+_STATIC = ("signal", "polarisations", "plate_mm")
+
+
+@partial(jax.jit, static_argnames=_STATIC)
+def _rows(index: Any, thickness: Any, media: Any, wavelength: Any, angle: Any, **options: Any) -> Any:
     """Rows (structures, sums, points) of intensities: R or T, or the Stokes sums.
 
     `index` (structures, slots, points), `thickness` (structures, slots), `media` the index of the ambient,
     the substrate and what is behind it, `angle` (structures or 1, points) in radians.
     """
+    layers = [to_pair(index[:, i]) for i in range(index.shape[1])]
+    phases = [2 * jnp.pi * thickness[:, i, None] / wavelength for i in range(index.shape[1])]
+    return _intensities(layers, phases, media, wavelength, angle, **options)
+
+
+@partial(jax.jit, static_argnames=_STATIC)
+def _grid(index: Any, upper: Any, lower: Any, media: Any, wavelength: Any, angle: Any, **options: Any) -> Any:
+    """Intensities (upper, lower, sums, points) of two layers `index` (2, points) in all their thicknesses."""
+    phases = [2 * jnp.pi * x[..., None] / wavelength for x in (upper[:, None], lower[None])]
+    layers = [to_pair(x) for x in index]
+    return _intensities(layers, phases, media, wavelength, angle, **options)
+
+
+def _intensities(
+    layers: list[Any], phases: list[Any], media: Any, wavelength: Any, angle: Any, *, signal: str,
+    polarisations: str, plate_mm: float | None,
+) -> Any:  # fmt: skip
+    """Intensities (..., sums, points) of layers and phases that broadcast to (..., points)."""
     ambient, substrate, behind = media[0].real, to_pair(media[1]), to_pair(media[2])
-    slots = range(index.shape[1])
-    layers = [to_pair(index[:, i]) for i in slots]
-    phases = [2 * jnp.pi * thickness[:, i, None] / wavelength for i in slots]
     front: Any = few_layers(ambient, layers, substrate, phases, angle, polarisations)
     if plate_mm is None and signal == "psi-delta":
-        return jnp.stack(ellipsometry.stokes(*front), axis=1)
+        return jnp.stack(ellipsometry.stokes(*front), axis=-2)
     if plate_mm is None:
         of = reflectance if signal == "R" else transmittance
-        return of(*front)[:, None]
+        return of(*front)[..., None, :]
     a, _ = interface.transverse(ambient, angle)
     q, q_back = interface.normal(substrate, a), interface.normal(behind, a)
     internal = plate.internal_transmittance(to_complex(q).imag, plate_mm, wavelength)
@@ -69,11 +84,11 @@ def _rows(
         else:
             sums.append(plate.plate_reflectance(upper, back, internal))
     if signal != "psi-delta":
-        return jnp.mean(jnp.stack(sums), axis=0)[:, None]
+        return jnp.mean(jnp.stack(sums), axis=0)[..., None, :]
     cross = ellipsometry.cross_products(*front)
     returned = jnp.conj(amplitudes[1]) * amplitudes[0]
     total = plate.multiple_reflections(cross.reflected, cross.passed_twice, cross.below, returned, internal)
-    return jnp.stack(ellipsometry.stokes_from_sums(sums[0], sums[1], total), axis=1)
+    return jnp.stack(ellipsometry.stokes_from_sums(sums[0], sums[1], total), axis=-2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,15 +171,6 @@ class SignalView:
         `shift` is that of the angle of incidence in degrees, `media` stand for those of the view, and with
         `average` (weights, count) each `count` structures are averaged, of which light adds incoherently.
         """
-        of_light = self.spectrum.polarisation
-        pure = self.signal != "psi-delta" and (of_light != "unpolarised" or not self.oblique)
-        letters = (of_light if of_light in ("s", "p") and self.oblique else "s") if pure else "sp"
-        below: Any = self.around.substrate
-        options: Any = {
-            "signal": self.signal,
-            "polarisations": letters,
-            "plate_mm": None if below.back is None else below.plate_mm,
-        }
         media = self.media if media is None else media
         size, rows = (MANY if index.shape[1] < SLOTS else FEW), []
         angle = np.deg2rad(self.angle + np.broadcast_to(shift, len(thickness))[:, None])
@@ -172,13 +178,31 @@ class SignalView:
             part = [_filled(x[first : first + size], size) for x in (index, thickness, angle)]
             light = part[2] if self.oblique else None
             with jax.enable_x64(True):
-                found = _rows(part[0], part[1], media, self.wavelength, light, **options)
+                found = _rows(part[0], part[1], media, self.wavelength, light, **self._options)
             rows.append(np.asarray(found)[: len(thickness) - first, :, : self.points])
         sums = np.concatenate(rows)
         if average is not None:
             weights, count = average
             sums = np.einsum("k,mkcp->mcp", weights, sums.reshape(-1, count, *sums.shape[1:]))
         return self._compared(np.moveaxis(sums, 1, 2)).reshape(len(sums), -1)
+
+    def simulate_grid(self, index: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+        """Simulate values (upper · lower, points · channels) of two layers `index` (2, padded points), each
+        thickness (nm) of the upper with each of the lower."""
+        angle = np.deg2rad(self.angle) if self.oblique else None
+        with jax.enable_x64(True):
+            found = _grid(index, upper, lower, self.media, self.wavelength, angle, **self._options)
+        sums = np.asarray(found)[..., : self.points].reshape(len(upper) * len(lower), -1, self.points)
+        return self._compared(np.moveaxis(sums, 1, 2)).reshape(len(sums), -1)
+
+    @cached_property
+    def _options(self) -> dict[str, Any]:
+        """What the programs are compiled for."""
+        of_light, below = self.spectrum.polarisation, self.around.substrate
+        pure = self.signal != "psi-delta" and (of_light != "unpolarised" or not self.oblique)
+        letters = (of_light if of_light in ("s", "p") and self.oblique else "s") if pure else "sp"
+        plate_mm = None if below.back is None else below.plate_mm
+        return {"signal": self.signal, "polarisations": letters, "plate_mm": plate_mm}
 
     def _compared(self, sums: np.ndarray) -> np.ndarray:
         if self.signal != "psi-delta":

@@ -17,12 +17,16 @@ from pellicle.recipes.dispersion_models import MODELS, build_model
 
 ROUGHEST = 20.0
 """Thickness (nm) of a mixture of half and half up to which it is roughness; more is a layer of its own."""
+OXIDE = 60.0
+"""Largest thickness (nm) of an oxide that grew below a film."""
 _BOUNDS = {
     "roughness": (0.0, ROUGHEST, "nm"),
     "thickness_spread": (0.0, 60.0, "nm"),
     "angle_shift": (-3.0, 3.0, "deg"),
 }
 """Bounds and units of the numbers of effects."""
+_WIDER = {("cauchy", "B"): 2e5, ("sellmeier", "B1"): 10.0, ("sellmeier", "C1"): 1e5}
+"""Upper bounds of models beyond those of a fit: rutile has 1.0e5, 6.1 and 6.3e4 from 450 to 950 nm."""
 _NODES, _WEIGHTS = hermegauss(7)
 
 
@@ -66,7 +70,8 @@ class Structure:
             found.append(Number("thickness", 0.0, layer.most, "nm", i))
             if layer.modelled:
                 specs = MODELS[layer.name].items()
-                found += [Number(key, x.lower, x.upper, "", i) for key, x in specs if x.free]
+                own = [(key, x.lower, _WIDER.get((layer.name, key), x.upper)) for key, x in specs if x.free]
+                found += [Number(*bounds, "", i) for bounds in own]
         for effect in self.effects:
             found.append(Number(effect, *_BOUNDS[effect], None if effect == "angle_shift" else 0))
         return tuple(found)

@@ -57,7 +57,8 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str) -> list[str]:
             f"If {kept[0].condition}, they may be of this: {_lower(_sentence(kept[0], substrate))}.",
         ]
     if len(kept) == 1:
-        return [f"One hypothesis is left, but is not certain: {_lower(_sentence(kept[0], substrate))}."]
+        only = f"One hypothesis is left, but is not certain: {_lower(_sentence(kept[0], substrate))}."
+        return [only, *_effects(kept[0], ())]
     sentences = [f"The data do not decide between {', '.join(names[:_SHOWN])}{more} on {substrate}."]
     main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]
     n = min(x.n[0] for x in main), max(x.n[1] for x in main)

@@ -1,0 +1,210 @@
+"""Structures of two layers: pairs of a few indices on a grid of thicknesses, then those near the best."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from itertools import permutations
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from pellicle.identification.evidence import weigh
+from pellicle.identification.hypothesis import TABLE_UNCERTAINTY
+from pellicle.identification.problem import Problem
+from pellicle.identification.structure import Structure
+
+if TYPE_CHECKING:
+    from pellicle.identification.growth import Growth
+
+PARTNERS = ("MgF2", "SiO2", "SU-8", "alumina", "MgO", "Y2O3", "Si3N4", "Ta2O5", "TiO2")
+"""Materials of two layers: indices from 1.38 to 2.5, at most a tenth apart."""
+_APART = 0.03
+"""Relative difference of the mean index of two layers: less is one film."""
+_CALLED = 8.0
+"""Fall of χ² from one film to two layers from which these can be a rival: a thickness costs 5.5 of ln Z, the
+choice of a material 3.5, and a rival may lie 5 below."""
+_THICK = np.arange(24.0, 1200.0, 24.0)
+_THIN = np.array([6.0, 16, 28, 42, 58, 76, 96, 120, 146, 174, 204, 234])
+"""Thicknesses (nm) of the grid: a minimum is 50 nm wide where n is 2.4."""
+_MINIMA, _ROUNDS, _NEAR, _KEPT, _FREE, _NAMED = 3, 9, 30.0, 8, 3, 4
+"""Starts of a pair, steps from each, χ² above the best and number of pairs that are polished, and of those
+that a free index and near tables follow."""
+
+
+_CHANGE = 0.05
+"""Relative change of an index beyond which another table is nearer."""
+
+
+class Pair(NamedTuple):
+    """Two layers at their best thicknesses (nm), with the factors of their indices, and χ² there."""
+
+    names: tuple[str, str]
+    depth: np.ndarray
+    factors: np.ndarray
+    cost: float
+
+
+def grow(growth: Growth, settled: bool) -> None:
+    """Try two layers. Where one film describes the data (`settled`), only pairs that are far better count."""
+    names = [x for x in dict.fromkeys([*PARTNERS, *growth.order[:2]]) if x in growth.order]
+    pairs = _scanned(growth, names)
+    if settled:
+        single = _single_cost(growth)
+        pairs = [x for x in pairs if x.cost < single - _CALLED]
+    if not pairs:
+        return
+    for pair in [x for x in pairs if x.cost < pairs[0].cost + _NEAR][:_KEPT]:
+        _add(growth, pair.names, pair.depth)
+    seen = set()
+    for pair in pairs[: 2 * _FREE]:
+        for i in (0, 1):
+            partner = pair.names[1 - i]
+            if (i, partner) not in seen and len(seen) < 2 * _FREE:
+                seen.add((i, partner))
+                _with_free_index(growth, pair, i)
+    _named(growth)
+
+
+def _scanned(growth: Growth, names: list[str]) -> list[Pair]:
+    """Pairs of films, the best first: each from the best places of a grid of thicknesses."""
+    problem, most = growth.scanned, growth.problem.thickest
+    mean = {name: float(np.mean(np.abs(growth.tables(name)[0]))) for name in names}
+    chosen = [x for x in permutations(names, 2) if abs(mean[x[0]] / mean[x[1]] - 1) > _APART]
+    starts: list[np.ndarray] = []
+    of: list[tuple[str, str]] = []
+    for pair in chosen:
+        if time.monotonic() > growth.deadline:
+            break
+        index = [np.stack(x) for x in zip(*(growth.tables(name) for name in pair), strict=True)]
+        found = []
+        for upper, lower in ((_THICK, _THIN), (_THIN, _THICK)):
+            values = [v.simulate_grid(own, upper, lower) for v, own in zip(problem.views, index, strict=True)]
+            costs = problem.metric.costs(np.concatenate(values, axis=1) - problem.data)
+            found += _lowest(costs.reshape(len(upper), len(lower)), upper, lower)
+        found = sorted(found, key=lambda x: x[0])[:_MINIMA]
+        starts += [depth for _, depth in found]
+        of += [pair] * len(found)
+    if not of:
+        return []
+    every = [
+        np.stack([[growth.tables(name)[v] for name in pair] for pair in of])
+        for v in range(len(problem.views))
+    ]
+    x, costs = _refined(problem, every, np.stack(starts), np.full((len(of), 2), most))
+    best: dict[tuple[str, str], Pair] = {}
+    for names_, row, cost in sorted(zip(of, x, costs, strict=True), key=lambda entry: entry[2]):
+        best.setdefault(names_, Pair(names_, row[:2], 1 + row[2:], float(cost)))
+    return list(best.values())
+
+
+def _lowest(costs: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """The lowest local minima of a grid of χ², with their thicknesses."""
+    edge = np.pad(costs, 1, constant_values=np.inf)
+    sides = (edge[:-2, 1:-1], edge[2:, 1:-1], edge[1:-1, :-2], edge[1:-1, 2:])
+    places = np.argwhere(np.all([costs <= x for x in sides], axis=0))
+    order = np.argsort(costs[tuple(places.T)])[:_MINIMA]
+    return [(float(costs[i, j]), np.array([upper[i], lower[j]])) for i, j in places[order]]
+
+
+def _refined(
+    problem: Problem, index: list[np.ndarray], depth: np.ndarray, most: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Thicknesses and relative changes of the indices (rows, 4) of many pairs, and χ², after steps of all.
+
+    `index` (rows, 2, padded points) is that of each view, `depth` (rows, 2) where to start, `most` (rows, 2)
+    the largest thicknesses; the changes have the uncertainty of a table. Levenberg-Marquardt.
+    """
+    prior = np.array([0.0, 0.0, *2 * [TABLE_UNCERTAINTY**-2]])
+    upper = np.concatenate([most, np.full_like(most, _CHANGE)], axis=1)
+    lower = np.concatenate([np.zeros_like(most), np.full_like(most, -_CHANGE)], axis=1)
+    x = trial = np.concatenate([np.minimum(depth, most), np.zeros_like(depth)], axis=1)
+    best, damping = np.full(len(x), np.inf), np.full(len(x), 1e-2)
+    normal, gradient = np.zeros((len(x), 4, 4)), np.zeros((len(x), 4))
+    for _ in range(_ROUNDS):
+        values, slopes = _linearised(problem, index, trial)
+        left = problem.data - values
+        cost = problem.metric.costs(left) + trial**2 @ prior
+        better = cost < best
+        own, pull = problem.metric.grams(slopes * (upper > lower)[..., None], left)
+        normal = np.where(better[:, None, None], own + np.diag(prior), normal)
+        gradient = np.where(better[:, None], pull - prior * trial, gradient)
+        x, best = np.where(better[:, None], trial, x), np.where(better, cost, best)
+        damping = np.where(better, damping / 5, damping * 8)
+        diagonal = damping[:, None] * np.einsum("rii->ri", normal) + 1e-9
+        step = np.linalg.solve(normal + diagonal[..., None] * np.eye(4), gradient[..., None])[..., 0]
+        trial = np.clip(x + step, lower, upper)
+    return x, best
+
+
+def _linearised(problem: Problem, index: list[np.ndarray], x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (rows, values) of pairs at thicknesses and index changes `x` (rows, 4), and slopes."""
+    step = np.array([0.05, 0.05, 1e-4, 1e-4])
+    rows = x[:, None] + np.concatenate([np.zeros((1, 4)), np.diag(step)])
+    found = []
+    for view, own in zip(problem.views, index, strict=True):
+        changed = (own[:, None] * (1 + rows[..., 2:, None])).reshape(-1, *own.shape[1:])
+        found.append(view.simulate(changed, rows[..., :2].reshape(-1, 2)).reshape(len(x), 5, -1))
+    values = np.concatenate(found, axis=2)
+    return values[:, 0], (values[:, 1:] - values[:, :1]) / step[:, None]
+
+
+def _single_cost(growth: Growth) -> float:
+    """χ² of the best single film on the points of a scan."""
+    problem = growth.scanned
+    single = [x.attempt for x in growth.weighed if len(x.structure.layers) == 1]
+    values = [problem.simulate(x.structure, x.x[None]) for x in single]
+    tables = [x for x in single if not x.structure.layers[0].modelled and not x.structure.effects]
+    costs = [*problem.metric.costs(np.concatenate(values) - problem.data)]
+    if tables:
+        names = [x.structure.layers[0].name for x in tables]
+        index = [np.stack([[view.tables[name]] * 2 for name in names]) for view in problem.views]
+        depth = np.array([[x.x[0], 0.0] for x in tables])
+        costs += [*_refined(problem, index, depth, depth * 0 + [growth.problem.thickest, 0.0])[1]]
+    return float(min(costs))
+
+
+def _with_free_index(growth: Growth, pair: Pair, position: int) -> None:
+    """Add a pair with a free index in place of one of its tables."""
+    free = as_cauchy(growth.tables(pair.names[position])[0] * pair.factors[position])
+    own, other = [pair.depth[position], *free], [pair.depth[1 - position]]
+    names = ["cauchy", pair.names[1 - position]]
+    start = np.array([*own, *other] if position == 0 else [*other, *own])
+    _add(growth, names if position == 0 else names[::-1], start)
+
+
+def _add(growth: Growth, names: Sequence[str], start: np.ndarray) -> None:
+    """Polish two layers and keep them, unless their indices have become those of one film."""
+    before = len(growth.attempts)
+    growth.add([growth.film(name) for name in names], [start])
+    if len(growth.attempts) == before:
+        return
+    last, view = growth.attempts[-1], growth.problem.views[0]
+    upper, lower = (np.mean(np.abs(last.structure.index(i, last.x[None], view))) for i in (0, 1))
+    if abs(upper / lower - 1) < _APART:
+        growth.attempts.pop()
+
+
+def _named(growth: Growth) -> None:
+    """Tables in place of the free index of the best pairs, where two are near it."""
+    growth.weighed = weigh(growth.problem, growth.attempts, growth.columns)
+    view, tried = growth.problem.views[0], {x.structure for x in growth.attempts}
+    pairs = [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]
+    for x in pairs[:_NAMED]:
+        layers, depths = x.structure.layers, x.structure.thicknesses(x.x[None])[0]
+        for i, layer in enumerate(layers):
+            index = x.structure.index(i, x.x[None], view)[0]
+            distance = {name: float(np.mean(np.abs(view.tables[name] - index))) for name in growth.order}
+            near = sorted(distance, key=lambda name: distance[name])[:3] if layer.name == "cauchy" else []
+            for own in near:
+                pair = tuple(growth.film(own if j == i else x.name) for j, x in enumerate(layers))
+                if Structure(pair) not in tried:
+                    tried.add(Structure(pair))
+                    _add(growth, [x.name for x in pair], depths)
+
+
+def as_cauchy(index: Any) -> tuple[float, float]:
+    """A and B of a free index near a table's."""
+    mean = float(np.mean(index.real))
+    slope = float(np.clip(1.2e4 * (mean - 1) ** 2, 0.0, 9e4))
+    return float(np.clip(mean - slope / 3.6e5, 1.26, 2.8)), slope
