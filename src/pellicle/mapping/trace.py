@@ -33,6 +33,7 @@ from pellicle.mapping.trace_branches import Branches, Start, branches_of, signal
 from pellicle.mapping.trace_fit import Fit, Fitter
 from pellicle.mapping.trace_light import Light, averaged, light_of
 from pellicle.mapping.trace_path import Course
+from pellicle.mapping.trace_turns import Mirrors
 from pellicle.scene.film import Scene
 from pellicle.scene.free import MONOTONIC, SLOWLY
 from pellicle.scene.instrument import Drift
@@ -44,8 +45,6 @@ log = getLogger(__name__)
 
 FEW = 4
 """Most wavelengths of a trace; more are spectra, and each of them has a fit of its own first."""
-_APART = 3.0
-"""Distance in standard errors below which the thicknesses of two fits are the same."""
 _OTHERS, _FAR = 16, 40.0
 """Most other paths whose likelihood is computed, and the Δχ² of the path from which none is."""
 _STRETCH, _LOST = 16, 0.1
@@ -143,62 +142,53 @@ def undecided(model: PixelModel, cube: Cube, where: tuple[slice, ...]) -> BatchF
 
 def _decided(fit: Fitter, light: Light, found: Branches) -> tuple[Start, np.ndarray, list[float]]:
     """The best path by the likelihood of all data, the Δχ² of others in each window (windows,), and times
-    from which one with an abrupt change of the rate fits as well, which only is less probable beforehand."""
+    from which one that turns abruptly, or that does not, is as probable."""
     nearest, used = found.nearest(light.time), np.isfinite(light.values).all(axis=1)
     used = np.flatnonzero(used & found.inside[nearest])
     own = light.part(used)
     centre, size = found.centre[found.inside], len(found.candidates.thickness)
-    path, left, rival, tried = found.path, found.path.rival.copy(), np.full(size, np.inf), -1
-    best, turns = fit(own, found.start_of(path), found), []
+    path, left, rival = found.path, found.path.rival.copy(), np.full(size, np.inf)
+    best, turns = fit(own, found.start_of(path), found), dict[float, float]()
     for _ in range(_OTHERS):
-        turn = None if found.course.turn == np.inf else _turn(best, fit, tried)
-        if turn is not None:
-            tried, before = turn
-            other, start = None, Start(own.time, fit.thickness(best), best.about["kinks"] > 0, before)
-        else:
-            window = int(np.argmin(left))
-            if left[window] >= _FAR:
-                break
-            other = found.without(path, window)
-            left[window] = np.inf
-            left[~found.candidates.same(path.chosen)[np.arange(size), other.chosen]] = np.inf
-            if not np.isfinite(other.price):
-                continue
-            start = found.start_of(other, turns=True)
-        made = fit(own, start, found, best)
-        apart = np.abs(fit.thickness(made) - fit.thickness(best)) > _APART * fit.thickness_error(best)
+        window = int(np.argmin(left))
+        if left[window] >= _FAR:
+            break
+        other = found.without(path, window)
+        left[window] = np.inf
+        left[~found.candidates.same(path.chosen)[np.arange(size), other.chosen]] = np.inf
+        if not np.isfinite(other.price):
+            continue
+        made = fit(own, found.start_of(other, turns=True), found, best)
+        apart = fit.apart(made, best)
         if not apart.any():
             continue  # it leads to the same thicknesses
-        differ = np.interp(centre, own.time, apart) > 0
         above = made.deviance - best.deviance
         log.info("another path, Δχ² %.3g", above)
-        if above > SURE and np.any(made.about["kinks"]) and made.misfit - best.misfit < SURE:
-            turns.append(float(own.time[np.argmax(apart)]))
-        if above < 0:
-            best, rival, above = made, rival - above, -above
-            path = other or found.nearest_path(
-                path, Start(own.time, fit.thickness(made), made.about["kinks"] > 0)
-            )
-        rival[differ] = np.minimum(rival[differ], above)
+        if above < 0:  # others are those of the better path
+            best, path, left, rival = made, other, other.rival.copy(), np.full(size, np.inf)
+        differ = np.interp(centre, own.time, apart) > 0
+        rival[differ] = np.minimum(rival[differ], abs(above))
         if rival.max() < RIVAL:
             break
+    mirrors = Mirrors.of(fit, best) if found.course.turn < np.inf and own.values.shape[1] == 1 else None
+    after = 0
+    while mirrors is not None and (event := mirrors.next(own.time, best, after)) is not None:
+        after = event.at
+        made = min((fit(own, start, found, best) for start in event.starts), key=event.price)
+        apart = fit.apart(made, best)
+        if not apart.any():
+            continue
+        above, differ = event.price(made) - event.price(best), np.interp(centre, own.time, apart) > 0
+        log.info("mirrored at %.4g, Δχ² %.3g", own.time[after], above)
+        if above < 0:  # those before were of the path that is worse
+            best, rival = made, rival - above
+            turns = {time: less - above for time, less in turns.items()}
+        turns[float(own.time[after])] = abs(above)
+        rival[differ] = np.minimum(rival[differ], abs(above))
+    plausible = [time for time, less in turns.items() if less <= SURE]
     every = np.full(len(found.centre), np.inf)
     every[found.inside] = np.minimum(rival, left)
-    return Start(own.time, fit.thickness(best), best.about["kinks"] > 0), every, sorted(set(turns))
-
-
-def _turn(fit: Fit, fitter: Fitter, after: int) -> tuple[int, int] | None:
-    """Positions of the first time behind `after` at which the film turns, and of one a step before it."""
-    rate, error = fit.smoothed.rate[:, fitter.depth], np.sqrt(fit.smoothed.rate_variance[:, fitter.depth])
-    sure = np.flatnonzero(np.abs(rate) > _APART * error)
-    turns = np.flatnonzero(np.diff(np.sign(rate[sure])))
-    for first, last in zip(sure[turns], sure[turns + 1], strict=True):
-        if first <= after:
-            continue
-        thickness = fitter.thickness(fit)
-        far = np.flatnonzero(np.abs(thickness[:last] - thickness[first]) > fitter.step)
-        return int(first), int(far[-1]) if far.size else 0
-    return None
+    return Start(own.time, fit.thickness(best), best.about["kinks"] > 0), every, plausible
 
 
 def _gains(light: Light, fit: Fit, wavelength: np.ndarray, smoothed: Smoothed) -> dict[str, tuple[Any, ...]]:

@@ -33,12 +33,11 @@ _OUTSIDE = 25.0
 
 class Start(NamedTuple):
     """Thickness at times (times,) from which a fit starts, True in `kinks` (times,) if the rate may change
-    abruptly in the step before; and the position up to which the path holds, if it goes on from there."""
+    abruptly in the step before."""
 
     time: np.ndarray
     thickness: np.ndarray
     kinks: np.ndarray
-    until: int | None = None
 
     def along(self, time: np.ndarray) -> np.ndarray:
         """Thickness at any times, by straight lines."""
@@ -87,11 +86,6 @@ class Branches(NamedTuple):
     def nearest(self, time: np.ndarray) -> np.ndarray:
         """The windows of any times."""
         return np.searchsorted(0.5 * (self.centre[1:] + self.centre[:-1]), time)
-
-    def nearest_path(self, path: TracePath, fitted: Start) -> TracePath:
-        """A path by the candidates nearest to thicknesses."""
-        away = np.abs(self.candidates.thickness - fitted.along(self.centre[self.inside])[:, None])
-        return path._replace(chosen=np.nanargmin(away, axis=1))
 
     def gain_of(
         self,

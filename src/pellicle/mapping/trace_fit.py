@@ -16,7 +16,7 @@ from pellicle.fitting.noise import correlation_length
 from pellicle.mapping.pixels import PixelModel
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.trace_branches import Branches, Start, known_ends, signals_at
-from pellicle.mapping.trace_light import LEAST, MIDDLE, Light
+from pellicle.mapping.trace_light import MIDDLE, Light
 from pellicle.scene.free import MONOTONIC, SLOWLY
 
 log = getLogger(__name__)
@@ -24,8 +24,8 @@ log = getLogger(__name__)
 _PASSES, _NEARLY, _SETTLED = 20, 1.0, 0.05
 """Most passes of the smoother, and the changes of all values, in standard errors, below which the stiffness
 is sought again, and which end them."""
-_AHEAD = 80
-"""Most passes more of a path that goes on by a step each pass."""
+_APART = 3.0
+"""Distance in standard errors below which the thicknesses of two fits are the same."""
 _STEP = 0.125
 """Largest change of a thickness in a pass, in wavelengths in the film."""
 
@@ -81,12 +81,13 @@ class Fitter(NamedTuple):
         parameter = self.model.parameters[self.depth]
         return (parameter.upper - parameter.lower) * np.sqrt(fit.smoothed.variance[:, self.depth])
 
+    def apart(self, fit: Fit, other: Fit) -> np.ndarray:
+        """True at times (times,) at which the thickness of a fit is not that of the `other` one."""
+        return np.abs(self.thickness(fit) - self.thickness(other)) > _APART * self.thickness_error(other)
+
     def __call__(self, light: Light, start: Start, found: Branches, rival: Fit | None = None) -> Fit:
         """Smooth, linearise again, and so on until nothing moves; with the weights of the residuals of a
-        `rival`, or those of their own size and correlation.
-
-        A `start` that holds up to some time goes on from there as the film did, by a step each pass.
-        """
+        `rival`, or those of their own size and correlation."""
         depth, own, count = self.depth, len(self.kinds), len(light.time)
         lower, upper = bounds(self.model.parameters)
         kinds = *(SLOWLY if kind == MONOTONIC else kind for kind in self.kinds), *light.shared
@@ -96,29 +97,22 @@ class Fitter(NamedTuple):
         rest[:, depth] = (start.along(light.time) - lower[depth]) / (upper - lower)[depth]
         about, step = _about(light.time, rest[:, depth], start), self.step / (upper - lower)[depth]
         like, fit, moved, settled = None if rival is None else rival.smoothed, None, np.inf, False
-        seen, more = (count, 0) if start.until is None else (max(start.until, LEAST), _AHEAD)
-        for number in range(_PASSES + more):
+        for number in range(_PASSES):
             slope, residual, point = self._linear(light, rest, gain, scales)
             weights = _weights(residual, light, number > 1) if rival is None else rival.weight.copy()
-            weights[seen:] = 0.0
             quadratics = self._quadratics(slope, weights, residual, point)
-            # the stiffness is that of the right path, or of the part that is
-            again = not settled and moved < _NEARLY if seen == count else number == 0
+            again = not settled and moved < _NEARLY  # the stiffness is that of the right path
             like = smooth(light.time, quadratics, kinds, like=None if again else like, **about)
-            settled, change = settled or (again and seen == count), like.mean - point
-            moved = np.max(np.abs(change[:seen]) / np.sqrt(np.maximum(like.variance[:seen], 1e-30)))
+            settled, change = settled or again, like.mean - point
+            moved = np.max(np.abs(change) / np.sqrt(np.maximum(like.variance, 1e-30)))
             log.info("pass %d of the smoother: values moved by up to %.2g standard errors", number + 1, moved)
             constant = np.sum(weights * (residual + np.einsum("tbi,ti->tb", slope, point)) ** 2)
             deviance = like.deviance + float(constant)
             fit = Fit(like, quadratics, slope, weights, residual, kinds, about, scales, deviance)
-            point += change * min(1.0, step / max(float(np.max(np.abs(change[:seen, depth]))), 1e-12))
-            point[seen:] = like.mean[seen:]
+            point += change * min(1.0, step / max(float(np.max(np.abs(change[:, depth]))), 1e-12))
             rest, gain = point[:, :own], light.gains(point[0, own:], gain, scales)
             if settled and moved < _SETTLED:
                 break
-            if seen < count:
-                beyond = np.abs(rest[seen:, depth] - rest[seen - 1, depth]) > step
-                seen += max(int(np.argmax(beyond)), 1) if beyond.any() else len(beyond)
         assert fit is not None
         return fit
 
