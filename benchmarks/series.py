@@ -57,6 +57,7 @@ def window(random, nm):
 FLAWS = {
     "none": (),
     "lamp": ("lamp",),
+    "level": ("level",),
     "window": ("window",),
     "index": ("index",),
     "wavelength": ("wavelength",),
@@ -73,6 +74,7 @@ def draw(random, nm, flaws):
     seen = nm + (random.normal(0, 0.3) if "wavelength" in flaws else 0.0)
     values = reflectance(grown, index, seen)
     values = values * (lamp(random, nm) if "lamp" in flaws else 1.0)
+    values = values * (1 + 0.05 * slow(random)[:, None] if "level" in flaws else 1.0)
     values = values * (window(random, nm) if "window" in flaws else 1.0)
     values = values * (1 + 0.01 * random.standard_normal(values.shape))
     axes = {"time": ("time", TIME, {"units": "s"}), "wavelength": ("wavelength", nm, {"units": "nm"})}
@@ -211,7 +213,7 @@ def main():
     parser.add_argument("--draws", type=int, default=10)
     parser.add_argument("--only", choices=FLAWS)
     parser.add_argument("--narrow", action="store_true", help="600 to 700 nm, else 450 to 900 nm")
-    parser.add_argument("--scale", choices=["free", "slow"], help="of the scene")
+    parser.add_argument("--scale", choices=["free", "slow", "slowly"], help="of the scene; slowly: in time")
     parser.add_argument("--lamp-curve", choices=["joint"], help="one gain against wavelength for all times")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--traces", action="store_true", help="of lasers, in place of spectra")
@@ -219,7 +221,8 @@ def main():
     if given.traces:
         return traces(given.draws, given.seed)
     nm = np.linspace(600, 700, 60) if given.narrow else np.linspace(450, 900, 120)
-    instrument = pl.Instrument(scale=given.scale or 1.0)
+    in_time = given.scale == "slowly"
+    instrument = pl.Instrument(scale={"varies": "slowly"} if in_time else given.scale or 1.0)
     scene = pl.Scene(pl.Layer(1.46, pl.Free(0, 4000)), SUBSTRATE, instrument=instrument)
     print("| not told | " + " | ".join(COLUMNS) + " |\n|---|" + "---|" * len(COLUMNS))
     for name in [given.only] if given.only else FLAWS:

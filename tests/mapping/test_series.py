@@ -153,6 +153,27 @@ def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeyp
 
 
 @pytest.mark.slow
+def test_a_lamp_that_drifts_is_a_state_beside_the_thickness():
+    level = 1 + 0.05 * np.sin(TIME / 300)
+    data = cube(GROWN, seed=4) * xarray.DataArray(level, dims="time")
+    scene = pl.Scene(SCENE.layers, 3.9, instrument=pl.Instrument(scale={"varies": "slowly"}))
+    found = pl.series(data, scene)
+    assert found.decided > 0.95
+    for name, true in {"thickness": GROWN, "scale": level}.items():
+        off = (found[name] - true) / found[f"{name}_stderr_noise"]
+        assert 0.5 < np.sqrt(np.mean(off**2)) < 1.7
+    # a spectrum of 24 values of 0.3 with noise of 0.01 knows its level to 0.7 %
+    assert found["scale_stderr_noise"].median() < 0.003
+    assert (found["scale_stderr"] > found["scale_stderr_noise"]).all()
+
+
+def test_a_level_that_varies_in_time_is_no_curve_of_the_wavelength():
+    for instrument in ({"scale": {"varies": "monotonic"}}, {"offset": {"changes": "slowly"}}):
+        with pytest.raises(ValueError, match="has the key varies, one of slowly, freely, shared"):
+            pl.Instrument(**instrument)
+
+
+@pytest.mark.slow
 def test_a_window_that_no_time_changes_is_a_lamp_curve_of_the_series():
     data = cube(GROWN, seed=4)
     window = 1 + 0.02 * np.sin(2 * np.pi * (NM - 600) / 100)

@@ -125,6 +125,7 @@ def test_an_unknown_key_names_the_nearest(refused, text, said):
         (BASE.replace('"SiO2"', "-1.5"), ("-1.5",)),
         (BASE.replace('"SiO2"', '"gone.csv"'), ("gone.csv",)),
         (BASE + "[instrument]\nscale = 'loose'\n", ("instrument.scale", "'loose'")),
+        (BASE + "[instrument]\nscale = { varies = 'slow' }\n", ("instrument.scale", "varies", "'slow'")),
         ('[scene]\nsubstrate = "Si"\nlayer = []\n', ("scene.layer",)),
         ("[data]\nfile = ['a.csv']\n" + BASE, ("data.file", "go into files")),
         ("[data]\nwavelengths = [400, nan]\n" + BASE, ("data.wavelengths.1", "finite", "nan")),

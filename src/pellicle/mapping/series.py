@@ -25,6 +25,7 @@ from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME, elapsed, first_date
 from pellicle.mapping.lamp import lamp_curve_of
+from pellicle.mapping.lamp_states import LampStates, lamp_states
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.order_path import order_path
 from pellicle.mapping.pixels import PixelModel, prepare
@@ -96,7 +97,9 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None 
     with jax.enable_x64(True):
         joined = (join or _joined)(model, cube, dataset, time, kinds)
         spectra = Spectra(model, cube, joined.used)
-        left = residuals(spectra, time, joined.smoothed.mean) if join is None else joined.beside
+        left = dict(joined.beside)
+        if join is None:
+            left |= residuals(spectra, time, joined.smoothed.mean[:, : len(kinds)])
     found = series_of(made, dataset, model.parameters, times, joined)
     return replace(found, dataset=found.dataset.assign(left))
 
@@ -155,18 +158,23 @@ def _joined(
     units = _start(units[np.arange(used.size), path.chosen], path.rival, kinds)
     along = np.diff(time) / np.median(np.diff(time))
     fastest = 10 * float(np.max(np.abs(np.diff(units[:, depth]) / along))) + 1e-3
-    about = time, kinds, path.breaks, fastest
-    smoothed, quadratics = _settled(spectra, about, units, factor)
-    changes = spectra.responses(np.clip(smoothed.mean, 0.0, 1.0)) / (upper - lower)
+    lamp = lamp_states(model, spectra, units)
+    about = time, (*kinds, *lamp.kinds), path.breaks, fastest
+    smoothed, quadratics = _settled(spectra, about, units, factor, lamp)
+    at = np.clip(smoothed.mean[:, : len(kinds)], 0.0, 1.0)
+    changes = spectra.responses(at) / (upper - lower)
     # together as large as the error of each time alone, which the data may have limited
     size = np.sqrt(np.sum(changes[..., depth] ** 2, axis=1))
-    changes *= (systematic / (upper - lower)[depth] / np.where(size > 0, size, np.inf))[:, None, None]
-    pushes = np.einsum("tij,tkj->tik", quadratics.information, changes)
+    share = systematic / (upper - lower)[depth] / np.where(size > 0, size, np.inf)
+    if lamp.names:
+        pushes = lamp.pushes(spectra, at, share * factor)
+    else:
+        pushes = np.einsum("tij,tkj->tik", quadratics.information, changes * share[:, None, None])
     drift = _DRIFT * np.interp(time, time[[0, -1]], [-1, 1])[:, None, None]
     lasting = np.sqrt(1 - _DRIFT**2 / 3)  # together they keep the mean variance
     pushes = np.concatenate([lasting * pushes, drift * pushes], axis=2)
-    smoothed = smooth(time, quadratics._replace(pushes=pushes), kinds, path.breaks, fastest, smoothed)
-    return Joined(path, smoothed, kinds, used)
+    smoothed = smooth(time, quadratics._replace(pushes=pushes), *about[1:], smoothed)
+    return Joined(path, smoothed, kinds, used, beside=lamp.variables(smoothed, used, len(dataset[TIME])))
 
 
 def _settled(
@@ -174,24 +182,26 @@ def _settled(
     about: tuple[np.ndarray, tuple[str, ...], np.ndarray, float],
     units: np.ndarray,
     factor: np.ndarray,
+    lamp: LampStates,
 ) -> tuple[Smoothed, Quadratics]:
     """Smooth and linearise from `units` (times, parameters) until nothing moves; the misfits times `factor`.
 
-    `about` are times, kinds of change, breaks and the fastest rate.
+    `about` are times, kinds of change of parameters and states of the lamp, breaks and the fastest rate.
     """
     time, kinds, breaks, fastest = about
-    smoothed, none = None, np.zeros((*units.shape, 0))
+    smoothed, none, own = None, np.zeros((len(units), len(kinds), 0)), units.shape[1]
     quadratics = Quadratics(none, none, none)
     for number in range(_PASSES):
         at = np.clip(units, 0.0, 1.0)
-        curved = spectra.quadratic(at)
+        curved, states = lamp.beside(spectra, at, spectra.quadratic(at))
+        at = np.concatenate([at, states], axis=1)
         information = curved.hessian * factor[:, None, None]
         vector = np.einsum("tij,tj->ti", information, at) - curved.gradient * factor[:, None]
         quadratics = Quadratics(vector, information, none)
         like = smoothed if number > 1 else None  # the stiffness is that of the second pass
         smoothed = smooth(time, quadratics, kinds, breaks, fastest, like)
-        moved = np.max(np.abs(smoothed.mean - units) / np.sqrt(np.maximum(smoothed.variance, 1e-30)))
-        units = smoothed.mean
+        mean, variance = smoothed.mean[:, :own], smoothed.variance[:, :own]
+        moved, units = np.max(np.abs(mean - units) / np.sqrt(np.maximum(variance, 1e-30))), mean
         log.info("pass %d of the smoother: values moved by up to %.2g standard errors", number + 1, moved)
         if moved < _SETTLED:
             break

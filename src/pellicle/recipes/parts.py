@@ -356,7 +356,9 @@ def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
 
 def instrument(table: schema.InstrumentTable) -> Instrument:
     """The instrument of a table. Raises UsageError."""
-    return _part(Instrument, table, scale=table.scale, offset=table.offset)
+    levels = {key: getattr(table, key) for key in ("scale", "offset")}
+    levels = {key: vars(x) if isinstance(x, schema.LevelTable) else x for key, x in levels.items()}
+    return _part(Instrument, table, **levels)
 
 
 def instrument_keys(instrument: Instrument) -> dict[str, Any]:
@@ -364,7 +366,9 @@ def instrument_keys(instrument: Instrument) -> dict[str, Any]:
     keys = {}
     for key, slow in (("scale", SLOW_SCALE), ("offset", SLOW_OFFSET)):
         value = getattr(instrument, key)
-        if isinstance(value, Drift):
+        if isinstance(value, Drift) and value == Drift(varies=value.varies) != ONE_NUMBER:
+            keys[key] = {"varies": value.varies}
+        elif isinstance(value, Drift):
             if value not in (slow, ONE_NUMBER):
                 raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
             keys[key] = "slow" if value == slow else "free"

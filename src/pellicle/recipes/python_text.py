@@ -73,7 +73,8 @@ def python_text(thing: Any) -> str:
     if isinstance(thing, StandardUncertainties) and thing == type(thing).none():
         return f"pl.{type(thing).__name__}.none()"
     if isinstance(thing, Drift):
-        return repr("free" if thing == ONE_NUMBER else "slow")
+        words = {"varies": thing.varies} if thing.varies else "free" if thing == ONE_NUMBER else "slow"
+        return repr(words)
     if isinstance(thing, Material | Constant):
         return _medium(thing)
     if isinstance(thing, _Text):

@@ -104,11 +104,17 @@ class GridTable(_Table):
     step: float = Field(gt=0)
 
 
+class LevelTable(_Table):
+    """A gain or an offset that is one number at each time of a series, and how it changes."""
+
+    varies: Literal["slowly", "freely", "shared"]
+
+
 class InstrumentTable(_uncertainties(name for name in _EVERY if name not in _OF_SCENE)):
     """`[instrument]`."""
 
-    scale: Literal["free", "slow"] | float = 1.0
-    offset: Literal["free", "slow"] | float = 0.0
+    scale: Literal["free", "slow"] | LevelTable | float = 1.0
+    offset: Literal["free", "slow"] | LevelTable | float = 0.0
     bandwidth: Number | None = None
     thickness_spread: Number | None = None
     angle_spread: Number | None = None

@@ -6,7 +6,7 @@ from typing import final
 
 import equinox as eqx
 
-from pellicle.scene.free import Free
+from pellicle.scene.free import MONOTONIC, VARIES, Free
 from pellicle.scene.layers import Quantity, check_not_negative, none_if_zero
 
 
@@ -15,17 +15,26 @@ class Drift(eqx.Module):
     """Linear nuisance that each evaluation solves exactly: a polynomial in wavelength.
 
     Degree 0 is one free number. Coefficients of higher degree shrink under normal priors: that of degree j
-    has the standard deviation `width`·2^(1−j) of the signal's own level.
+    has the standard deviation `width`·2^(1−j) of the signal's own level. `varies`: how one number changes in
+    a series, one of `VARIES` but "monotonic"; None, and "freely", for another number at each time.
     """
 
     degree: int = eqx.field(static=True, default=0)
     width: float = eqx.field(static=True, default=0.3)
+    varies: str | None = eqx.field(static=True, default=None)
 
 
 SLOW_SCALE, SLOW_OFFSET, ONE_NUMBER = Drift(3), Drift(2), Drift(0)
 
 
-def _number_or_drift(value: float | str | Drift | Free, slow: Drift, name: str) -> float | Drift:
+def _number_or_drift(
+    value: float | str | dict[str, str] | Drift | Free, slow: Drift, name: str
+) -> float | Drift:
+    if isinstance(value, dict):
+        words = tuple(word for word in VARIES if word != MONOTONIC)
+        if {*value} != {"varies"} or value["varies"] not in words:
+            raise ValueError(f"`{name}` has the key varies, one of {', '.join(words)}, not {value!r}")
+        return Drift(varies=value["varies"])
     if isinstance(value, str):
         drifts = {"free": ONE_NUMBER, "slow": slow}
         if value not in drifts:
@@ -46,7 +55,8 @@ class Instrument(eqx.Module):
 
     **Arguments:**
 
-    - `scale`, `offset`: numbers, "free" (one fitted number) or "slow" (a fitted polynomial in wavelength).
+    - `scale`, `offset`: numbers, "free" (one fitted number) or "slow" (a fitted polynomial in wavelength);
+      {"varies": "slowly"} for one number that changes slowly with the time of a series.
     - `bandwidth`: full width at half maximum in nm.
     - `thickness_spread`: standard deviation of the only layer's thickness over the spot in nm.
     - `angle_spread`: half angle of the cone of light in degrees; or `numerical_aperture`, n₀ times its sine.
