@@ -113,7 +113,7 @@ def _mistakes(seed: int) -> list[Case]:
     for i in range(12):
         film, depth = FILMS[i], (90.0, 200.0, 400.0)[i % 3]
         right = _case("wrong substrate", f"{film} {depth:g} nm", SETTINGS[i % 2], (Layer(film, depth),), seed)
-        stated = "BK7" if right.stated == "Si" else ("SF10" if i % 4 == 1 else "Si")
+        stated = "BK7" if right.stated == "Si" else ("SF10/HOYA" if i % 4 == 1 else "Si")
         found.append(replace(right, stated=stated, expected="mistake"))
         film, depth = FILMS[(i + 3) % 13], (120.0, 300.0)[i % 2]
         right = _case("wrong reference", f"{film} {depth:g} nm", SETTINGS[0], (Layer(film, depth),), seed)

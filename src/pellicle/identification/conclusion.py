@@ -21,9 +21,6 @@ _DEMANDED = 12.0
 """Δ ln Z to the best single film from which a second layer is needed, however thick."""
 NOISY = 2.0
 """Ratio of unexplained residuals to noise above which nothing is identified."""
-USUAL = 3.0
-"""Times its usual size that an effect may have in what is identified: a polymer on nitride was told as two
-oxides with an angle 3.6 times as wrong as usual."""
 MISSTATED = 0.3
 """Shift of the angle of incidence (degrees) above which it was stated wrongly: six times a usual error."""
 _LIKE = 0.02
@@ -58,9 +55,8 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
     parts = list(zip(best.structure.numbers, best.x, best.stderr, strict=True))
     off = any(n.name == "angle_shift" and abs(v) > MISSTATED for n, v, _ in parts)
     lost = any(n.name == "thickness" and v > BARE and not v > SIGNIFICANT * e for n, v, e in parts)
-    strained = best.excess[1] > USUAL
     unlike = all(_like_no_film(problem, x) for x in kept)
-    return Outcome.UNDECIDED if off or strained or lost or unlike else Outcome.IDENTIFIED
+    return Outcome.UNDECIDED if off or lost or unlike else Outcome.IDENTIFIED
 
 
 def _like_no_film(problem: Problem, x: Weighed) -> bool:

@@ -24,6 +24,9 @@ _APART = 0.03
 _CALLED = 8.0
 """Fall of χ² from one film to two layers from which these can be a rival: a thickness costs 5.5 of ln Z, the
 choice of a material 3.5, and a rival may lie 5 below."""
+_NOISE = 1.0
+"""Ratio of the residuals of one film to the noise below which they need no second layer: of an oxide in a
+reflectometer (0.92), 28 nm of MgF2 on it took up what its wavelengths are off."""
 _THICK = np.arange(24.0, 1200.0, 24.0)
 _THIN = np.array([6.0, 16, 28, 42, 58, 76, 96, 120, 146, 174, 204, 234])
 """Thicknesses (nm) of the grid: a minimum is 50 nm wide where n is 2.4."""
@@ -46,7 +49,10 @@ class Pair(NamedTuple):
 
 
 def grow(growth: Growth, settled: bool) -> None:
-    """Try two layers. Where one film describes the data (`settled`), only pairs that are far better count."""
+    """Try two layers. Where one film describes the data (`settled`), only with residuals above the noise, and
+    only pairs that are far better."""
+    if settled and growth.weighed[0].remaining < _NOISE:
+        return
     names = [x for x in dict.fromkeys([*PARTNERS, *growth.order[:2]]) if x in growth.order]
     pairs = _scanned(growth, names)
     if settled:
