@@ -4,7 +4,7 @@ Simulates samples by the tmm package with everyday flaws (`specimens.py`), ident
 with the substrate that is stated, which in some cases is wrong, and compares the answer with the truth:
 confident errors, right answers, undecided ones that list the truth, layers that are not there.
 `--only decisions` checks which further measurement `pl.plan_measurement` expects to decide between rivals,
-by simulating and fitting it.
+by simulating and fitting it. `--real` identifies measurements and files of other programs (`real.py`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 
 import decisions
 import numpy as np
+import real
 from scoring import Answer, described, failures, films, goals, score, table, truth_of, write_csv
 from specimens import Specimen, clean, measured
 from suite import HELD_OUT, SEED, Case, cases
@@ -63,9 +64,13 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=[], help="groups, or parts of names, or decisions")
     parser.add_argument("--every", type=int, default=1, help="only every so-many-th case")
     parser.add_argument("--seed", type=int, default=SEED, help=f"master seed ({SEED}; held out: {HELD_OUT})")
+    parser.add_argument("--real", action="store_true", help="files of measurements and of other programs")
     parser.add_argument("--out", type=Path, help="CSV file of the answers")
     asked = parser.parse_args()
     start()
+    if asked.real:
+        real.report()
+        return
     if asked.only == ["decisions"]:
         decisions.report(asked.seed, asked.every)
         return

@@ -106,6 +106,22 @@ def test_a_wrong_back_face_is_at_most_undecided():
     assert abs(right.best.layers[0].thickness.value - 80) < 3 * right.best.layers[0].thickness.stderr < 5
 
 
+def test_data_beyond_most_tables_are_left_out():
+    """Polystyrene is tabulated from 437 nm on; this one absorbs below 430 nm."""
+    nm = np.linspace(380, 880, 120)
+    film = np.asarray(pl.medium("polystyrene")(np.maximum(nm, 440)), complex)
+    film = film + 0.4j * np.clip((430 - nm) / 20, 0, 1) + 0.3 * np.sin(nm / 5) * (nm < 430)
+    silicon = np.asarray(pl.medium("Si")(nm), complex)
+    values = by_tmm.films("s", nm, (1.0, film, silicon), [300.0])
+    spectrum = pl.Spectrum(nm, values + 0.002 * np.random.default_rng(1).normal(size=nm.size), "R")
+    found = pl.identify(spectrum, "Si", among=["polystyrene", "PMMA"], layers=1, allow=())
+    assert found.status is Outcome.UNDECIDED
+    assert found.best.condition.endswith("nm are compared, which most tables cover")
+    assert "polystyrene" in found.best.layers[0].like
+    assert found.best.layers[0].thickness.value == pytest.approx(300, abs=5)
+    assert found.data[0].wavelength.min() > 430
+
+
 def test_time_that_ends_is_said():
     found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si", budget=0)
     assert found.verdict.endswith("The budget of 0 s ended before all was tried.")

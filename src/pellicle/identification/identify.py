@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pellicle.data.spectrum import Spectrum
+from pellicle.data.spectrum import Spectrum, within
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.fringes import fringes
 from pellicle.fitting.film.other_readings import conventions
@@ -26,7 +26,7 @@ from pellicle.identification.signal_view import (
     check_signal,
     compared_points,
 )
-from pellicle.materials import check_common_range
+from pellicle.materials import Material, check_common_range
 from pellicle.scene.common_range import covered
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.layers import Layer, Substrate, medium
@@ -35,6 +35,9 @@ FEWEST = 20
 """Points below which a spectrum cannot tell structures apart."""
 _USUAL, _FRINGED = 3000.0, 8000.0
 """Largest thickness (nm) that is tried, unless fringes have an optical path of at least the second."""
+_MOST_TABLES = 0.7
+"""Share of the tables that cover a part of the data which is compared alone: films of a spectrometer's whole
+range, from 190 nm, are those of 15 of 35 materials."""
 CONDITIONS = ("calibration", "plate")
 """Statements about a measurement that may be wrong."""
 REFERENCES = ("substrate", "Al")
@@ -94,10 +97,10 @@ def _identified(
     for condition, other in _conditions(spectra, request, growth):
         if time.monotonic() > deadline:
             break
-        again, _ = _grown(*other, deadline, 1)
+        again, rest = _grown(*other, deadline, 1)
         found = [x for x in conclusion.survivors(again.weighed) if x.remaining < conclusion.NOISY]
         if found:
-            return _record(again, found, Outcome.UNDECIDED, condition, left_out, request, began)
+            return _record(again, found, Outcome.UNDECIDED, condition, rest, request, began)
     return _record(growth, [], Outcome.NONE, "", left_out, request, began)
 
 
@@ -183,8 +186,12 @@ def _optical_path(spectrum: Spectrum) -> float:
 def _conditions(
     spectra: Sequence[Spectrum], request: Request, growth: Growth
 ) -> Iterator[tuple[str, tuple[Sequence[Spectrum], Request]]]:
-    """Usual mistakes in what is stated: each in words, with spectra and request without it."""
+    """Usual mistakes in what is stated: each in words, with spectra and request without it; and the part of
+    the data that most tables cover."""
     below = request.substrate
+    if (part := _within_tables(spectra, request)) is not None:
+        low, high = (f(x.wavelength) for f, x in ((min, part[0]), (max, part[0])))
+        yield f"only {low:.0f} to {high:.0f} nm are compared, which most tables cover", (part, request)
     if "calibration" in request.conditions and all(x.signal == "R" for x in spectra):
         for name in REFERENCES:
             mirror = below.material if name == "substrate" else medium(name)
@@ -207,6 +214,19 @@ def _conditions(
     face = _other_face(spectra, request)
     if face is not None:
         yield face[0], (spectra, face[1])
+
+
+def _within_tables(spectra: Sequence[Spectrum], request: Request) -> list[Spectrum] | None:
+    """Spectra at the wavelengths that most tables of materials cover; None where that is all of them, or less
+    than half. Oxides measured from 190 nm on silica are found from 320 nm on alone."""
+    known = [x.wavelength_range for x in map(medium, request.names) if isinstance(x, Material)]
+    if not known:
+        return None
+    low = float(np.quantile([x for x, _ in known], _MOST_TABLES))
+    high = float(np.quantile([x for _, x in known], 1 - _MOST_TABLES))
+    part = [within(x, (low, high), "tables of most materials end there") for x in spectra]
+    whole = all(len(a) == len(b) for a, b in zip(part, spectra, strict=True))
+    return None if whole or min(map(len, part)) < FEWEST else part
 
 
 def _other_face(spectra: Sequence[Spectrum], request: Request) -> tuple[str, Request] | None:

@@ -8,6 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from pellicle.files import new_folder
 from pellicle.fitting.status import describe
 from pellicle.identification.hypothesis import Hypothesis, Identification, Outcome, SupposedLayer
@@ -112,6 +114,9 @@ def write_identification(
     contents = {REPORT: report(found), PAGE: identification_page(found)}
     files = list(dict.fromkeys(x.path for x in found.data if x.path))
     options = dict(reading) | ({"joint": True} if len(files) > 1 else {})
+    if any(x.left_out is not None for x in found.data):
+        nm = np.concatenate([x.wavelength for x in found.data])
+        options["range"] = [float(nm.min()), float(nm.max())]
     for number, x in enumerate(found.hypotheses, 1):
         contents[f"{number}.toml"] = recipe_text(
             x.scene(), target, files=[] if tables else files, reading=options, tables=tables
