@@ -76,11 +76,9 @@ def paths(thickness, colour=False, turn=TURN, **about):
 @pytest.mark.parametrize(
     ("thickness", "colour"),
     [
-        # 13 s of processor time; the command below follows the same film
-        pytest.param(wedge(20.0), False, id="it gets black", marks=pytest.mark.slow),
+        pytest.param(wedge(20.0), False, id="it gets black"),
         pytest.param(front(40.0), False, id="black film spreads"),
-        # the film in colour that gets black is in every run
-        pytest.param(wedge(60.0), True, id="in colour, never black", marks=pytest.mark.slow),
+        pytest.param(wedge(60.0), True, id="in colour, never black"),
         pytest.param(wedge(20.0), True, id="in colour"),
     ],
 )

@@ -69,11 +69,12 @@ def trace_path(time: np.ndarray, candidates: Candidates, course: Course = ANY) -
 
     Where turning has a price, a film that only grows, one that only thins, and one that turns are rivals.
     """
+    steps = _steps_of(time, candidates)
     if course.turn == 0:
-        return _path(time, candidates, 0, course.far)
-    found = [_path(time, candidates, way, course.far) for way in (1, -1)]
+        return _path(candidates, steps, 0, course.far)
+    found = [_path(candidates, steps, way, course.far) for way in (1, -1)]
     if course.turn < np.inf:
-        free = _path(time, candidates, 0, course.far)
+        free = _path(candidates, steps, 0, course.far)
         found.append(free._replace(price=free.price + course.turn))
     best = min(found, key=lambda path: path.price)
     with np.errstate(invalid="ignore"):
@@ -81,45 +82,60 @@ def trace_path(time: np.ndarray, candidates: Candidates, course: Course = ANY) -
     return best._replace(rival=np.min(np.nan_to_num(rivals, nan=np.inf, posinf=np.inf), axis=0))
 
 
-def _path(time: np.ndarray, candidates: Candidates, way: int, far: float) -> TracePath:
-    """The cheapest path that changes in this `way`: 1 grows, −1 thins, 0 does either."""
-    thickness, delta, stderr = candidates
+class _Steps(NamedTuple):
+    """Steps from each window to the next, which all courses share: the nearest candidates `before` each
+    (windows - 1, candidates, those before), and length (nm) and noise of each step, of the same shape.
+
+    `prices` (candidates, those before, those before these) are of changes of the rate, from the third window.
+    """
+
+    before: np.ndarray
+    length: np.ndarray
+    noise: np.ndarray
+    prices: list[np.ndarray]
+
+
+def _steps_of(time: np.ndarray, candidates: Candidates) -> _Steps:
+    thickness, _, stderr = candidates
     there = np.isfinite(thickness)
-    cost, sigma = np.where(there, delta, np.inf), np.where(there, stderr, 1.0)
-    place, steps = np.where(there, thickness, 1e9), np.diff(time)
-    count, size = thickness.shape
-    near = min(_NEAR, size)
-    # states: a candidate, and one of those nearest to it in the window before
-    before = np.argsort(np.abs(place[1:, :, None] - place[:-1, None, :]), axis=2, kind="stable")[..., :near]
+    place, sigma = np.where(there, thickness, 1e9), np.where(there, stderr, 1.0)
+    away = place[1:, :, None] - place[:-1, None, :]
+    before = np.argsort(np.abs(away), axis=2, kind="stable")[..., : min(_NEAR, thickness.shape[1])]
+    length = np.take_along_axis(away, before, axis=2)
+    last = np.take_along_axis(np.broadcast_to(sigma[:-1, None, :], away.shape), before, axis=2)
+    own, duration = np.broadcast_to(sigma[1:, :, None], last.shape), np.diff(time)
 
     def price(t: int) -> np.ndarray:
-        """Prices (candidates at t, those before, those before these) of changes of the rate."""
-        i, ratio = before[t - 1], steps[t - 1] / steps[t - 2]
-        j = before[t - 2][i]
-        step = place[t][:, None, None] - place[t - 1][i][..., None]
-        last = ratio * (place[t - 1][i][..., None] - place[t - 2][j])
-        bend = 0.5 * _BEND * (np.abs(step) + np.abs(last))
-        noise = [sigma[t][:, None, None], (1 + ratio) * sigma[t - 1][i][..., None], ratio * sigma[t - 2][j]]
-        return np.minimum((step - last) ** 2 / (bend**2 + sum(x**2 for x in noise)), KINK)
+        i, ratio = before[t - 1], duration[t - 1] / duration[t - 2]
+        step, past = length[t - 1][..., None], ratio * length[t - 2][i]
+        bend = 0.5 * _BEND * (np.abs(step) + np.abs(past))
+        middle, first = (1 + ratio) * last[t - 1][..., None], ratio * last[t - 2][i]
+        noise = bend**2 + (own[t - 1][..., None] ** 2 + middle**2 + first**2)
+        return np.minimum((step - past) ** 2 / noise, KINK)
 
-    def forbidden(t: int) -> np.ndarray:
-        """Prices of long steps (candidates at t, those before), infinite for those in the wrong way by more
-        than the noise."""
-        i = before[t - 1]
-        step = place[t][:, None] - place[t - 1][i]
-        wrong = way * step < -3 * np.hypot(sigma[t][:, None], sigma[t - 1][i])
-        return np.where(wrong, np.inf, LEAP * np.maximum(np.abs(step) / far - 1, 0.0))
+    return _Steps(before, length, np.hypot(own, last), [price(t) for t in range(2, len(time))])
+
+
+def _path(candidates: Candidates, steps: _Steps, way: int, far: float) -> TracePath:
+    """The cheapest path that changes in this `way`: 1 grows, −1 thins, 0 does either."""
+    there = np.isfinite(candidates.thickness)
+    cost, (count, size) = np.where(there, candidates.delta, np.inf), there.shape
+    # states: a candidate, and one of those nearest to it in the window before
+    before, prices, near = steps.before, [np.empty(0)] * 2 + steps.prices, steps.before.shape[2]
+    # of long steps, infinite for those in the wrong way by more than the noise
+    leaps = LEAP * np.maximum(np.abs(steps.length) / far - 1, 0.0)
+    paid_at = cost[1:, :, None] + np.where(way * steps.length < -3 * steps.noise, np.inf, leaps)
 
     forward, origin = np.empty((count, size, near)), np.zeros((count, size, near), int)
-    forward[1] = cost[0][before[0]] + cost[1][:, None] + forbidden(1)
+    forward[1] = cost[0][before[0]] + paid_at[0]
     for t in range(2, count):
-        total = forward[t - 1][before[t - 1]] + price(t)
+        total = forward[t - 1][before[t - 1]] + prices[t]
         origin[t] = np.argmin(total, axis=2)
-        forward[t] = np.min(total, axis=2) + cost[t][:, None] + forbidden(t)
+        forward[t] = np.min(total, axis=2) + paid_at[t - 1]
     backward, least = np.zeros((size, near)), np.full((count, size), np.inf)
     least[-1] = forward[-1].min(axis=1)
     for t in range(count - 1, 1, -1):
-        ahead = price(t) + (cost[t][:, None] + forbidden(t) + backward)[..., None]
+        ahead = prices[t] + (paid_at[t - 1] + backward)[..., None]
         backward = np.full((size, near), np.inf)
         np.minimum.at(backward, before[t - 1], ahead)
         least[t - 1] = np.min(forward[t - 1] + backward, axis=1)
@@ -129,7 +145,7 @@ def _path(time: np.ndarray, candidates: Candidates, way: int, far: float) -> Tra
     with np.errstate(invalid="ignore"):
         left = np.nan_to_num(least - best, nan=np.inf, posinf=np.inf)
     left[candidates.same(chosen)] = np.inf
-    paid = [price(t)[chosen[t], pairs[t], pairs[t - 1]] for t in range(2, count)]
+    paid = [prices[t][chosen[t], pairs[t], pairs[t - 1]] for t in range(2, count)]
     kinks = np.pad(np.array(paid) >= KINK, 1)
     return TracePath(chosen, left.min(axis=1), best, kinks)
 
