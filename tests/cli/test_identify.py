@@ -68,3 +68,10 @@ def test_what_is_missing_is_said(pellicle, film):
         in pellicle("identify", film, "--substrate", "Si", "--allow", "layers=x", code=2).err
     )
     assert "Sii" in pellicle("identify", film, "--substrate", "Sii", code=2).err
+    for flags, message in (
+        (("--budget", "-3"), "--budget must be above 0 seconds"),
+        (("--family", "metals"), "no family 'metals'"),
+        (("--among", "SiO2,Foo"), "unknown material 'Foo'"),
+        ((film,), "is named twice"),
+    ):
+        assert message in pellicle("identify", film, *flags, "--substrate", "Si", code=2).err

@@ -163,9 +163,10 @@ def test_what_cannot_be_identified(refuses):
     spectrum = reflectance(("SiO2", 300.0))
     few = pl.Spectrum(NM[:12], spectrum.values[:12], "R")
     counts = pl.Spectrum(NM, spectrum.values * 1000, "counts", calibrated=False)
-    ratio = pl.Spectrum(NM, np.full(NM.size, 30.0), "psi-delta", delta=np.full(NM.size, 90.0))
+    ratio = pl.Spectrum(NM, np.linspace(30.0, 31.0, NM.size), "psi-delta", delta=np.full(NM.size, 90.0))
     for data, given, message in (
         (few, {}, "12 points are too few"),
+        (pl.Spectrum(NM, np.full(NM.size, 0.2), "R"), {}, "all values are 0.2"),
         (counts, {}, "cannot be identified: give calibrated"),
         (ratio, {}, "need the `angle` of incidence"),
         (spectrum, {"family": "oxides"}, "no family 'oxides'"),

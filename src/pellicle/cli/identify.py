@@ -55,13 +55,17 @@ def identify(
         raise UsageError("no data: name the files, as in pellicle identify oxide.csv --substrate Si")
     if substrate is None:
         raise UsageError("no substrate: an identification needs it, as in --substrate Si")
+    if twice := [path for i, path in enumerate(paths) if path in paths[:i]]:
+        raise UsageError(f"{twice[0]} is named twice: each file counts as a measurement of its own")
     check_words(options)
     given: dict[str, Any] = {"back": back, "ambient": ambient, "family": family}
     given = {name: value for name, value in given.items() if value is not None} | _allowed(allow)
     if budget is not None:
         given["budget"] = parse_number(budget.removesuffix("s"), "`budget`", "seconds, as in 20s")
+        if given["budget"] <= 0:
+            raise UsageError(f"--budget must be above 0 seconds, not {budget}")
     if among is not None:
-        given["among"] = [word.strip() for word in among.split(",")]
+        given["among"] = [word.strip() for word in among.split(",") if word.strip()]
     if out is not None:
         check_folder(out)
     start()
@@ -78,6 +82,7 @@ def _identify(
     json: bool,
 ) -> int:
     from pellicle.api.identification import identify as identified
+    from pellicle.identification.films import chosen
     from pellicle.recipes.media import medium
     from pellicle.reporting.identification import failure, report, to_json, write_identification
 
@@ -85,6 +90,8 @@ def _identify(
         if name in given:
             given[name] = medium(given[name], name=f"`{name}`")
     below = medium(substrate, name="`substrate`")
+    for material in chosen(given.get("among"), given.get("family")):
+        medium(material, name="`among`")
     several = options.angle if isinstance(options.angle, list) else []
     if several and len(several) != len(paths):
         raise UsageError(

@@ -152,6 +152,8 @@ def check(spectrum: Spectrum, request: Request) -> None:
         raise DataError(
             f"{name}: {len(spectrum)} points are too few to tell films apart: give at least {FEWEST}"
         )
+    if not np.ptp(spectrum.values):
+        raise DataError(f"{name}: all values are {spectrum.values[0]:g}, so there is nothing to identify")
     oblique = spectrum.angle is not None or np.any(np.asarray(request.light.angle) > 0)
     if spectrum.signal == "psi-delta" and not oblique:
         raise UsageError(f"{name}: psi and delta need the `angle` of incidence, and the data do not state it")
