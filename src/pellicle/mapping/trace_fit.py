@@ -26,6 +26,8 @@ _PASSES, _NEARLY, _SETTLED = 20, 1.0, 0.05
 is sought again, and which end them."""
 _APART = 3.0
 """Distance in standard errors below which the thicknesses of two fits are the same."""
+_LEAST = 1e-6
+"""Least of the fastest rates."""
 _STEP = 0.125
 """Largest change of a thickness in a pass, in wavelengths in the film."""
 
@@ -95,7 +97,8 @@ class Fitter(NamedTuple):
         scales = np.stack([2 * found.gain[:, 0], 8 * np.nanmax(np.abs(light.values), axis=0)], axis=1)
         gain, rest = found.gain.copy(), np.tile(found.start, (count, 1))
         rest[:, depth] = (start.along(light.time) - lower[depth]) / (upper - lower)[depth]
-        about, step = _about(light.time, rest[:, depth], start), self.step / (upper - lower)[depth]
+        about = _about(light.time, rest[:, depth], start, rival)
+        step = self.step / (upper - lower)[depth]
         like, fit, moved, settled = None if rival is None else rival.smoothed, None, np.inf, False
         for number in range(_PASSES):
             slope, residual, point = self._linear(light, rest, gain, scales)
@@ -150,12 +153,17 @@ class Fitter(NamedTuple):
         return Quadratics(vector, information, np.zeros((*vector.shape, 0)))
 
 
-def _about(time: np.ndarray, thickness: np.ndarray, start: Start) -> dict[str, Any]:
-    """Breaks, of which a trace has none, fastest rate and kinks, as the smoother takes them."""
-    usual = float(np.max(np.abs(np.diff(thickness) / np.diff(time)))) * float(np.median(np.diff(time)))
+def _about(time: np.ndarray, thickness: np.ndarray, start: Start, rival: Fit | None) -> dict[str, Any]:
+    """Breaks, of which a trace has none, fastest rate and kinks, as the smoother takes them; the prior of
+    rates is that of the `rival`, with which the fit is compared."""
+    if rival is None:
+        usual = float(np.max(np.abs(np.diff(thickness) / np.diff(time)))) * float(np.median(np.diff(time)))
+    else:
+        usual = 0.1 * (rival.about["fastest"] - _LEAST)
     bent = start.bent(time)
-    kinks = bent * usual**2 / max(int(bent.sum()), 1)
-    return {"breaks": np.zeros(len(time), bool), "fastest": 10 * usual + 1e-6, "kinks": kinks}
+    run = np.cumsum(np.diff(bent, prepend=False) & bent)  # steps in which one change of the rate may be
+    kinks = bent * usual**2 / np.maximum(np.bincount(run, bent)[run], 1)
+    return {"breaks": np.zeros(len(time), bool), "fastest": 10 * usual + _LEAST, "kinks": kinks}
 
 
 def _weights(residual: np.ndarray, light: Light, later: bool) -> np.ndarray:
