@@ -17,7 +17,7 @@ from jax.core import Tracer
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media, require_isotropic
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import UsageError
-from pellicle.scene.free import Free, is_free
+from pellicle.scene.free import Free, free_leaves, is_free
 from pellicle.scene.graded import AtDepth, Graded, face
 from pellicle.scene.groups import listed
 from pellicle.scene.instrument import Instrument
@@ -178,8 +178,8 @@ class Scene(eqx.Module):
             object.__setattr__(self, name, part)
         if not self.layers:
             raise ValueError("a scene needs at least one layer; a bare surface is a layer of thickness 0")
-        names = [x.name for x in self.layers if x.name]
-        if twice := [name for name in names if names.count(name) > 1]:
+        fitted = [x.name for x in self.layers if x.name and free_leaves(x)]  # repeats of a layer share a name
+        if twice := [name for name in fitted if fitted.count(name) > 1]:
             raise UsageError(f"two layers are named {twice[0]!r}: give each a name of its own")
         if any(isinstance(a, Interface) and isinstance(b, Interface) for a, b in pairwise(self.layers)):
             raise ValueError("two interfaces are adjacent: an interface mixes the media at its sides")
