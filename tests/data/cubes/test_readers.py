@@ -235,6 +235,14 @@ def test_a_series_in_time(values, tmp_path):
     np.testing.assert_allclose(np.asarray(cube.arrays["values"])[1], values / 2)
 
 
+def test_a_table_with_a_column_for_each_time_says_of_none_that_it_is_ignored(write):
+    rows = "\n".join(f"{nm:g},0.{i}1,0.{i}2,0.{i}3" for i, nm in enumerate(NM))
+    cube = read_cube([Path(write(f"wavelength_nm,0 s,2 s,4 s\n{rows}\n"))], signal="R")
+    assert cube.coords["time"].tolist() == [0.0, 2.0, 4.0]
+    assert "wavelength unit: nm" in cube.notes
+    assert not any("ignored" in note or "'0 s'" in note for note in cube.notes)
+
+
 def test_wavelengths_of_metadata(values, same, tmp_path):
     stack = values.transpose(2, 0, 1)
     channel = {"EmissionWavelength": list(NM), "EmissionWavelengthUnit": ["nm"] * 9}

@@ -63,6 +63,7 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
         told = f"{b} has the time of {a}, {time[order[twice[0]]]:g} {unit}"
         raise DataError(f"{paths[0] if len(paths) == 1 else paths[0].parent}: {told}: leave one of them out")
     first, arrays, wavelength, angle = spectra[0], *_arrays([spectra[i] for i in order])
+    shared = [note for note in first.notes if all(note in one.notes for one in spectra)]  # not of its columns
     return RawCube(
         str(paths[0].parent if len(paths) > 1 else paths[0]),
         arrays,
@@ -77,7 +78,7 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
         angle=angle,
         coords={TIME: np.asarray(time, float)[order]},
         units={TIME: unit},
-        notes=(f"{len(spectra)} spectra, times from {where}", *first.notes),
+        notes=(f"{len(spectra)} spectra, times from {where}", *shared),
     )
 
 
