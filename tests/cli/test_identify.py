@@ -56,6 +56,9 @@ def test_files_at_several_angles_are_one_sample(pellicle, tmp_path):
     assert abs(value - 300) < 3 * stderr
     assert (out / "1.toml").read_text().count("[[data.file]]") == 2
     assert re.findall(r"angle = (.+)", (out / "1.toml").read_text()) == ["10", "60"]
+    stated = ("--angle", "10", "--polarisation", "s", *flags[:-1])
+    pellicle("identify", paths[0], *stated, tmp_path / "stated")
+    assert pl.read_recipe(tmp_path / "stated" / "1.toml").scene().light.polarisation == "s"
     told = pellicle("identify", *paths, "--angle", "10,50,60", "--substrate", "Si", code=2).err
     assert "--angle has 3 angles for 2 files" in told
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -117,9 +118,12 @@ def write_identification(
     if any(x.left_out is not None for x in found.data):
         nm = np.concatenate([x.wavelength for x in found.data])
         options["range"] = [float(nm.min()), float(nm.max())]
+    stated = {name: x for name, x in options.items() if name in ("signal", "polarisation", "transmission")}
     for number, x in enumerate(found.hypotheses, 1):
+        scene = x.scene()
+        scene = replace(scene, light=replace(scene.light, **stated))  # as the recipe states it
         contents[f"{number}.toml"] = recipe_text(
-            x.scene(), target, files=[] if tables else files, reading=options, tables=tables
+            scene, target, files=[] if tables else files, reading=options, tables=tables
         )
     return write_result(target, to_json(found), contents | {"figure.png": draw(found)})
 
