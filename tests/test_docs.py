@@ -43,6 +43,7 @@ EXIT_4 = (
     "pellicle fit docs/examples/wedge.png --region 98,5,5,14 --layer SiO2 --substrate Si --thickness 10:800",
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
+    "pellicle fit film.csv --layer TiO2 --substrate Si",
 )
 """Their fits do not converge to one answer (exit code 4), as their pages say."""
 SLOW = (
@@ -50,6 +51,8 @@ SLOW = (
     "pellicle fit --recipe found/1.toml",  # identification/test_identify.py
     # compile for 4 to 30 s; what the test that is named covers
     "pellicle fit docs/examples/oxide_um_percent.csv --recipe docs/examples/oxide.rcp",  # recipes
+    "pellicle fit film.csv --recipe docs/examples/two_layers.toml",  # fitting/film/test_search.py
+    "pellicle fit film.csv --layer TiO2",
     "pellicle fit turned.csv --recipe docs/examples/tilted_azimuths.toml",  # fitting/film/test_generalised.py
     "pellicle simulate docs/examples/tilted_azimuths.toml --out turned.csv",  # forward_model
     "pellicle simulate docs/examples/mica.toml --out flake.csv --seed 1",  # signals/test_mica.py
