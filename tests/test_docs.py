@@ -109,6 +109,9 @@ ELSEWHERE = (
     "source .venv/bin/activate",  # a shell builtin; make fit creates the folder
     "pellicle fit wafer.txt --layer cauchy --substrate Si",  # a file of the reader
     "pellicle demo",  # cli/test_demo_command.py
+    # compiles for half a minute; fitting/film/test_index_curves.py, dispersion/test_spline.py
+    'pellicle fit measurements/hematite_on_glass_140nm.csv --layer "spline-kk(400,470,540,610,690,780)"'
+    " --substrate BK7 --thickness 10:1000 --out results/hematite_k",
     # serve a page until they are interrupted; explorer/test_server.py
     *("pellicle explore", "pellicle explore docs/examples/oxide.toml"),
     "pellicle explore --layer TiO2 --substrate BK7 --back air --signal T",
