@@ -68,11 +68,15 @@ def test_holomorphic_style_gradient_of_a_complex_index(function):
     assert complex(slope) == pytest.approx(complex(dn, -dk), rel=1e-12)
 
 
-def test_wavelengths_of_jax_are_known_in_a_program():
+def test_arrays_of_jax_are_known_in_a_program():
     """An array that a program closes over is no argument of it, but JAX traces what is computed of it."""
-    wavelength = jnp.array([500.0, 600.0])
-    traced = jax.eval_shape(lambda d: pl.reflectance(wavelength, d, 1.46, 3.9), 300.0)
-    assert traced.shape == (2,)
+    wavelength, wafer = jnp.array([500.0, 600.0]), jnp.array([3.9 + 0.02j, 4.1 + 0.04j])
+    for below in (3.9, wafer):
+        traced = jax.eval_shape(lambda d, below=below: pl.reflectance(wavelength, d, 1.46, below), 300.0)
+        assert traced.shape == (2,)
+    amplifying = wafer.conj()
+    with pytest.raises(UsageError, match="which is gain"):
+        jax.eval_shape(lambda d: pl.reflectance(wavelength, d, 1.46, amplifying), 300.0)
 
 
 @BOTH

@@ -132,8 +132,9 @@ def index_at(what: Medium, wavelength) -> Any:
             if hasattr(principal, "check_range"):
                 principal.check_range(np.asarray(wavelength))
         return material.index(wavelength)
-    if not isinstance(what, Tracer) and np.iscomplexobj(what) and np.any(np.imag(what) < 0):
-        gain = np.ravel(what)[np.argmin(np.imag(what))]
+    # of NumPy's copy, as in `check_numbers`
+    if not isinstance(what, Tracer) and np.iscomplexobj(what) and np.any(np.asarray(what).imag < 0):
+        gain = np.ravel(what)[np.argmin(np.asarray(what).imag)]
         raise UsageError(
             f"index {gain:g} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
         )
