@@ -196,16 +196,18 @@ def test_a_dropped_file_is_drawn_and_fitted(opened):
     assert agrees(page, float(box.input_value()), atol=1e-4)
 
 
-def test_a_click_on_a_film_that_is_left_shows_it(opened):
-    page = opened()
-    drop(page, "wafer.csv", csv())
-    page.locator(".notes").get_by_text("wafer.csv").first.wait_for()
-    page.get_by_role("button", name="Which film?").click()
-    page.get_by_role("button", name="Show SiO2", exact=True).click(timeout=120_000)
-    settle(page)
-    assert float(number(page).input_value()) == pytest.approx(320.0, abs=8.0)
-    assert len(curve(page, "R data")) == 91
-    assert "SiO2" in page.locator(".fitted").inner_text()
+def test_a_click_on_a_film_that_is_left_shows_it(browser, tmp_path):
+    """In a session of its own, whose scene becomes that of the film."""
+    with explorer(tmp_path, RECIPE) as (_, address), opening(browser, address) as open_page:
+        page = open_page()
+        drop(page, "wafer.csv", csv())
+        page.locator(".notes").get_by_text("wafer.csv").first.wait_for()
+        page.get_by_role("button", name="Which film?").click()
+        page.get_by_role("button", name="Show SiO2", exact=True).click(timeout=120_000)
+        settle(page)
+        assert float(number(page).input_value()) == pytest.approx(320.0, abs=8.0)
+        assert len(curve(page, "R data")) == 91
+        assert "SiO2" in page.locator(".fitted").inner_text()
 
 
 BAD = {
