@@ -132,12 +132,13 @@ def index_at(what: Medium, wavelength) -> Any:
             if hasattr(principal, "check_range"):
                 principal.check_range(np.asarray(wavelength))
         return material.index(wavelength)
-    # of NumPy's copy, as in `check_numbers`
-    if not isinstance(what, Tracer) and np.iscomplexobj(what) and np.any(np.asarray(what).imag < 0):
-        gain = np.ravel(what)[np.argmin(np.asarray(what).imag)]
-        raise UsageError(
-            f"index {gain:g} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
-        )
+    if not isinstance(what, Tracer) and np.iscomplexobj(what):
+        known: Any = np.ravel(np.asarray(what, complex))  # NumPy's copy, as in `check_numbers`
+        if (gain := known[known.imag < 0]).size:
+            raise UsageError(
+                f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
+                " absorption is n + ik with k ≥ 0"
+            )
     return to_pair(floating(what))
 
 
