@@ -197,7 +197,7 @@ class SignalView:
 
     @cached_property
     def _options(self) -> dict[str, Any]:
-        """What the programs are compiled for."""
+        """Static arguments of the compiled programs."""
         of_light, below = self.spectrum.polarisation, self.around.substrate
         pure = self.signal != "psi-delta" and (of_light != "unpolarised" or not self.oblique)
         letters = (of_light if of_light in ("s", "p") and self.oblique else "s") if pure else "sp"

@@ -356,9 +356,8 @@ def reference_tables(reference: Reference, folder: Path) -> dict[str, Any]:
 
 def instrument(table: schema.InstrumentTable) -> Instrument:
     """The instrument of a table. Raises UsageError."""
-    levels = {key: getattr(table, key) for key in ("scale", "offset")}
-    levels = {key: vars(x) if isinstance(x, schema.LevelTable) else x for key, x in levels.items()}
-    return _part(Instrument, table, **levels)
+    levels = [vars(x) if isinstance(x, schema.LevelTable) else x for x in (table.scale, table.offset)]
+    return _part(Instrument, table, scale=levels[0], offset=levels[1])
 
 
 def instrument_keys(instrument: Instrument) -> dict[str, Any]:
@@ -366,12 +365,12 @@ def instrument_keys(instrument: Instrument) -> dict[str, Any]:
     keys = {}
     for key, slow in (("scale", SLOW_SCALE), ("offset", SLOW_OFFSET)):
         value = getattr(instrument, key)
-        if isinstance(value, Drift) and value == Drift(varies=value.varies) != ONE_NUMBER:
-            keys[key] = {"varies": value.varies}
-        elif isinstance(value, Drift):
-            if value not in (slow, ONE_NUMBER):
+        if isinstance(value, Drift):
+            varies = {"varies": value.varies}, Drift(varies=value.varies)
+            known = ("free", ONE_NUMBER), ("slow", slow), varies
+            if not (words := [word for word, drift in known if value == drift]):
                 raise UsageError(f"{key}: a recipe has free and slow, not a drift of degree {value.degree}")
-            keys[key] = "slow" if value == slow else "free"
+            keys[key] = words[0]
     return keys | _keys(instrument, "instrument", keys)
 
 

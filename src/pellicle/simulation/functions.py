@@ -102,9 +102,9 @@ def check_numbers(wavelength: Any, thickness: Any, angle: Any) -> None:
             raise UsageError(f"`thickness` must not be negative, got {value:g} nm")
     if (value := _wrong(wavelength, lambda nm: ~(nm > 0))) is not None:
         raise UsageError(f"`wavelength` must be above zero, in nm, got {value:g}")
-    known = not isinstance(wavelength, Tracer) and np.size(wavelength) > 0
-    # of NumPy's copy: JAX would trace the maximum of its own array, too, inside a program
-    if known and (longest := np.max(np.asarray(wavelength))) < MICROMETRES:
+    # not JAX's own array, of which a program would trace the maximum
+    known = np.asarray([] if isinstance(wavelength, Tracer) else wavelength)
+    if known.size and (longest := np.max(known)) < MICROMETRES:
         raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in µm: write {1e3 * longest:g}")
     if (value := _wrong(angle, lambda degrees: ~(np.abs(degrees) <= 90))) is not None:
         raise UsageError(f"`angle` must be 0 to 90 degrees, got {value:g}")
@@ -133,12 +133,10 @@ def index_at(what: Medium, wavelength) -> Any:
                 principal.check_range(np.asarray(wavelength))
         return material.index(wavelength)
     if not isinstance(what, Tracer) and np.iscomplexobj(what):
-        known: Any = np.ravel(np.asarray(what, complex))  # NumPy's copy, as in `check_numbers`
+        known: Any = np.ravel(np.asarray(what, complex))  # JAX's copy would be traced in a program
         if (gain := known[known.imag < 0]).size:
-            raise UsageError(
-                f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
-                " absorption is n + ik with k ≥ 0"
-            )
+            said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
+            raise UsageError(f"{said} absorption is n + ik with k ≥ 0")
     return to_pair(floating(what))
 
 
