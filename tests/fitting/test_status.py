@@ -191,6 +191,9 @@ NO_K = {"k": estimate("k", 0.0, 0.1, True)} | DEFAULT_N
 OTHER_N = {"rivals": (Rival({"thickness": 300.1, "n": 2.5}, 1.0),)}
 TRADING = {"trading": ["n and thickness are correlated", "another"]}
 EXPANDED = "300.0 ± 2.0 nm (95 %)"
+TWO = {"b.thickness": estimate("b.thickness", 70.0, 5.0)}
+UNSEEN_B = {"b.thickness": estimate("b.thickness", 70.0, math.inf)}
+OTHER_B = {"rivals": (Rival({"thickness": 300.1, "b.thickness": 90.0}, 1.0),)}
 
 
 def unseen(**limits):
@@ -221,6 +224,10 @@ def unseen(**limits):
             "does not explain film.csv: even the best fit misses by 0.012 on average, more than noise and the"
             " usual errors of instruments and samples would, most of all 690-710 nm. Its thickness 300 nm",
         ),
+        (Status.CONVERGED, TWO, {}, f"determine thickness: {EXPANDED} and b.thickness: 70.0 ± 9.8 nm (95 %"),
+        (Status.MISFIT, TWO, {}, "Its thickness 300 nm and b.thickness 70 nm should not be used."),
+        (Status.NOT_IDENTIFIABLE, TWO | UNSEEN_B, {}, "do not determine b.thickness: it may be anything"),
+        (Status.AMBIGUOUS, TWO, OTHER_B, "determine b.thickness: 70.0 ± 9.8 nm (95 %) fits best, but 90 nm"),
         (Status.MISFIT, {}, {"unit": " degrees"}, "misses by 0.012 degrees on average, more"),
         (Status.NOT_CONVERGED, {}, {}, "its best point so far, thickness 300 nm, should not be used."),
     ],

@@ -9,6 +9,7 @@ import pytest
 from pellicle.fitting.batch.data import CODES, STATUSES
 from pellicle.mapping.map_result import Run
 from pellicle.reporting.map_places import map_axes, place
+from pellicle.reporting.map_sites import sites_csv
 from pellicle.reporting.map_summary import summarise
 from pellicle.reporting.map_text import cube_json, cube_report, share
 
@@ -258,3 +259,19 @@ def test_the_edge_of_a_large_map_is_sought_on_fewer_pixels(monkeypatch):
     found = ~blank()
     found[4:-4, 4:-4] = False
     assert where(found) == "along the edge"
+
+
+def test_sites_have_a_row_each_and_statistics_below():
+    status = np.array([CODES[x] for x in ("converged", "converged", "misfit", "converged")])
+    nm = np.array([98.0, 100.0, 500.0, 105.0])
+    where = {"x": ("site", [0.0, 1, 2, 3], {"units": "mm"}), "y": ("site", [0.0, 0, 1, 1], {"units": "mm"})}
+    dataset = made(status, nm, ("site",), where | {"file": ("site", ["a.csv", "b.csv", "c.csv", "d.csv"])})
+    header, *rows = sites_csv(dataset, summarise(dataset)).splitlines()
+    errors = "thickness_stderr,thickness_stderr_noise"
+    assert header == f"\ufeffsite,x (mm),y (mm),status,thickness (nm),{errors}"
+    assert rows[1] == "b.csv,1,0,converged,100,0.400000006,0.1000000015"
+    assert rows[2].startswith("c.csv,2,1,misfit,500,")
+    statistics = {name: float(text) for name, *_, text, _, _ in (row.split(",") for row in rows[4:])}
+    # of 98, 100 and 105 nm
+    wanted = {"mean": 101.0, "standard deviation": 13**0.5, "range": 7.0, "uniformity (%)": 350 / 101}
+    assert statistics == pytest.approx(wanted)

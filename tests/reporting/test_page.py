@@ -19,7 +19,8 @@ from pellicle.reporting.comparison import comparison_page
 from pellicle.reporting.json_record import failure, to_json
 from pellicle.reporting.map_figures import map_page
 from pellicle.reporting.map_summary import summarise
-from pellicle.reporting.page.fit_pages import batch_page, fit_page
+from pellicle.reporting.page.batch_page import batch_page
+from pellicle.reporting.page.fit_pages import fit_page
 from pellicle.reporting.page.repetition import repetition
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
@@ -224,7 +225,8 @@ def test_the_page_of_a_map_has_figures_and_tables():
     status = image()
     status[:6] = CODES["ambiguous"]  # a tenth
     summary = summarise(made(status, path="/data/<b>wafer.nc"))
-    page = Page(map_page(summary, {"map": b"\x89PNG map", "rival": b"\x89PNG rival"}))
+    again = [("Command", "pellicle map <b>wafer.nc")]
+    page = Page(map_page(summary, {"map": b"\x89PNG map", "rival": b"\x89PNG rival"}, again))
     assert not page.open
     assert "Map of <b>wafer.nc" in page.text
     images = [own for tag, own in page.elements if tag == "img"]
@@ -234,6 +236,27 @@ def test_the_page_of_a_map_has_figures_and_tables():
     assert "median 300.00 nm" in page.text
     assert f"{np.sum(status == CODES['converged'])} pixels" in page.text
     assert "plotly" not in page.scripts
+    box = page.text.partition("Figures")[0]
+    assert "thickness: median 300.00 nm" in box
+    assert "pellicle map <b>wafer.nc" in page.text.partition("Repeat it")[2]
+
+
+def test_the_page_of_a_batch_has_statistics_and_a_figure_of_each_parameter(fit):
+    records = [to_json(fit) for _ in range(3)]
+    for record, nm in zip(records, (480.0, 486.0, 498.0), strict=True):
+        record["parameters"]["thickness"] |= {"value": nm, "stderr": 1700.0}
+        record["status"] = "converged"
+        record["parameters"]["n"] = record["parameters"]["thickness"] | {"value": 1.5, "unit": ""}
+    records[2]["status"] = "misfit"  # not counted
+    page = Page(batch_page(records, [None] * 3))
+    words = " ".join(page.text.split())
+    assert "thickness (nm)24834.20.88 %480 to 4860.62 %" in words
+    assert "480 ± 1700" in words
+    assert [own["value"] for tag, own in page.elements if tag == "option" and "value" in own] == [
+        *("results", "results-1", ""),
+    ]
+    parts = [own for tag, own in page.elements if own.get("class") == "of-parameter"]
+    assert [(own["data-of"], "hidden" in own) for own in parts] == [("results", False), ("results-1", True)]
 
 
 def test_the_best_of_a_comparison_is_first_and_the_others_curves_can_be_shown(fit, with_part):

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from pellicle.fitting.result import Profile
-from pellicle.reporting.folders import write_fit, write_index
+from pellicle.reporting.folders import LIBRARY, SELF_CONTAINED, folder_per_file, write_fit, write_index
 from pellicle.reporting.json_record import failure, to_json
+from pellicle.reporting.page.batch_page import batch_page
 from pellicle.reporting.page.fit_pages import fit_page
 from tests.browser import pages, wait_for
 
@@ -194,3 +195,26 @@ def test_the_table_of_a_batch_sorts_filters_and_leads_to_pages(browser, curved, 
     page.get_by_role("link", name="film.csv").click()
     page.wait_for_selector("#data-0[data-ready]")
     page.close()
+
+
+def test_pages_of_many_fits_share_plotly(browser, curved, tmp_path):
+    root = folder_per_file(tmp_path / "out", [f"{i}.csv" for i in range(SELF_CONTAINED + 1)])[0].parent
+    text = (write_fit(root / "one", curved) / "report.html").read_text(encoding="utf-8")
+    assert len(text) < 0.6 * len(fit_page(curved, (root / "one/figure.png").read_bytes()))
+    page = browser.new_page(viewport={"width": 1400, "height": 2000})
+    page.goto((root / "one/report.html").as_uri())
+    page.wait_for_selector("#data-0[data-ready]")
+    (root / LIBRARY).unlink()  # a page alone still has its picture, and a sentence
+    page.reload()
+    wait_for(page, lambda: "plotly.min.js is missing" in page.locator("#trouble").inner_text())
+    assert page.locator("figure img").count()
+    page.close()
+
+
+def test_one_parameter_of_a_batch_is_chosen(opened, curved):
+    record = to_json(curved)
+    record["parameters"]["n"] = record["parameters"]["thickness"] | {"value": 1.5, "unit": ""}
+    text = batch_page([record, record], [None, None])
+    page = opened(text.replace(" hidden>", ">"))
+    page.locator("#parameter").select_option("results-1")
+    assert [page.locator(f"#{name}").is_visible() for name in ("results", "results-1")] == [False, True]

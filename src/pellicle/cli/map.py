@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -95,7 +96,7 @@ def map_cube(
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
     show(cube_json(made) if json else as_flags(cube_report(made)), folder is not None)
     if folder is not None:
-        _write(folder, made)
+        _write(folder, made, _command(path, described.path, run, cube, str(out)))
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
 
 
@@ -156,14 +157,26 @@ def _started(folder: Path | None, progress: PixelProgress) -> Iterator[None]:
         raise
 
 
-def _write(folder: Path, made: Map) -> None:
+def _command(path: str, recipe: str, run: RunFlags, cube: CubeFlags, out: str) -> str:
+    """The command of a map, without what does not change its numbers."""
+    words = ["pellicle", "map", path, "--recipe", recipe]
+    given = {**vars(run), **vars(cube), "resume": None, "overwrite": None, "out": out}
+    for name, value in given.items():
+        if value is not None and value is not False:
+            text = ":".join(f"{end:g}" for end in value) if isinstance(value, tuple) else str(value)
+            words += named([name]) if value is True else [*named([name]), text]
+    return shlex.join(words)
+
+
+def _write(folder: Path, made: Map, command: str) -> None:
     from pellicle.files import replacing
     from pellicle.mapping.growth import TIME
     from pellicle.reporting.map_figures import write_cube_map
+    from pellicle.reporting.map_sites import SITES
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
-    write_cube_map(folder, made)
-    names = [STORE, NETCDF]
+    write_cube_map(folder, made, command)
+    names = [STORE, NETCDF, *([SITES] if (folder / SITES).exists() else [])]
     if TIME in made.dims:
         try:
             rates = made.growth()

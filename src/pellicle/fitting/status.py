@@ -13,6 +13,8 @@ RIVAL = 6.0
 """A distinct rival within this Δχ² on the effective points makes a fit ambiguous."""
 WELL_KNOWN = 0.1
 """Largest relative error of a thickness beside which a default bound is a remark."""
+MOST_NAMED = 4
+"""Most thicknesses that a verdict names."""
 
 
 ORDER = (
@@ -108,19 +110,26 @@ def verdict(
     trading: Sequence[str] = (),
     found: str = "",
 ) -> str:
-    """The verdict in one or two sentences, on the leading parameter or what is `found` instead.
+    """The verdict in one or two sentences, on all free thicknesses, on the leading parameter where none is
+    free, or on what is `found` instead.
 
     `missed`, `rms` with its `unit` behind a space, and `where` name the data that a misfit does not explain,
     by how much and at which wavelengths; `opaque` are thicknesses of layers that absorb, and `trading`
     sentences on parameters that are correlated with the leading one.
     """
-    lead = next((p for p in parameters.values() if p.free), None)
-    if lead is None:
+    leads = _leading(status, parameters, rivals)
+    if not leads:
         return "Nothing was free to fit."
-    value, best = expanded(lead), found or f"{lead.name} {lead.value:.4g}{_unit(lead)}"
+    lead, more = leads[0], len(leads) - MOST_NAMED
+    value, each = (
+        expanded(lead),
+        " and ".join(f"{p.name} {p.value:.4g}{_unit(p)}" for p in leads[:MOST_NAMED]),
+    )
+    best = found or f"{each}{f' and {more} more' if more > 0 else ''}"
     besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
-        return f"The data determine {lead.name}: {value}.{besides}"
+        each = " and ".join(f"{p.name}: {expanded(p)}" for p in leads[:MOST_NAMED])
+        return f"The data determine {each}{f' and {more} more' if more > 0 else ''}.{besides}"
     if status is Status.AT_BOUND:
         resting = [p for p in parameters.values() if p.binding]
         given = [p for p in resting if not p.default_bounds]
@@ -150,6 +159,21 @@ def verdict(
             f"{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
     return f"The fit did not converge: its best point so far, {best}, should not be used."
+
+
+def _leading(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Estimate]:
+    """The numbers that a verdict is about: all free thicknesses, or else the first free number.
+
+    Those that are not determined come first: by their error, or by the best distinct rival.
+    """
+    free = [p for p in parameters.values() if p.free]
+    leads = [p for p in free if p.name.split(".")[-1] == "thickness"] or free[:1]
+    if status is Status.NOT_IDENTIFIABLE:
+        return sorted(leads, key=lambda p: math.isfinite(p.stderr))
+    if status is Status.AMBIGUOUS:
+        apart = apart_from(parameters, distinct_rivals(parameters, rivals)[0])
+        return sorted(leads, key=lambda p: p.name not in apart)
+    return leads
 
 
 def _other(parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...], lead: Estimate) -> str:

@@ -26,6 +26,9 @@ CHAIN = "chain.h5"
 REPORT = "report.txt"
 PAGE = "report.html"
 SUMMARY = "summary.csv"
+LIBRARY = "plotly.min.js"
+SELF_CONTAINED = 20
+"""Most fits of a batch whose pages contain Plotly; each copy takes 0.5 MB, and a thousand half a gigabyte."""
 FINGERPRINT = "fingerprint"
 """Key of result.json that only a folder with all its files has."""
 SCENE = "scene"
@@ -75,7 +78,8 @@ def write_fit(
             write_text(target / "recipe.toml", recipe(target), overwrite=True)
     pictures = {} if posterior is None else _write_posterior(target, posterior)
     image = (target / "figure.png").read_bytes()
-    text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe))
+    library = f"../{LIBRARY}" if (target.parent / LIBRARY).exists() else ""
+    text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe), library)
     write_text(target / PAGE, text, overwrite=True)
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
@@ -107,8 +111,8 @@ def chain_file(folder: str | os.PathLike[str]) -> Path:
 def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.PathLike[str]]) -> list[Path]:
     """Folder of each file's fit: `folder` itself for one file, else sub-folders named by the files' stems.
 
-    For several files `folder` is made, and its result.json lists the sub-folder of each file. Raises
-    UsageError as `write_fit` does.
+    For several files `folder` is made, and its result.json lists the sub-folder of each file; for many it
+    also has Plotly, which their pages share. Raises UsageError as `write_fit` does.
     """
     if len(paths) < 2:
         return [Path(folder) for _ in paths]
@@ -116,6 +120,10 @@ def folder_per_file(folder: str | os.PathLike[str], paths: Sequence[str | os.Pat
     files = [{"path": os.fspath(path), "folder": name} for path, name in zip(paths, names, strict=True)]
     index = {"schema": INDEX_SCHEMA, "files": files, "versions": versions()}
     write_text(root / MARKER, indented(index), overwrite=True)
+    if len(paths) > SELF_CONTAINED:
+        from pellicle.reporting.page.document import plotly_script
+
+        write_text(root / LIBRARY, plotly_script(), overwrite=True)
     return [root / name for name in names]
 
 
@@ -182,7 +190,7 @@ def write_index(
     `records` are JSON records of fits and failures, as many as there are `folders` or fewer; `repeats` is
     their scatter where they are repeated measurements. Raises as `write_summary` does.
     """
-    from pellicle.reporting.page.fit_pages import batch_page
+    from pellicle.reporting.page.batch_page import batch_page
 
     target, links = new_folder(folder), []
     for own in folders[: len(records)]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -34,6 +34,7 @@ from pellicle.reporting.map_panels import (
     to_scale,
     unusable,
 )
+from pellicle.reporting.map_sites import SITES, sites_csv
 from pellicle.reporting.map_summary import (
     MapSummary,
     dataset_of,
@@ -282,26 +283,33 @@ def _line(sheet: Sheet, variable: str) -> Figure:
     return figure
 
 
-def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map) -> Path:
+def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map, command: str = "") -> Path:
     """Write result.json, report.txt, report.html and figures of a map, and return the folder.
 
-    Each file appears complete or not at all.
+    A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `command` is the
+    one that repeats the map.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
     summary, images = summarise(made), {}
-    target = write_result(folder, cube_json(made, summary), {REPORT: cube_report(made, summary)})
+    texts = {REPORT: cube_report(made, summary)}
+    if summary.axes.kind != "image":
+        texts[SITES] = sites_csv(made, summary)
+    target = write_result(folder, cube_json(made, summary), texts)
     for name, figure in figures(made, summary):
         path = save_figure(figure, target / f"{name}.png", overwrite=True)
         images[name] = path.read_bytes()
-    write_text(target / PAGE, map_page(summary, images), overwrite=True)
+    recipe = str(summary.attributes.get("recipe", ""))
+    again = [(name, text) for name, text in (("Command", command), ("Recipe", recipe)) if text]
+    write_text(target / PAGE, map_page(summary, images, again), overwrite=True)
     return target
 
 
-def map_page(summary: MapSummary, images: Mapping[str, bytes]) -> str:
+def map_page(summary: MapSummary, images: Mapping[str, bytes], again: Sequence[tuple[str, str]] = ()) -> str:
     """Format the map of a cube as a page.
 
-    **Arguments:** `images`, the PNG image of each figure by its name, "map" first.
+    **Arguments:** `images`, the PNG image of each figure by its name, "map" first; `again`, what repeats the
+    map: descriptions and texts to copy.
     """
     about = {
         "map": "Values, standard errors, statuses and histogram",
@@ -309,6 +317,7 @@ def map_page(summary: MapSummary, images: Mapping[str, bytes]) -> str:
     }
     sentence = in_words(summary)
     parameters = [row for p in summary.parameters for row in parameter_rows(p)]
+    numbers = [f"{name}: {text}" if name else text for name, text in parameters]
     path = str(summary.attributes.get("path", "")).replace("\\", "/")
     return page(
         "map.html",
@@ -317,7 +326,8 @@ def map_page(summary: MapSummary, images: Mapping[str, bytes]) -> str:
         kind="Map of a cube of spectra",
         tone="good" if 2 * summary.decided >= summary.with_data > 0 else "warn",
         sentence=sentence,
-        decided=decided_in_words(summary),
+        numbers=numbers,
+        again=again,
         pictures=[
             picture(image, f"{about.get(name, f'{name}: values, standard errors and histogram')}. {sentence}")
             for name, image in images.items()

@@ -43,16 +43,25 @@ class Plane:
 class ParameterSummary:
     """A free parameter at the decided pixels.
 
-    `percentiles` are the 0th, 5th, 50th, 95th and 100th; the standard errors are medians.
+    `percentiles` are the 0th, 5th, 50th, 95th and 100th, `mean` and `sd` those of the values; the standard
+    errors are medians.
     """
 
     name: str
     variable: str
     unit: str
     percentiles: np.ndarray
+    mean: float
+    sd: float
     stderr: float
     stderr_noise: float
     plane: Plane | None
+
+    @property
+    def uniformity(self) -> float:
+        """Range over twice the mean in percent, as for wafers; undefined of a mean that is not positive."""
+        span = self.percentiles[4] - self.percentiles[0]
+        return float(50 * span / self.mean) if self.mean > 0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +176,13 @@ def _parameter(dataset: Dataset, variable: str, used: np.ndarray, axes: MapAxes)
     for name in (f"{variable}_stderr", f"{variable}_stderr_noise"):
         errors = np.asarray(dataset[name], dtype=float)[used] if name in dataset else np.full(1, np.nan)
         medians.append(float("nan") if np.all(np.isnan(errors)) else float(np.nanmedian(errors)))
-    percentiles, plane = np.full(5, np.nan), None
-    if np.isfinite(values[used]).any():
-        percentiles = np.nanpercentile(values[used], [0, 5, 50, 95, 100])
+    percentiles, mean, sd, plane = np.full(5, np.nan), float("nan"), float("nan"), None
+    if (known := values[used][np.isfinite(values[used])]).size:
+        percentiles = np.percentile(known, [0, 5, 50, 95, 100])
+        mean, sd = float(known.mean()), float(known.std(ddof=1)) if known.size > 1 else float("nan")
         plane = _plane(values, used, axes, unit)
     name = parameter_name(dataset, variable)
-    return ParameterSummary(name, variable, unit, percentiles, *medians, plane=plane)
+    return ParameterSummary(name, variable, unit, percentiles, mean, sd, *medians, plane=plane)
 
 
 def _plane(values: np.ndarray, used: np.ndarray, axes: MapAxes, unit: str) -> Plane | None:

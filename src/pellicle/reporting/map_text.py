@@ -161,8 +161,12 @@ def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:
     least, low, middle, high, largest = (f"{value:{digits}}" for value in p.percentiles)
     unit = f" {p.unit}" if p.unit else ""
     stderr, noise = _error(p.stderr, unit), _error(p.stderr_noise, unit)
+    spread = f"mean {p.mean:{digits}}{unit}, standard deviation over the map {_error(p.sd, unit)}"
+    if math.isfinite(p.uniformity):
+        spread += f", uniformity {p.uniformity:.2g} % (largest less least, over twice the mean)"
     rows = [
         (p.name, f"median {middle}{unit}, 5 to 95 %: {low} to {high}{unit}, all: {least} to {largest}{unit}"),
+        ("", spread),
         ("", f"standard error {stderr} (median), of the noise {noise}"),
     ]
     if p.plane is not None:
@@ -215,7 +219,7 @@ def cube_json(made: Dataset | Map, summary: MapSummary | None = None) -> dict[st
             p.name: {
                 **taken(p, "variable", "unit"),
                 **dict(zip(("least", "q05", "median", "q95", "largest"), p.percentiles, strict=True)),
-                **taken(p, "stderr", "stderr_noise"),
+                **taken(p, "mean", "sd", "uniformity", "stderr", "stderr_noise"),
                 **({} if p.plane is None else {"plane": asdict(p.plane)}),
             }
             for p in facts.parameters

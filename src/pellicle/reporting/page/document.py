@@ -1,5 +1,6 @@
 """Page of a result: template, style, script, figures and pictures in one file."""
 
+import gzip
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -22,10 +23,12 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
-def page(template: str, title: str, figures: Sequence[Mapping[str, Any]], **content: Any) -> str:
+def page(
+    template: str, title: str, figures: Sequence[Mapping[str, Any]], library: str = "", **content: Any
+) -> str:
     """Format a page by a template of this package. All text of `content` is escaped.
 
-    A page without figures leaves Plotly out.
+    A page without figures leaves Plotly out, and one with the path of a `library` loads it from there.
     """
     return (
         _environment()
@@ -36,7 +39,8 @@ def page(template: str, title: str, figures: Sequence[Mapping[str, Any]], **cont
             style=Markup(palette() + _text("page.css")),
             script=Markup(_text("page.js")),
             figures=_json(figures),
-            plotly=Markup(packed_plotly() if figures else ""),
+            plotly=Markup(packed_plotly() if figures and not library else ""),
+            library=library if figures else "",
             **content,
         )
     )
@@ -56,6 +60,11 @@ def palette() -> str:
 def packed_plotly() -> str:
     """Plotly's script, compressed by gzip, in base64."""
     return b64encode((_ASSETS / "plotly-basic.min.js.gz").read_bytes()).decode()
+
+
+def plotly_script() -> str:
+    """Plotly's script."""
+    return gzip.decompress((_ASSETS / "plotly-basic.min.js.gz").read_bytes()).decode()
 
 
 @cache

@@ -1,28 +1,16 @@
-"""Pages of fits: one fit with its posterior, sources and how to repeat it, or a batch with its statuses.
-
-A page has a verdict, interactive figures and tables; that of a batch a table to sort and filter, and the
-scatter of repeats.
-"""
+"""Page of a fit: verdict, interactive figures and tables, posterior, sources, and how to repeat it."""
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from html import escape
-from pathlib import PurePosixPath
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 
 from pellicle.fitting.curves import ColourCurve
-from pellicle.fitting.repeated_measurements import Repeats
 from pellicle.fitting.result import Fit, Part, Status
 from pellicle.reporting import figures, fit_text
-from pellicle.reporting import repeats as repeats_text
-from pellicle.reporting.drawable import Line, Panel, Section, Style, labelled
-from pellicle.reporting.drawable import Table as Columns
+from pellicle.reporting.drawable import Line, Panel, Section, labelled
 from pellicle.reporting.figures import file_names
-from pellicle.reporting.fit_text import NUISANCE
 from pellicle.reporting.json_record import taken
 from pellicle.reporting.page import repetition
 from pellicle.reporting.page.document import Table, page, picture
@@ -52,11 +40,13 @@ def fit_page(
     posterior: Posterior | None = None,
     pictures: Mapping[str, bytes] | None = None,
     again: Sequence[tuple[str, str]] = (),
+    library: str = "",
 ) -> str:
     """Format a fit, and its posterior if there is one, as a page.
 
     **Arguments:** `image`, the PNG of the fit's figure; `pictures`, other PNG images by name ("corner",
-    "predictive"); `again`, what repeats the fit: descriptions and texts to copy.
+    "predictive"); `again`, what repeats the fit: descriptions and texts to copy; `library`, the path from the
+    page to Plotly in a file of its own.
     """
     of_data = [figures.of_part(fit, i) for i in range(min(len(fit.parts), MOST_FIGURES))]
     misfit, index, section, surface = figures.of_misfit(fit), figures.of_index(fit), None, None
@@ -75,6 +65,7 @@ def fit_page(
         "fit.html",
         " and ".join(filter(None, file_names(fit))) or "fit",
         shown,
+        library,
         **taken(fit, "status", "verdict", "warnings"),
         **{"tone": TONES[fit.status], "advice": fit_text.ADVICE[fit.status]},
         swatches=[_swatches(part) for part in fit.parts if isinstance(part.curve, ColourCurve)],
@@ -217,108 +208,3 @@ def _trace(posterior: Posterior) -> dict[str, Any]:
     drawn = figure("trace", caption, Section("step after the burn-in", panels))
     drawn["layout"]["hovermode"] = False
     return drawn
-
-
-Record = Mapping[str, Any]
-_MOST_PARAMETERS = 8
-"""Columns of free parameters, the first of each file."""
-_STYLES: Mapping[str, tuple[Style, str]] = {
-    "good": ("circle", "green"),
-    "warn": ("diamond", "fit"),
-    "bad": ("cross", "red"),
-}
-"""Symbol and colour of the results of a tone: both differ."""
-
-
-def batch_page(records: Sequence[Record], pages: Sequence[str | None], repeats: Repeats | None = None) -> str:
-    """Format the results of several files as a page.
-
-    **Arguments:** `records`, the JSON records of fits and failures; `pages`, the path of each one's own page
-    relative to this one, with slashes, None where there is none; `repeats`, the scatter of their parameters
-    where the files are repeated measurements.
-    """
-    links = [None if each is None else quote(each) for each in pages]
-    every = [record["parameters"] for record in records]
-    shown = (name for p in every for name in p if p[name]["free"] and not NUISANCE.fullmatch(name))
-    # those of the instrument are the last ones
-    names = sorted(dict.fromkeys(shown), key=lambda name: name.startswith("instrument."))[:_MOST_PARAMETERS]
-    units = {name: next((p[name]["unit"] for p in every if name in p), "") for name in names}
-    drawn = _figure(records, links, names[0], units[names[0]]) if names else None
-    rows = [_row(record, link, names) for record, link in zip(records, links, strict=True)]
-    scatter = None
-    if repeats is not None:
-        head, *cells = repeats_text.rows(repeats)
-        scatter = {"verdict": repeats.verdict, "head": head[1:], "rows": cells}
-        scatter |= {"notes": repeats_text.notes(repeats), "warnings": repeats_text.warnings(repeats)}
-    counts = Counter(str(record["status"]) for record in records)
-    return page(
-        "batch.html",
-        f"{len(records)} fits",
-        [drawn] if drawn else [],
-        figure=drawn,
-        heads=[(name, units[name]) for name in names],
-        rows=rows,
-        counts=[(status, TONES[Status(status)], number) for status, number in counts.most_common()],
-        repeats=scatter,
-    )
-
-
-def _row(record: Record, link: str | None, names: Sequence[str]) -> dict[str, Any]:
-    cells = []
-    for name in names:
-        p = record["parameters"].get(name)
-        if p is None or not p["free"] or p["value"] is None:
-            cells.append({"value": "", "text": ""})
-            continue
-        error = "" if p["stderr"] is None else f" ± {p['stderr']:.2g}"
-        cells.append({"value": f"{p['value']:.10g}", "text": f"{p['value']:.6g}{error}"})
-    chi2 = record["chi2_reduced"]
-    return {
-        "name": _name(record),
-        "link": link,
-        "status": str(record["status"]),
-        "tone": TONES[Status(record["status"])],
-        "verdict": record.get("error") or record["verdict"],
-        "cells": cells,
-        "chi2": "" if chi2 is None else f"{chi2:.4g}",
-        "warnings": len(record["warnings"]),
-    }
-
-
-def _name(record: Record) -> str:
-    """The file without its folder, and the spectrum in it."""
-    data = record["data"]
-    data = data[0] if isinstance(data, list) else data
-    spectrum = f" [{data['spectrum']}]" if data.get("spectrum") else ""
-    return PurePosixPath(str(data["path"]).replace("\\", "/")).name + spectrum
-
-
-def _figure(records: Sequence[Record], links: Sequence[str | None], name: str, unit: str) -> dict[str, Any]:
-    """The leading parameter of each file with its standard error, in the order of the files."""
-    estimates = [(i, record, record["parameters"].get(name)) for i, record in enumerate(records)]
-    known = [(i, record, p) for i, record, p in estimates if p and p["free"] and p["value"] is not None]
-    lines = []
-    for tone, (style, colour) in _STYLES.items():
-        rows = [(i, record, p) for i, record, p in known if TONES[Status(record["status"])] == tone]
-        if rows:
-            lines.append(
-                Line(
-                    np.array([i + 1.0 for i, _, _ in rows]),
-                    np.array([p["value"] for _, _, p in rows]),
-                    ", ".join(sorted({str(record["status"]) for _, record, _ in rows})),
-                    colour,
-                    style,
-                    errors=np.array([np.nan if p["stderr"] is None else p["stderr"] for _, _, p in rows]),
-                    hints=[escape(f"{_name(record)}: {p['value']:.6g}") for _, record, p in rows],
-                    links=[{"link": links[i]} if links[i] else {} for i, _, _ in rows],
-                )
-            )
-    label = labelled(name, unit)
-    caption = (
-        f"Fitted {label} of each file with its standard error. A click on a point opens the page of its fit."
-    )
-    values = [record["parameters"].get(name, {}).get("value") for record in records]
-    table = Columns({"file": np.arange(1.0, len(records) + 1), label: values})
-    section = Section("number of the file", [[Panel(label, lines, height=3.0)]], table=table)
-    axis = {"tickformat": "d", **({"dtick": 1} if len(records) < 12 else {})}
-    return figure("results", caption, section, axis=axis)

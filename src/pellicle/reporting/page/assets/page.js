@@ -7,6 +7,8 @@
 
   // ---- Plotly, packed in the page ----
   async function library() {
+    if (window.Plotly) return window.Plotly; // of a file that the pages of a batch share
+    if (!document.getElementById("plotly")) throw new Error("plotly.min.js is missing in the folder above");
     const packed = document.getElementById("plotly").textContent.trim();
     const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
     const text = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
@@ -168,6 +170,13 @@
       }
       button.textContent = "Copied";
       setTimeout(() => { button.textContent = "Copy"; }, 2000);
+    });
+  }
+
+  // ---- one of several figures ----
+  for (const select of document.querySelectorAll("select[data-shows]")) {
+    select.addEventListener("change", () => {
+      for (const part of document.getElementsByClassName(select.dataset.shows)) part.hidden = part.dataset.of !== select.value;
     });
   }
 
