@@ -244,9 +244,9 @@ def test_the_page_of_a_map_has_figures_and_tables():
 def test_the_page_of_a_batch_has_statistics_and_a_figure_of_each_parameter(fit):
     records = [to_json(fit) for _ in range(3)]
     for record, nm in zip(records, (480.0, 486.0, 498.0), strict=True):
-        record["parameters"]["thickness"] |= {"value": nm, "stderr": 1700.0}
         record["status"] = "converged"
-        record["parameters"]["n"] = record["parameters"]["thickness"] | {"value": 1.5, "unit": ""}
+        thickness = record["parameters"]["thickness"] | {"value": nm, "stderr": 1700.0}
+        record["parameters"] = {"thickness": thickness, "n": thickness | {"value": 1.5, "unit": ""}}
     records[2]["status"] = "misfit"  # not counted
     page = Page(batch_page(records, [None] * 3))
     words = " ".join(page.text.split())
