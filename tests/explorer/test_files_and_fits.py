@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.explorer import background
-from pellicle.explorer import session as sessions
+from pellicle.explorer import background, dropped_files
 from pellicle.explorer.session import Session
 from pellicle.scene.free import Free
 
@@ -50,6 +49,21 @@ def test_light_and_range_of_the_data_replace_those_of_the_scene(session):
     assert about["signals"] == ["Ψ", "Δ"]
     assert {each["name"]: each["value"] for each in about["controls"]}["angle"] == 70.0
     assert session.view.wavelength[0] == 500.0
+
+
+def test_new_data_replace_the_light_of_those_before_and_removing_them_restores_it(session):
+    ellipsometry = csv("wavelength_nm,angle_deg,psi_deg,delta_deg", NM, 0 * NM + 70, 0 * NM + 30, 0 * NM + 90)
+    began = session.answer("scene", {})
+    session.answer("data", {"name": "e.csv", "text": ellipsometry})
+    answer = session.answer("data", {"name": "film.csv", "text": GOOD})
+    assert answer["states_angle"]  # the slider leaves the angle of the data before
+    about = session.answer("scene", {})
+    assert about["signals"] == ["R"]
+    assert {each["name"]: each["value"] for each in about["controls"]}["angle"] == 0.0
+    for request in ("remove", "reset"):
+        session.answer("data", {"name": "e.csv", "text": ellipsometry})
+        assert session.answer(request, {})["curves"] == []
+        assert session.answer("scene", {}) == began
 
 
 BAD = {
@@ -110,7 +124,7 @@ def test_only_files_of_the_folder_are_read(session, tmp_path, write):
 
 
 def test_large_files_are_refused(session, monkeypatch, tmp_path):
-    monkeypatch.setattr(sessions, "LARGEST_FILE", 100)
+    monkeypatch.setattr(dropped_files, "LARGEST_FILE", 100)
     assert "more than" in session.answer("data", {"name": "a.csv", "text": GOOD})["error"]
     (tmp_path / "recipe" / "own.csv").write_text(GOOD)
     assert "more than" in session.answer("data", {"file": "own.csv"})["error"]

@@ -210,6 +210,35 @@ def test_a_click_on_a_film_that_is_left_shows_it(browser, tmp_path):
         assert "SiO2" in page.locator(".fitted").inner_text()
 
 
+def test_a_layer_is_added_in_the_page_and_a_reload_keeps_it(opened):
+    page = opened()
+    page.get_by_role("button", name="+ layer").click()
+    page.get_by_role("combobox", name="material of layer 2").wait_for()
+    settle(page)
+    box = page.get_by_role("combobox", name="material of layer 1")
+    box.fill("TiO3")
+    box.press("Enter")
+    said = page.get_by_role("group", name="layer 1", exact=True).locator(".bad")
+    said.wait_for()
+    assert "unknown material 'TiO3'" in said.inner_text()
+    box.fill("TiO2")
+    box.press("Enter")
+    page.get_by_role("group", name="layer 1 (TiO2)").wait_for()
+    settle(page)
+    stack = pl.Scene([pl.Layer("TiO2", 100.0), pl.Layer("SiO2", 250.0)], "Si")
+    expected = pl.simulate(stack, np.asarray(curve(page, axis="x"))).values
+    assert np.allclose(curve(page), expected, atol=2e-6)
+    page.reload()
+    settle(page)
+    assert np.allclose(curve(page), expected, atol=2e-6)
+    page.get_by_role("button", name="Remove layer 1").click()
+    page.get_by_role("group", name="layer 2").first.wait_for(state="detached")
+    settle(page)
+    assert agrees(page, 250.0)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    wait_for(page, lambda: "film=" not in page.url)
+
+
 BAD = {
     "words.csv": b"this is a letter\nand no spectrum\n",
     "empty.csv": b"",

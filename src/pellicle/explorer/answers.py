@@ -180,3 +180,12 @@ def data_text(spectra: Sequence[Spectrum]) -> list[str]:
     if count > MOST and any(np.ptp(spectrum.wavelength) > 0 for spectrum in spectra):
         sentences.append(f"data at {MOST} of {count} angles of incidence are drawn; a fit uses all of them")
     return list(dict.fromkeys(sentences))
+
+
+def cut_ranges(spectra: Sequence[Spectrum]) -> list[list[float]]:
+    """Ranges of wavelengths in nm below and above the data that are used, whose points are left out."""
+    used = np.concatenate([spectrum.wavelength for spectrum in spectra])
+    out = [spectrum.left_out.wavelength for spectrum in spectra if spectrum.left_out is not None]
+    every = np.concatenate([used, *out])
+    ends = [[every.min(), used.min()], [used.max(), every.max()]]
+    return [[float(low), float(high)] for low, high in ends if high > low]

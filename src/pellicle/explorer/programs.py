@@ -167,7 +167,7 @@ def colour_program(
     """
     bands, light = integration_bands(BANDS), scene.light
     if light.ellipsometric:
-        scene = with_value(scene, _LIGHT, Light(None, light.angle, azimuth=light.azimuth))
+        scene = with_value(scene, LIGHT, Light(None, light.angle, azimuth=light.azimuth))
     scene = with_wavelength(scene, bands.wavelength)
     return _compiled(scene, names, after=lambda r: r @ bands.weights, count=count)
 
@@ -200,8 +200,9 @@ def angle_program(
     return lambda values, _: compute(values, degrees)
 
 
-_LIGHT = (GetAttrKey("light"),)
-ANGLE = (*_LIGHT, GetAttrKey("angle"))
+LIGHT = (GetAttrKey("light"),)
+"""Place of the light in a scene."""
+ANGLE = (*LIGHT, GetAttrKey("angle"))
 """Place of the angle of incidence in a scene."""
 
 

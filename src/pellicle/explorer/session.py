@@ -1,9 +1,8 @@
 """Session of the explorer: answers the requests of a page or a widget about one scene."""
 
 import os
-import tempfile
 import time
-from base64 import b64decode, b64encode
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -16,12 +15,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 from pellicle.explorer.answers import (
     colours_to_json,
     curve_to_json,
+    cut_ranges,
     data_curves,
     data_text,
     fit_to_json,
@@ -30,12 +29,14 @@ from pellicle.explorer.answers import (
 )
 from pellicle.explorer.background import NOW, SOON, Compiler, FitRun
 from pellicle.explorer.controls import fitted_names, scene_with, with_value
-from pellicle.explorer.programs import ANGLE, asked_angles, measured_angles
+from pellicle.explorer.dropped_files import LARGEST_FILE, MaterialFiles, measured_spectra
+from pellicle.explorer.film_texts import described, rebuilt, words
+from pellicle.explorer.programs import ANGLE, LIGHT, asked_angles, measured_angles
 from pellicle.explorer.unknown_film import identification, identification_to_json
-from pellicle.explorer.views import FilmView, SurfaceExplorerView
+from pellicle.explorer.views import FilmView, SurfaceExplorerView, same_view
 from pellicle.identification.hypothesis import Hypothesis
 from pellicle.recipes.python_text import python_program
-from pellicle.recipes.write import recipe_text
+from pellicle.scene.common_range import common_range, covered
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
 
@@ -45,9 +46,6 @@ SIZE, MOVING, LARGEST = 192, 96, 512
 """Pixels across the rendering of a ball, while a slider moves, and the most that a page may ask for."""
 WANTED = ("curves", "colour", "sphere", "plan")
 """Parts of a view."""
-LARGEST_FILE = 20_000_000
-"""Bytes of the largest data file."""
-_LONGEST_NAME = 120
 _VIEWS = 16
 """Sets of angles of incidence that are remembered."""
 _View: TypeAlias = FilmView | SurfaceExplorerView
@@ -75,6 +73,7 @@ class Session:
         reading: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         self.title, self.folder = title, None if folder is None else Path(folder).resolve()
+        self._nm = wavelength  # of the scene without data
         if wavelength is None and spectra:
             wavelength = np.unique(spectra[0].wavelength)
         view = SurfaceExplorerView(scene) if isinstance(scene, Surface) else FilmView(scene, wavelength)
@@ -82,6 +81,10 @@ class Session:
         here = self.folder or Path.cwd()
         self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
         self._reading = reading
+        self._first = self.view, self.spectra, reading
+        self._light: Any = getattr(scene, "light", None)  # of the scene without data
+        self._edited = False
+        self._materials = MaterialFiles(self.folder)
         self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
@@ -90,6 +93,10 @@ class Session:
             "scene": self._scene,
             "view": self._view,
             "data": self._data,
+            "remove": self._remove,
+            "reset": self._reset,
+            "layers": self._layers,
+            "material": lambda body: {"word": self._materials.take(body)},
             "fit": self._fit,
             "fit_status": lambda body: self._fit_run.status(),
             "fit_stop": lambda body: self._fit_run.stop(),
@@ -115,8 +122,10 @@ class Session:
 
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self._view_of(body)
-        about = {"title": self.title, "kind": view.kind, "limit": LARGEST_FILE}
+        about = {"title": self.title, "kind": view.kind, "limit": LARGEST_FILE, "edited": self._edited}
         data = {"data": self._data_shown()} if self.spectra else {}
+        if isinstance(view, FilmView):
+            data |= {"layers": described(view.scene), "words": words()}
         return {**about, **view.describe(), **data}
 
     def _view_of(self, body: Mapping[str, Any]) -> _View:
@@ -131,28 +140,89 @@ class Session:
             self._views[key] = self.view.at(angles)
         return self._views[key]
 
+    def _film(self) -> FilmView:
+        """The view of a film. Raises UsageError for a surface."""
+        if isinstance(self.view, SurfaceExplorerView):
+            raise UsageError("the explorer draws no data of a surface: pellicle fit fits BRDF samples")
+        return self.view
+
     def _data(self, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Read data, and take the light of the scene from them."""
-        view = self.view
-        if isinstance(view, SurfaceExplorerView):
-            view.measured([])
-        spectra = _measured_spectra(body, self.folder, view.scene.light.signal)
-        changed = self._view_of(body).measured(spectra)
-        self.spectra, self._reading, self._hypotheses = spectra, {}, ()
-        if changed is None:
-            return self._data_shown()
-        self.view = changed
+        """Read data, which replace those before, and take the light of the scene from them."""
+        view = self._film()
+        spectra = measured_spectra(body, self.folder, self._light.signal)
+        base = FilmView(self._unlit(view.scene), view.wavelength)
+        if body.get("angles") is not None:
+            base = base.at(asked_angles(body["angles"]))
+        return self._take(base.measured(_covered(spectra, view.scene)) or base, spectra)
+
+    def _remove(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Remove the data, and with them their light and angles."""
+        scene = self._unlit(self._film().scene)
+        return self._take(FilmView(scene, self._known(scene)), [])
+
+    def _reset(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Show what the session began with."""
+        view, spectra, reading = self._first
+        self._edited = False
+        return self._take(view, spectra, reading)
+
+    def _layers(self, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Change media and layers, at the values of the sliders; `rows` as `rebuilt` takes them."""
+        view = self._film()
+        marked = body.get("free") or []
+        free = {c.name for c in view.controls if c.free is not None or c.name in marked}
+        scene = scene_with(view.scene, view.controls, self._values(view, body), free)
+        made = rebuilt(scene, body.get("rows"), self._materials.medium)
+        if isinstance(made, list):
+            return {"wrong": [_sentence(ValueError(text)) for text in made]}
+        answer = self._take(self._measured(made), self.spectra, self._reading)
+        self._edited = True
+        return answer
+
+    def _unlit(self, scene: Scene) -> Scene:
+        """The scene with the light that it has without data."""
+        return with_value(scene, LIGHT, self._light)
+
+    def _known(self, scene: Scene) -> Any:
+        """Wavelengths in nm at which a scene without data is shown; None for the visible ones."""
+        if self._nm is None:
+            return None
+        low, high = common_range(scene)
+        nm = np.unique(np.asarray(self._nm, float))
+        inside = nm[(nm >= low) & (nm <= high)]
+        return inside if len(inside) > 1 else nm
+
+    def _measured(self, scene: Scene) -> FilmView:
+        """The view of a scene with the light of the data."""
+        if not self.spectra:
+            return FilmView(scene, self._known(scene))
+        spectra = _covered(self.spectra, scene)
+        view = FilmView(scene, np.unique(spectra[0].wavelength))
+        return view.measured(spectra) or view
+
+    def _take(
+        self, view: _View, spectra: Sequence[Spectrum], reading: Mapping[str, Any] = MappingProxyType({})
+    ) -> dict[str, Any]:
+        """Show a view and data in place of those before; the answer says what is new to the page."""
+        old, stated = self.view, bool(measured_angles([*self.spectra, *spectra]).size)
+        self.spectra, self._reading, self._hypotheses = [*spectra], reading, ()
+        if same_view(old, view):
+            return {**self._data_shown(), "states_angle": stated}
+        self.view = view
         if self._ahead:
             self.prepare()
-        return {**self._data_shown(), "scene_changed": True}
+        return {**self._data_shown(), "states_angle": stated, "scene_changed": True}
 
     def _data_shown(self) -> dict[str, Any]:
+        if not self.spectra:
+            return {"name": None, "curves": [], "notes": [], "cut": []}
         curves = data_curves(self.spectra, isinstance(self.view, FilmView) and self.view.against_angle)
+        used = _covered(self.spectra, self.view.scene)
         return {
             "name": self.spectra[0].path,
             "curves": [curve_to_json(curve) for curve in curves],
-            "notes": data_text(self.spectra),
-            "states_angle": any(spectrum.angle is not None for spectrum in self.spectra),
+            "notes": data_text(used),
+            "cut": cut_ranges(used),
         }
 
     def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -164,7 +234,7 @@ class Session:
         scene = scene_with(view.scene, view.controls, values, names)
         if "angle" not in names and all(spectrum.angle is not None for spectrum in self.spectra):
             scene = with_value(scene, ANGLE, 0.0)  # angles of the data, whatever the slider has
-        fit = self._fit_run.run(self.spectra, scene)
+        fit = self._fit_run.run(_covered(self.spectra, scene), scene)
         if fit is None:
             return {"stopped": True}
         answer = fit_to_json(fit, view.controls)
@@ -179,7 +249,8 @@ class Session:
         if not self.spectra or isinstance(view, SurfaceExplorerView):
             raise UsageError("there are no data to identify: open a file first")
         values = self._values(view, body)
-        found = self._fit_run.alone(lambda: identification(self.spectra, view.scene, values))
+        spectra = _covered(self.spectra, view.scene)
+        found = self._fit_run.alone(lambda: identification(spectra, view.scene, values))
         assert found is not None  # nothing stops it
         self._hypotheses = found.hypotheses
         return identification_to_json(found)
@@ -189,24 +260,24 @@ class Session:
         number = body.get("number")
         if type(number) is not int or number not in range(len(self._hypotheses)):
             raise UsageError(f"no hypothesis {number!r}: ask which film it is first")
-        view = FilmView(self._hypotheses[number].scene())
-        self.view = view.measured(self.spectra) or view
-        if self._ahead:
-            self.prepare()
-        return {**self._data_shown(), "scene_changed": True}
+        kept = self._hypotheses
+        answer = self._take(self._measured(kept[number].scene()), self.spectra, self._reading)
+        self._hypotheses, self._edited = kept, True
+        return answer
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self._view_of(body)
         scene, folder = view.stated(self._values(view, body)), self.folder or Path.cwd()
         if isinstance(scene, Surface) or isinstance(view, SurfaceExplorerView):
-            return {"toml": recipe_text(scene, folder), "python": python_program(scene)}
+            return {"toml": self._materials.recipe(scene, folder), "python": python_program(scene)}
+        about: dict[str, Any] = {"wavelength": view.wavelength}
         program = python_program(view.sampled(scene))
-        if not self.spectra:
-            return {"toml": recipe_text(scene, folder, wavelength=view.wavelength), "python": program}
-        if np.ndim(scene.light.angle):  # those of the files
+        if self.spectra:
+            files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
+            about = {"files": files, "reading": self._reading}
+        if self.spectra and np.ndim(scene.light.angle):  # those of the files
             scene = with_value(scene, ANGLE, 0.0)
-        files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.spectra))
-        return {"toml": recipe_text(scene, folder, files=files, reading=self._reading), "python": program}
+        return {"toml": self._materials.recipe(scene, folder, **about), "python": program}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, warnings = self._view_of(body), []
@@ -285,65 +356,6 @@ def _sentence(error: Exception) -> str:
     return " ".join(str(error).replace("`", "").split())
 
 
-def _measured_spectra(body: Mapping[str, Any], folder: Path | None, signal: str) -> list[Spectrum]:
-    """Read the spectra of a request: `name` with `text` or `base64`, or `file`, one in the folder.
-
-    A file that does not state its signal has that of the scene. **Raises:** DataError or UsageError in one
-    sentence.
-    """
-    if "file" in body:
-        path = _inside(folder, body["file"])
-        return _read(path, path.name, signal)
-    name = body.get("name")
-    if not isinstance(name, str):
-        raise UsageError("a file needs a name")
-    name = "".join(x for x in name.replace("\\", "/").rpartition("/")[2] if x.isprintable()).strip(". ")
-    name = name[-_LONGEST_NAME:] or "data.csv"
-    encoded = body.get("base64")
-    given = body.get("text") if encoded is None else encoded
-    if not isinstance(given, str):
-        raise UsageError(f"{name}: a file needs its text, or its bytes in base64")
-    try:
-        content = given.encode() if encoded is None else b64decode(given, validate=True)
-    except ValueError:
-        form = "Unicode text" if encoded is None else "base64"
-        raise UsageError(f"{name}: is not {form}") from None
-    _check_size(name, len(content))
-    with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
-        path = Path(place) / name
-        path.write_bytes(content)
-        return _read(path, name, signal)
-
-
-def _check_size(name: str, size: int) -> None:
-    if size > LARGEST_FILE:
-        raise DataError(f"{name}: has more than {LARGEST_FILE // 1_000_000} MB: fit it with pellicle fit")
-
-
-def _inside(folder: Path | None, name: Any) -> Path:
-    """The path of a file in the folder. Raises UsageError for one outside, whether it exists or not."""
-    path = None if folder is None or not isinstance(name, str) or "\0" in name else (folder / name).resolve()
-    if path is None or folder is None or not path.is_relative_to(folder):
-        raise UsageError(f"{name}: only files in the folder of the recipe can be read")
-    if not path.is_file():
-        raise DataError(f"{name}: no such file in the folder of the recipe")
-    _check_size(name, path.stat().st_size)
-    return path
-
-
-def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
-    """Read a file whose errors and spectra bear its name without the folder."""
-    try:
-        try:
-            spectra = read_spectra(path)
-        except UsageError as error:
-            try:
-                spectra = read_spectra(path, signal=signal)
-            except UsageError:
-                raise error from None
-            note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
-            spectra = [replace(each, notes=(*each.notes, note)) for each in spectra]
-    except (UsageError, DataError) as error:
-        raise type(error)(str(error).replace(str(path), name)) from None
-    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in spectra]
-    return [replace(each, path=name, notes=own) for each, own in zip(spectra, notes, strict=True)]
+def _covered(spectra: Sequence[Spectrum], scene: Any) -> list[Spectrum]:
+    """Spectra without the points at which a material of the scene has no data."""
+    return [covered(spectrum, scene) for spectrum in spectra]

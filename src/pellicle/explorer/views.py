@@ -251,6 +251,14 @@ class FilmView:
         return exact(self.sampled(insert(template(self.scene, self.controls, active), numbers)))
 
 
+def same_view(one: FilmView | SurfaceExplorerView, other: FilmView | SurfaceExplorerView) -> bool:
+    """Return True for views of the same scene, drawn alike."""
+    if isinstance(one, SurfaceExplorerView) or isinstance(other, SurfaceExplorerView):
+        return one is other
+    alike = one.folded == other.folded and np.array_equal(one.wavelength, other.wavelength)
+    return alike and eqx.tree_equal(one.scene, other.scene) is True
+
+
 def _visible(scene: Scene) -> np.ndarray:
     """Visible wavelengths of the materials of a scene. Raises DataError where there are none."""
     nm = default_wavelengths(scene)

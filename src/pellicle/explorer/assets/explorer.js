@@ -8,6 +8,8 @@ const AGAIN_AFTER = 150; // ms between questions while the engine compiles
 const PROGRESS_EVERY = 400; // ms between questions about a fit
 const SAME_CHANGE = 1500; // ms within which several steps of a slider are one change, and have one curve before it
 
+const NO_DATA = { name: null, curves: [], notes: [], cut: [] };
+
 /** Rows of a plan as two lists: effects that are simulated, and those that are left out. */
 function planLists(rows) {
   const item = (row) => make("li", {}, make("strong", {}, row.effect), `: ${row.reason}`,
@@ -82,6 +84,7 @@ export async function explore(element, call, options = {}) {
   // ---- views of the current values ----
   const query = new URLSearchParams(options.query ?? "");
   let controls = [];
+  let film = ""; // texts of the media and layers, where they are not those that the session began with
   let angles = null; // of incidence, where they are not those of the scene
   let limit = Infinity; // bytes of a file
   let serial = 0;
@@ -91,10 +94,14 @@ export async function explore(element, call, options = {}) {
   let againTimer = null;
   let pending = 0; // requests and drawings under way
   const unfinished = new Set(); // parts of the view whose programs are being compiled
+  const marked = () => controls.filter((each) => each.free.checked).map((each) => each.about.name);
   const values = () => Object.fromEntries(controls.map((each) => [each.about.name, each.value]));
   const view = (...want) => () => ({ values: values(), want, serial: ++serial, turn: turns, moving: gesture });
   const asView = (body) => ask("view", body);
-  const refresh = () => askCurves(view("curves", "colour"));
+  const refresh = () => {
+    layerList.follow(values());
+    askCurves(view("curves", "colour"));
+  };
 
   const askCurves = newestOf(asView, (answer, asked) => {
     if (answer.error || asked.turn !== turns) return; // curves of another scene
@@ -163,9 +170,10 @@ export async function explore(element, call, options = {}) {
 
   function tellChange() {
     query.delete("angle"); // a list has no slider
+    if (film) query.set("film", film); else query.delete("film");
     if (angles === null) query.delete("angles"); else query.set("angles", angles.join(","));
     for (const { about, value } of controls) {
-      if (value === about.value) query.delete(about.name); else query.set(about.name, short(value, 10));
+      if (value === about.value && !(film && value)) query.delete(about.name); else query.set(about.name, short(value, 10));
     }
     options.changed?.(query.toString());
     element.dispatchEvent(new CustomEvent("changed", { detail: { values: values(), angles: angles ?? [] } }));
@@ -192,7 +200,7 @@ export async function explore(element, call, options = {}) {
     if (turn !== turns) return null;
     if (scene.error) return false;
     angles = listed !== null && scene.angles?.length ? scene.angles : listed; // in rising order
-    const marked = new Map(controls.map((each) => [each.about.name, each.free.checked]));
+    const checked = new Map(controls.map((each) => [each.about.name, each.free.checked]));
     options.titled?.(scene.title);
     element.classList.toggle("of-surface", scene.kind === "surface");
     limit = scene.limit ?? Infinity;
@@ -203,21 +211,50 @@ export async function explore(element, call, options = {}) {
     for (const each of controls) {
       const value = given.get(each.about.name);
       if (value !== null && value !== "" && Number.isFinite(Number(value))) each.set(Number(value));
-      each.free.checked = marked.get(each.about.name) ?? each.free.checked;
+      each.free.checked = checked.get(each.about.name) ?? each.free.checked;
     }
     const groups = [...new Set(scene.controls.map((about) => about.group))];
     const list = scene.angles ? [angleList.element] : []; // a surface has none
     if (list.length && !groups.includes("light")) groups.splice(groups.includes("instrument") ? groups.indexOf("instrument") : groups.length, 0, "light");
     const typing = document.activeElement === angleList.input;
     if (list.length) angleList.show(scene);
-    sliders.replaceChildren(...groups.map((name) => make("fieldset", {}, make("legend", {}, name),
+    sliders.replaceChildren(layerList.element, ...groups.map((name) => make("fieldset", {}, make("legend", {}, name),
       ...controls.filter((each) => each.about.group === name).map((each) => each.element), ...(name === "light" ? list : []))));
     if (typing) angleList.input.focus();
     stored.replaceChildren(...(scene.files ?? []).map((name) => make("button", {
       type: "button", onclick: () => takeData(name, { file: name }),
     }, `Load ${name}`)));
-    if (scene.data) showData(scene.data);
+    layerList.show(scene.layers, scene.words);
+    film = scene.edited ? filmText(scene.layers) : "";
+    showData(scene.data ?? NO_DATA);
     return true;
+  }
+
+  // ---- media and layers ----
+  const layerList = new LayerList(`${id}-layers`, takeLayers, async (file) => {
+    const answer = await ask("material", { name: file.name, base64: base64(await file.arrayBuffer()) });
+    return answer.word;
+  });
+
+  /** Shows the scene with changed media and layers; sliders of what stays keep their values. */
+  async function takeLayers(rows) {
+    say("Building the scene …");
+    const answer = await ask("layers", { rows, values: values(), free: marked() });
+    say("");
+    if (answer.wrong || answer.error) layerList.refuse(answer.wrong ?? []);
+    if (answer.error || answer.wrong || !(await takeScene(new URLSearchParams(), angles))) return;
+    fitted.textContent = "";
+    tellChange();
+    refresh();
+  }
+
+  /** Builds the film of an address, where the session has another one. */
+  async function takeFilm(text) {
+    if (!text) return;
+    const scene = await ask("scene");
+    if (!scene.layers || filmText(scene.layers) === text) return;
+    const { wrong, error } = await ask("layers", { rows: filmRows(text) });
+    if (wrong || error) trouble("layers", `The film of the address cannot be built. ${error ?? wrong.filter(Boolean).join(" ")}`);
   }
 
   // ---- angles of incidence ----
@@ -249,23 +286,33 @@ export async function explore(element, call, options = {}) {
     }
     const answer = await ask("data", body);
     say("");
+    await takeAnswer(answer);
+  }
+
+  function showData(data) {
+    const there = data.name !== null;
+    Object.assign(plot, { data: data.curves, cut: data.cut, before: [], fitted: [] });
+    const remove = make("button", { type: "button", onclick: removeData, "aria-label": `Remove ${data.name}`, title: "Removes the data, with their angles and signal" }, "×");
+    notes.replaceChildren(...data.notes.map((text, i) => make("li", {}, text, ...(i ? [] : [" ", remove]))));
+    fit.disabled = which.disabled = !there;
+    element.classList.toggle("with-data", there);
+  }
+
+  /** Shows what the engine has after a request that changed data or scene, at the values `kept` of the sliders. */
+  async function takeAnswer(answer, kept = values()) {
     if (answer.error) return;
-    const kept = values();
     if (answer.states_angle) delete kept.angle;
     if (answer.scene_changed && !(await takeScene(new URLSearchParams(Object.entries(kept))))) return;
     if (answer.states_angle) for (const each of controls) if (each.about.name === "angle") each.set(each.about.value);
+    for (const each of controls) each.note();
+    fitted.textContent = "";
     showData(answer);
     tellChange();
     await plot.draw(false);
     refresh();
   }
 
-  function showData(data) {
-    Object.assign(plot, { data: data.curves, before: [], fitted: [] });
-    notes.replaceChildren(...data.notes.map((text) => make("li", {}, text)));
-    fit.disabled = which.disabled = false;
-    element.classList.add("with-data");
-  }
+  const removeData = async () => takeAnswer(await ask("remove"));
 
   // ---- fit ----
   const fit = make("button", { type: "button", class: "fit", disabled: true, onclick: runFit, title: "Fits the marked sliders to the data" }, "Fit");
@@ -281,7 +328,7 @@ export async function explore(element, call, options = {}) {
       const { running, text } = await call("fit_status", {}).catch(() => ({}));
       if (running && text && !stop.hidden) fitted.textContent = `Fitting: ${text} …`;
     }, PROGRESS_EVERY);
-    const free = controls.filter((each) => each.free.checked).map((each) => each.about.name);
+    const free = marked();
     const answer = await ask("fit", { values: values(), ...(free.length ? { free } : {}) });
     clearInterval(progress);
     fit.disabled = which.disabled = false;
@@ -331,7 +378,10 @@ export async function explore(element, call, options = {}) {
     const answer = await ask("recipe", { values: values() });
     if (!answer.error) dialog.show(title, answer[kind], name);
   }
-  const reset = () => (angles !== null ? takeAngles(null, {}) : setAll(Object.fromEntries(controls.map(({ about }) => [about.name, about.value]))));
+  async function reset() {
+    const answer = await ask("reset");
+    if (!answer.error && (await takeScene(new URLSearchParams()))) await takeAnswer({ ...answer, scene_changed: false });
+  }
   const button = (text, onclick) => make("button", { type: "button", onclick }, text);
   const link = button("Copy link", () => copyText(window.location.href, link, element));
   const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, fit, stop, which,
@@ -341,7 +391,7 @@ export async function explore(element, call, options = {}) {
 
   // ---- start ----
   const asked = anglesOf(query.get("angles"));
-  const ready = takeScene(query, asked).then(async (found) => {
+  const ready = takeFilm(query.get("film")).then(() => takeScene(query, asked)).then(async (found) => {
     if (found || asked === null) return found;
     const refused = sentence.textContent;
     const other = await takeScene(query);

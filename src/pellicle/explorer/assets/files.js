@@ -19,10 +19,11 @@ function fileZone(take, target, marked) {
     marked.classList.toggle("dropping", depth > 0);
   };
   const drop = (event) => {
+    const taken = event.defaultPrevented; // by a field of a material
     event.preventDefault();
     depth = 0;
     marked.classList.remove("dropping");
-    if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
+    if (event.dataTransfer.files.length && !taken) take(event.dataTransfer.files[0]);
   };
   const listeners = { dragenter: over(1), dragover: over(0), dragleave: over(-1), drop };
   for (const [name, listener] of Object.entries(listeners)) target.addEventListener(name, listener);
