@@ -187,8 +187,13 @@ def test_a_dropped_file_is_drawn_and_fitted(opened):
     settle(page)
     box = number(page)
     assert float(box.input_value()) == pytest.approx(320.0, abs=1.0)
-    assert "±" in page.locator(".error-of-fit").first.inner_text()
-    assert "nm" in page.locator(".fitted").inner_text()
+    assert "(95 %), ±" in page.locator(".error-of-fit").first.inner_text()
+    assert page.locator(".verdict.good").inner_text().startswith("converged: ")
+    residual = np.array(curve(page, "R data")) - reflectance(
+        float(box.input_value()), curve(page, "R data", "x")
+    )
+    assert np.allclose(curve(page, "R residual"), residual, atol=1e-4)
+    assert page.get_by_text("Left out (").evaluate("(line) => line.tagName") == "SUMMARY"
     assert agrees(page, float(box.input_value()), atol=1e-4)  # six digits of the thickness
     page.reload()
     settle(page)

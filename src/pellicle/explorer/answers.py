@@ -17,6 +17,7 @@ from pellicle.fitting.result import Fit
 from pellicle.forward_model.plan import Plan
 from pellicle.reporting import fit_text
 from pellicle.reporting.json_record import taken
+from pellicle.reporting.page.fit_pages import TONES
 from pellicle.reporting.plotly_figure import numbers
 from pellicle.reporting.renderings import display, encode, exposure, png
 from pellicle.signals.base import Quantity
@@ -98,17 +99,19 @@ def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str
 
 
 def fit_to_json(fit: Fit, controls: Collection[Control]) -> dict[str, Any]:
-    """Convert a fit: values and standard errors of controls, verdict, report and fitted curves."""
+    """Convert a fit: values of controls and their errors, of the noise and of 95 %, verdict and report."""
     values, errors = {}, {}
     for control in controls:
         estimate = fit.parameters.get(control.name)
         if estimate is not None and estimate.free:
             values[control.name] = min(max(estimate.value, control.lower), control.upper)
-            errors[control.name] = estimate.stderr if isfinite(estimate.stderr) else None
+            both = {"noise": estimate.stderr_noise, "expanded": estimate.expanded}
+            errors[control.name] = {name: x if isfinite(x) else None for name, x in both.items()}
     return {
         "values": values,
         "errors": errors,
         "status": str(fit.status),
+        "tone": TONES[fit.status],
         "verdict": fit.verdict.replace("`", ""),
         "warnings": [warning.replace("`", "") for warning in fit.warnings],
         "summary": fit_text.report(fit).replace("`", ""),

@@ -10,12 +10,14 @@ import jax
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.status import describe
 from pellicle.identification import films
-from pellicle.identification.hypothesis import Identification
+from pellicle.identification.hypothesis import Identification, Outcome
 from pellicle.identification.identify import Request, identified
 from pellicle.reporting.identification import report
 from pellicle.reporting.json_record import taken
 from pellicle.scene.film import Light, Scene
 
+_TONES = {Outcome.IDENTIFIED: "good", Outcome.UNDECIDED: "warn"}
+"""Class of the style of an outcome; others are bad."""
 BUDGET = 30.0
 """Seconds after which nothing more is tried: the page waits."""
 
@@ -40,6 +42,7 @@ def identification_to_json(found: Identification) -> dict[str, Any]:
         rows.append(taken(x, "name", "probability") | {"text": ", ".join(numbers)})
     return {
         "status": str(found.status),
+        "tone": _TONES.get(found.status, "bad"),
         "verdict": found.verdict,
         "hypotheses": rows,
         "summary": report(found),

@@ -10,6 +10,9 @@ const SAME_CHANGE = 1500; // ms within which several steps of a slider are one c
 
 const NO_DATA = { name: null, curves: [], notes: [], cut: [] };
 
+/** Status with its colour, and the verdict. */
+const verdict = (answer) => make("p", { class: `verdict ${answer.tone}` }, make("strong", {}, `${answer.status}:`), ` ${answer.verdict}`);
+
 /** Rows of a plan as two lists: effects that are simulated, and those that are left out. */
 function planLists(rows) {
   const item = (row) => make("li", {}, make("strong", {}, row.effect), `: ${row.reason}`,
@@ -18,7 +21,9 @@ function planLists(rows) {
   const list = (title, own) => (own.length ? [make("h3", {}, title), make("ul", {}, ...own.map(item))] : []);
   const off = rows.filter((row) => row.choice === "off");
   const on = rows.filter((row) => row.choice !== "off");
-  return [...list(`Simulated (${on.length})`, on), ...list(`Left out (${off.length})`, off)];
+  const [, items] = list("", off);
+  const folded = items ? [make("details", {}, make("summary", {}, `Left out (${off.length})`), items)] : [];
+  return [...list(`Simulated (${on.length})`, on), ...folded];
 }
 
 /**
@@ -342,7 +347,7 @@ export async function explore(element, call, options = {}) {
     }
     setAll(answer.values, answer.errors);
     plot.fitted = answer.curves ?? []; // with scale and offset
-    fitted.replaceChildren(make("p", {}, answer.verdict));
+    fitted.replaceChildren(verdict(answer));
     if (answer.summary) fitted.append(make("details", {}, make("summary", {}, "Summary of the fit"), make("pre", { tabindex: 0 }, answer.summary)));
   }
 
@@ -359,7 +364,7 @@ export async function explore(element, call, options = {}) {
     if (answer.error) return;
     const rows = answer.hypotheses.map(({ name, text }, number) => make("li", {},
       make("button", { type: "button", onclick: () => takeHypothesis(number) }, `Show ${name}`), ` ${text}`));
-    fitted.replaceChildren(make("p", {}, `${answer.status}: ${answer.verdict}`), make("ol", { class: "hypotheses", "aria-label": "Films that the data leave" }, ...rows),
+    fitted.replaceChildren(verdict(answer), make("ol", { class: "hypotheses", "aria-label": "Films that the data leave" }, ...rows),
       make("details", {}, make("summary", {}, "All that was tried"), make("pre", { tabindex: 0 }, answer.summary)));
   }
 
@@ -407,9 +412,9 @@ export async function explore(element, call, options = {}) {
   columns.replaceChildren(
     sliders,
     make("section", { class: "spectrum", "aria-label": "Spectrum" }, alert, make("figure", {}, canvas, caption), reading),
+    make("section", { class: "actions", "aria-label": "Data and results" },
+      make("div", { class: "zone" }, zone.element, stored, notes), buttons, status, fitted, warnings),
     look,
-    make("section", { class: "actions", "aria-label": "Data and results" }, buttons, status, fitted,
-      make("div", { class: "zone" }, zone.element, stored, notes), warnings),
     make("section", { class: "effects", "aria-labelledby": `${id}-plan` },
       make("h2", { id: `${id}-plan` }, "Plan: what is simulated, and why"), plan),
   );

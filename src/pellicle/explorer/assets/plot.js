@@ -5,6 +5,8 @@ const CHANNELS = ["--red", "--green", "--blue", "--fourth"]; // of a surface, th
 const ANGLES = ["--fit", "--blue", "--green", "--fourth"]; // of incidence, rising, as in reports of fits
 const DASHES = ["solid", "dash", "dashdot", "longdash"];
 const DASHES_IN_WORDS = ["solid", "dashed", "dash-dotted", "long-dashed"];
+const SHARE_OF_RESIDUALS = 0.45; // of the height of another panel
+const GAP = 0.06; // between panels, as a fraction of the height
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
 
 /** Unpacks and runs Plotly, which is a gzipped script in base64, and returns it. */
@@ -18,6 +20,19 @@ async function library(packed, nonce) {
   document.head.append(script);
   script.remove();
   return window.Plotly;
+}
+
+/** Ordinate of a curve at x, null beyond its ends. */
+function interpolated({ x, y }, at) {
+  const rising = x[0] <= x.at(-1);
+  let [low, high] = [0, x.length - 1];
+  if (rising ? at < x[0] || at > x[high] : at > x[0] || at < x[high]) return null;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if ((x[middle] <= at) === rising) low = middle; else high = middle;
+  }
+  if (y[low] === null || y[high] === null) return null;
+  return x[high] === x[low] ? y[low] : y[low] + ((y[high] - y[low]) * (at - x[low])) / (x[high] - x[low]);
 }
 
 /** The plot: curves of the scene, those before the last change, and data; panels share the abscissa. */
@@ -78,9 +93,27 @@ class Plot {
     return { x: gaps(x, (end) => x[end]), y: gaps(y, () => null) };
   }
 
+  /** Data minus curve, of each curve that the data measure; the fitted curve goes before that of the sliders. */
+  #residuals() {
+    const models = new Map([...this.curves, ...this.fitted].map((curve) => [curve.label.replace(/ \(.*\)$/, ""), curve]));
+    return this.data.flatMap((curve) => {
+      const model = models.get(curve.label.replace(/ \(.*\)$/, ""));
+      if (!model) return [];
+      const y = curve.x.map((x, i) => {
+        const own = curve.y[i];
+        const fit = interpolated(model, x);
+        if (own === null || fit === null) return null;
+        return curve.ordinate?.startsWith("Δ") ? ((((own - fit) % 360) + 540) % 360) - 180 : own - fit;
+      });
+      const unit = /\(°\)/.test(curve.ordinate ?? "") ? " (°)" : "";
+      return [{ ...curve, y, ordinate: `residual${unit}` }];
+    });
+  }
+
   /** Draws; while a slider moves, axes only grow. */
   async draw(moving) {
-    const ordinates = [...new Set([...this.curves, ...this.data].map((curve) => this.#ordinate(curve)))];
+    this.residuals = this.#residuals();
+    const ordinates = [...new Set([...this.curves, ...this.data, ...this.residuals].map((curve) => this.#ordinate(curve)))];
     if (!ordinates.length || !window.Plotly) return;
     this.caption.textContent = this.#words();
     const style = getComputedStyle(this.element);
@@ -113,6 +146,9 @@ class Plot {
       })),
       ...this.fitted.map((curve) => line(curve, { color: colour("--rival"), dash: "dot" }, legend(`fit: ${curve.label}`, "fit"))),
       ...this.curves.map((curve) => line(curve, own(curve), legend(curve.label, group(curve)))),
+      ...this.residuals.map((curve) => trace(curve, { x: curve.x, y: curve.y }, {
+        name: `${curve.label} residual`, showlegend: false, line: { width: 1, color: several ? own(curve).color : colour("--data") },
+      })),
     ];
     const entries = traces.filter((each) => each.showlegend !== false).map((each) => each.name);
     await window.Plotly.react(this.element, traces, this.#layout(ordinates, entries, colour, moving), {
@@ -137,20 +173,25 @@ class Plot {
     const top = 10 + 24 * Math.max(rows, 1); // room for the legend
     const coarse = window.matchMedia("(pointer: coarse)").matches;
     const line = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), linecolor: colour("--line") };
-    const share = (1 - 0.08 * (ordinates.length - 1)) / ordinates.length;
+    const weights = ordinates.map((name) => (name.startsWith("residual") ? SHARE_OF_RESIDUALS : 1));
+    const panels = weights.reduce((sum, each) => sum + each, 0);
+    const share = (1 - GAP * (ordinates.length - 1)) / panels;
     const layout = {
-      width: this.width, height: (narrow ? 150 : 250) * ordinates.length + (narrow ? 56 : 76) + top,
+      width: this.width, height: (narrow ? 150 : 250) * panels + (narrow ? 56 : 76) + top,
       margin: { l: narrow ? 52 : 68, r: 12, t: top, b: narrow ? 40 : 48 }, uirevision: this.revision, dragmode: coarse ? false : "zoom",
       paper_bgcolor: colour("--page"), plot_bgcolor: colour("--page"), font: { color: colour("--text"), size: 13 },
       hovermode: "x", hoversubplots: "axis", hoverlabel: { bgcolor: colour("--panel"), font: { color: colour("--text") } },
       showlegend: true, legend: { orientation: "h", y: 1, yanchor: "bottom", x: 0, bgcolor: "rgba(0,0,0,0)" },
       xaxis: { ...line, range: this.#span(), title: { text: this.axis.label, standoff: 6 }, anchor: ordinates.length === 1 ? "y" : `y${ordinates.length}` },
     };
+    layout.shapes = (this.cut ?? []).map(([x0, x1]) => ({
+      type: "rect", x0, x1, y0: 0, y1: 1, yref: "paper", layer: "below", line: { width: 0 }, fillcolor: colour("--soft"), opacity: 0.2,
+    }));
     ordinates.forEach((name, number) => {
-      const highest = 1 - number * (share + 0.08);
+      const highest = 1 - weights.slice(0, number).reduce((sum, each) => sum + each * share + GAP, 0);
       const range = this.#range(name, moving);
       layout[number === 0 ? "yaxis" : `yaxis${number + 1}`] = {
-        ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(highest - share, 0), highest], anchor: "x",
+        ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(highest - share * weights[number], 0), highest], anchor: "x",
       };
     });
     this.element.style.minHeight = `${layout.height + 2}px`;
@@ -159,14 +200,14 @@ class Plot {
 
   /** Range of the abscissa. */
   #span() {
-    const ends = [...this.curves, ...this.data].flatMap(({ x }) => [x[0], x.at(-1)]);
+    const ends = [...[...this.curves, ...this.data].flatMap(({ x }) => [x[0], x.at(-1)]), ...(this.cut ?? []).flat()];
     const room = this.data.length ? 0.01 * (Math.max(...ends) - Math.min(...ends)) : 0; // for whole markers
     return [Math.min(...ends) - room, Math.max(...ends) + room];
   }
 
   #range(name, moving) {
     let [low, high] = [Infinity, -Infinity];
-    for (const curve of [...this.curves, ...this.before, ...this.fitted, ...this.data]) {
+    for (const curve of [...this.curves, ...this.before, ...this.fitted, ...this.data, ...this.residuals]) {
       if (this.#ordinate(curve) !== name) continue;
       for (const value of curve.y) {
         if (value === null) continue;
@@ -176,7 +217,7 @@ class Plot {
     }
     if (!(low <= high)) return [0, 1];
     const room = ROOM * (high - low || Math.abs(high) || 1);
-    const fromZero = low >= 0 && (high <= 1.5 || low < high / 2);
+    const fromZero = !name.startsWith("residual") && low >= 0 && (high <= 1.5 || low < high / 2);
     let range = [fromZero ? 0 : low - room, high + room];
     const old = this.ranges[name];
     if (moving && old) range = [Math.min(old[0], range[0]), Math.max(old[1], range[1])];

@@ -44,14 +44,14 @@ class Control {
       },
       onchange: () => { this.set(Number.isFinite(this.number.valueAsNumber) ? this.number.valueAsNumber : this.value); changed(this, false); },
     });
-    this.error = make("span", { class: "error-of-fit" });
+    this.error = make("p", { class: "error-of-fit", hidden: true });
     const name = make("label", { for: id }, label, unit ? make("span", { class: "soft" }, ` (${unit})`) : "");
     this.free = make("input", { type: "checkbox", checked: Boolean(about.free), "aria-label": `Fit ${label}` });
     const free = make("label", { class: "free", title: "Fitted to the data" }, this.free, "fit");
-    const line = make("div", { class: "line" }, name, this.error, this.number, free);
+    const line = make("div", { class: "line" }, name, this.number, free);
     const ends = make("div", { class: "ends soft", "aria-hidden": "true" },
       make("span", {}, short(lower, 4)), make("span", {}, short(upper, 4)));
-    this.element = make("div", { class: "control" }, line, this.range, ends);
+    this.element = make("div", { class: "control" }, line, this.error, this.range, ends);
     this.set(about.value);
   }
 
@@ -60,9 +60,11 @@ class Control {
     this.#take(Math.min(Math.max(value, this.about.lower), this.about.upper));
   }
 
-  /** Shows the standard error of a fit beside the number, or removes it. */
-  note(error) {
-    this.error.textContent = Number.isFinite(error) ? `± ${short(error, 2)}` : "";
+  /** Shows the errors of a fit below the number, `{noise, expanded}`, or removes them. */
+  note(errors) {
+    const parts = errors ? [["95 %", errors.expanded], ["1σ noise", errors.noise]].filter(([, error]) => Number.isFinite(error)) : [];
+    this.error.textContent = parts.map(([name, error]) => `± ${short(error, 2)} (${name})`).join(", ");
+    this.error.hidden = !parts.length;
   }
 
   #take(value, write = true) {
