@@ -66,6 +66,38 @@ def test_new_data_replace_the_light_of_those_before_and_removing_them_restores_i
         assert session.answer("scene", {}) == began
 
 
+def test_a_file_is_read_by_the_texts_of_fields_that_its_message_names(session, tmp_path):
+    percent = csv("wavelength_nm,R", NM, np.linspace(20.0, 40.0, 128))
+    answer = session.answer("data", {"name": "film.csv", "text": percent})
+    assert "signal_unit" in answer["fields"]
+    assert "signal unit percent" in answer["error"]
+    texts = {"signal_unit": "percent", "range": "450-700", "columns": "", "noise": "0.4"}
+    answer = session.answer("data", {"reading": texts})  # of the same file
+    [curve] = answer["curves"]
+    assert (min(curve["x"]) >= 450, max(curve["x"]) <= 700) == (True, True)
+    assert np.allclose(curve["y"], np.interp(curve["x"], NM, np.linspace(0.2, 0.4, 128)), atol=1e-6)
+    assert session.spectra[0].sigma == pytest.approx(0.004)
+    assert answer["reading"] == {"signal_unit": "percent", "range": "450:700", "noise": "0.4"}
+    toml = session.answer("recipe", {})["toml"]
+    assert 'signal_unit = "percent"' in toml
+    assert "range = [450, 700]" in toml
+    wrong = session.answer("data", {"reading": {"wavelength_unit": "inch"}})
+    assert wrong["error"].startswith("wavelength unit must be one of")
+    assert session.answer("scene", {})["data"]["reading"] == answer["reading"]  # the data before stay
+
+
+def test_points_beyond_the_materials_are_left_out_and_their_range_is_stated(session):
+    wide = csv("wavelength_nm,R", NM + 300, np.full(128, 0.2))
+    session.answer("data", {"name": "film.csv", "text": wide})
+    rows = [{"material": None}, {"was": 0, "material": "CdS", "thickness": None}, {"material": None}]
+    answer = session.answer("layers", {"rows": rows})  # known up to 1033 nm
+    [[low, high]] = answer["cut"]
+    assert (round(low), high) == (1031, 1100.0)
+    assert any("known from" in note for note in answer["notes"])
+    [curve] = session.answer("view", {"want": ["curves"], "wait": True})["curves"]
+    assert max(curve["x"]) == pytest.approx(low)
+
+
 BAD = {
     "words": "this is no spectrum\nat all",
     "empty": "",
@@ -79,7 +111,7 @@ BAD = {
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_text_is_refused_in_one_sentence(session, kind):
     answer = session.answer("data", {"name": f"{kind}.csv", "text": BAD[kind]})
-    assert set(answer) == {"error"}
+    assert answer.keys() <= {"error", "fields"}
     assert answer["error"].startswith(f"{kind}.csv: ")
     assert "\n" not in answer["error"]
     assert "/tmp" not in answer["error"]
@@ -118,7 +150,7 @@ def test_only_files_of_the_folder_are_read(session, tmp_path, write):
     assert session.answer("data", {"file": "own.csv"})["name"] == "own.csv"
     for name in ("../secret.csv", str(secret), "link.csv", "./../secret.csv", "x\0", "~/secret.csv", "."):
         answer = session.answer("data", {"file": name})
-        assert set(answer) == {"error"}, name
+        assert answer.keys() <= {"error", "fields"}, name
     without = Session(pl.Scene(pl.Layer("SiO2", 100.0), "Si"))
     assert "only files in the folder" in without.answer("data", {"file": "own.csv"})["error"]
 

@@ -27,20 +27,26 @@ LARGEST_FILE = 20_000_000
 _LONGEST_NAME = 120
 
 
-def measured_spectra(body: Mapping[str, Any], folder: Path | None, signal: str) -> list[Spectrum]:
-    """Read the spectra of a request: `name` with `text` or `base64`, or `file`, one in the folder.
+def measured_spectra(
+    source: Mapping[str, Any] | Path, folder: Path | None, signal: str, options: Mapping[str, Any]
+) -> list[Spectrum]:
+    """Read the spectra of a request by options of reading: `name` with `text` or `base64`, or `file`, one in
+    the folder. A path is that of a recipe.
 
     A file that does not state its signal has that of the scene. **Raises:** DataError or UsageError in one
     sentence.
     """
+    if isinstance(source, Path):
+        return _read(source, os.path.relpath(source, folder or Path.cwd()), signal, options)
+    body = source
     if "file" in body:
         path = inside(folder, body["file"])
-        return _read(path, path.name, signal)
+        return _read(path, path.name, signal, options)
     name, content = _content(body)
     with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
         path = Path(place) / name
         path.write_bytes(content)
-        return _read(path, name, signal)
+        return _read(path, name, signal, options)
 
 
 def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
@@ -79,14 +85,14 @@ def inside(folder: Path | None, name: Any) -> Path:
     return path
 
 
-def _read(path: Path, name: str, signal: str) -> list[Spectrum]:
+def _read(path: Path, name: str, signal: str, options: Mapping[str, Any]) -> list[Spectrum]:
     """Read a file whose errors and spectra bear its name without the folder."""
     try:
         try:
-            spectra = read_spectra(path)
+            spectra = read_spectra(path, **options)
         except UsageError as error:
             try:
-                spectra = read_spectra(path, signal=signal)
+                spectra = read_spectra(path, **{"signal": signal, **options})
             except UsageError:
                 raise error from None
             note = f"the file does not say what it is: taken as {signal}, the signal of the scene"

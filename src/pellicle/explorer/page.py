@@ -10,7 +10,8 @@ from markupsafe import Markup
 from pellicle.reporting.page.document import packed_plotly, palette
 
 _ASSETS = files("pellicle.explorer") / "assets"
-_PARTS = ("slider.js", "angles.js", "layers.js", "plot.js", "files.js", "requests.js", "explorer.js")
+_NAMES = "slider angles layers plot files reading requests fits explorer"
+_PARTS = [f"{name}.js" for name in _NAMES.split()]
 """Parts of one ES module, which exports `explore(element, call, options)`: widgets have no imports."""
 
 

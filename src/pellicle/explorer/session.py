@@ -17,6 +17,7 @@ import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
+from pellicle.explorer import reading_fields
 from pellicle.explorer.answers import (
     colours_to_json,
     curve_to_json,
@@ -81,6 +82,7 @@ class Session:
         here = self.folder or Path.cwd()
         self.spectra = [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
         self._reading = reading
+        self._source: Mapping[str, Any] | Path | None = Path(spectra[0].path).resolve() if spectra else None
         self._first = self.view, self.spectra, reading
         self._light: Any = getattr(scene, "light", None)  # of the scene without data
         self._edited = False
@@ -115,7 +117,8 @@ class Session:
         try:
             return serial | self._requests[request](body)
         except (ValueError, OSError) as error:
-            return {"error": _sentence(error), **serial}
+            named = reading_fields.named_in(str(error))
+            return {"error": _sentence(error), **({"fields": named} if named else {}), **serial}
         except Exception as error:  # a fault of ours must not end the session
             log.exception("request %s", request)
             return {"error": f"{request} failed: {type(error).__name__}: {error}", **serial}
@@ -126,6 +129,7 @@ class Session:
         data = {"data": self._data_shown()} if self.spectra else {}
         if isinstance(view, FilmView):
             data |= {"layers": described(view.scene), "words": words()}
+            data |= {"fields": reading_fields.described()}
         return {**about, **view.describe(), **data}
 
     def _view_of(self, body: Mapping[str, Any]) -> _View:
@@ -149,11 +153,14 @@ class Session:
     def _data(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Read data, which replace those before, and take the light of the scene from them."""
         view = self._film()
-        spectra = measured_spectra(body, self.folder, self._light.signal)
+        if "name" in body or "file" in body or self._source is None:
+            self._source = body
+        reading = reading_fields.options_of(body.get("reading") or {})
+        spectra = measured_spectra(self._source, self.folder, self._light.signal, reading)
         base = FilmView(self._unlit(view.scene), view.wavelength)
         if body.get("angles") is not None:
             base = base.at(asked_angles(body["angles"]))
-        return self._take(base.measured(_covered(spectra, view.scene)) or base, spectra)
+        return self._take(base.measured(_covered(spectra, view.scene)) or base, spectra, reading)
 
     def _remove(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Remove the data, and with them their light and angles."""
@@ -223,6 +230,7 @@ class Session:
             "curves": [curve_to_json(curve) for curve in curves],
             "notes": data_text(used),
             "cut": cut_ranges(used),
+            "reading": reading_fields.texts_of(self._reading),
         }
 
     def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -350,10 +358,10 @@ class Session:
 
 
 def _sentence(error: Exception) -> str:
-    """A message on one line, without the backticks of Python arguments."""
+    """A message on one line, with the names of fields for Python arguments."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or 'a file'}: {error.strerror}"
-    return " ".join(str(error).replace("`", "").split())
+    return reading_fields.in_words(str(error))
 
 
 def _covered(spectra: Sequence[Spectrum], scene: Any) -> list[Spectrum]:

@@ -5,13 +5,9 @@
 
 const PLAN_AFTER = 150; // ms without a change after which the plan is asked for
 const AGAIN_AFTER = 150; // ms between questions while the engine compiles
-const PROGRESS_EVERY = 400; // ms between questions about a fit
 const SAME_CHANGE = 1500; // ms within which several steps of a slider are one change, and have one curve before it
 
 const NO_DATA = { name: null, curves: [], notes: [], cut: [] };
-
-/** Status with its colour, and the verdict. */
-const verdict = (answer) => make("p", { class: `verdict ${answer.tone}` }, make("strong", {}, `${answer.status}:`), ` ${answer.verdict}`);
 
 /** Rows of a plan as two lists: effects that are simulated, and those that are left out. */
 function planLists(rows) {
@@ -80,7 +76,6 @@ export async function explore(element, call, options = {}) {
   const look = make("section", { class: "look", "aria-label": "Colour and sphere", hidden: true }, patch, colourText, sphere);
   const warnings = make("ul", { class: "warnings warn", "aria-label": "Warnings", hidden: true });
   const plan = make("div", { class: "plan" });
-  const fitted = make("div", { class: "fitted", role: "status" });
   const notes = make("ul", { class: "notes soft", "aria-live": "polite" });
   const sliders = make("section", { class: "controls", "aria-label": "Controls" });
   const plot = new Plot(canvas, caption, reading);
@@ -92,6 +87,7 @@ export async function explore(element, call, options = {}) {
   let film = ""; // texts of the media and layers, where they are not those that the session began with
   let angles = null; // of incidence, where they are not those of the scene
   let limit = Infinity; // bytes of a file
+  let lastName = ""; // of the file that was read last
   let serial = 0;
   let turns = 0; // scenes that were asked for
   let gesture = false; // a slider is being moved
@@ -230,6 +226,7 @@ export async function explore(element, call, options = {}) {
       type: "button", onclick: () => takeData(name, { file: name }),
     }, `Load ${name}`)));
     layerList.show(scene.layers, scene.words);
+    reader.make(scene.fields);
     film = scene.edited ? filmText(scene.layers) : "";
     showData(scene.data ?? NO_DATA);
     return true;
@@ -248,7 +245,7 @@ export async function explore(element, call, options = {}) {
     say("");
     if (answer.wrong || answer.error) layerList.refuse(answer.wrong ?? []);
     if (answer.error || answer.wrong || !(await takeScene(new URLSearchParams(), angles))) return;
-    fitted.textContent = "";
+    fits.clear();
     tellChange();
     refresh();
   }
@@ -283,23 +280,35 @@ export async function explore(element, call, options = {}) {
       return trouble("data", `${name} has ${short(file.size / 1e6, 3)} MB: the explorer reads files of up to ${limit / 1e6} MB.`);
     }
     say(`Reading ${name} …`);
+    lastName = name;
     try {
       body ??= { name, base64: base64(await file.arrayBuffer()) };
     } catch {
       trouble("data", `${name} cannot be read: choose a file, not a folder.`);
       return say("");
     }
+    await readData(name, body);
+  }
+
+  /** Reads a file, or the last one anew with the options of the fields. */
+  async function readData(name, body) {
     const answer = await ask("data", body);
     say("");
+    if (answer.error) reader.need(name, answer.fields);
     await takeAnswer(answer);
   }
 
+  const reader = new ReadingFields(`${id}-reading`, (texts) => readData(lastName, { reading: texts }));
+
   function showData(data) {
     const there = data.name !== null;
+    if (there) lastName = data.name;
     Object.assign(plot, { data: data.curves, cut: data.cut, before: [], fitted: [] });
     const remove = make("button", { type: "button", onclick: removeData, "aria-label": `Remove ${data.name}`, title: "Removes the data, with their angles and signal" }, "×");
-    notes.replaceChildren(...data.notes.map((text, i) => make("li", {}, text, ...(i ? [] : [" ", remove]))));
-    fit.disabled = which.disabled = !there;
+    notes.replaceChildren(...data.notes.slice(0, 1).map((text) => make("li", {}, text, " ", remove)));
+    if (data.cut.length) notes.append(make("li", {}, "The shaded points are left out: the notes below say why."));
+    reader.show(data.name, data.reading ?? {}, data.notes.slice(1));
+    fits.disabled = !there;
     element.classList.toggle("with-data", there);
   }
 
@@ -310,7 +319,7 @@ export async function explore(element, call, options = {}) {
     if (answer.scene_changed && !(await takeScene(new URLSearchParams(Object.entries(kept))))) return;
     if (answer.states_angle) for (const each of controls) if (each.about.name === "angle") each.set(each.about.value);
     for (const each of controls) each.note();
-    fitted.textContent = "";
+    fits.clear();
     showData(answer);
     tellChange();
     await plot.draw(false);
@@ -319,54 +328,17 @@ export async function explore(element, call, options = {}) {
 
   const removeData = async () => takeAnswer(await ask("remove"));
 
-  // ---- fit ----
-  const fit = make("button", { type: "button", class: "fit", disabled: true, onclick: runFit, title: "Fits the marked sliders to the data" }, "Fit");
-  const stop = make("button", { type: "button", hidden: true, onclick: () => ask("fit_stop") }, "Stop");
-
-  async function runFit() {
-    fit.disabled = which.disabled = true;
-    stop.hidden = false;
-    const focused = document.activeElement === document.body;
-    if (focused) stop.focus(); // the button that had it is disabled
-    fitted.textContent = "Fitting …";
-    const progress = setInterval(async () => {
-      const { running, text } = await call("fit_status", {}).catch(() => ({}));
-      if (running && text && !stop.hidden) fitted.textContent = `Fitting: ${text} …`;
-    }, PROGRESS_EVERY);
-    const free = marked();
-    const answer = await ask("fit", { values: values(), ...(free.length ? { free } : {}) });
-    clearInterval(progress);
-    fit.disabled = which.disabled = false;
-    if (document.activeElement === stop) fit.focus();
-    stop.hidden = true;
-    fitted.textContent = "";
-    if (answer.error) return;
-    if (!answer.values) { // stopped
-      fitted.textContent = "The fit was stopped; the sliders are as they were.";
-      return;
-    }
-    setAll(answer.values, answer.errors);
-    plot.fitted = answer.curves ?? []; // with scale and offset
-    fitted.replaceChildren(verdict(answer));
-    if (answer.summary) fitted.append(make("details", {}, make("summary", {}, "Summary of the fit"), make("pre", { tabindex: 0 }, answer.summary)));
-  }
-
-  // ---- which film ----
-  const which = make("button", { type: "button", class: "fit", disabled: true, onclick: identify, title: "Looks for the films on this substrate that describe the data" }, "Which film?");
-
-  async function identify() {
-    fit.disabled = which.disabled = true;
-    fitted.textContent = "Trying films on this substrate …";
-    const answer = await ask("identify", { values: values() });
-    fit.disabled = which.disabled = false;
-    which.focus();
-    fitted.textContent = "";
-    if (answer.error) return;
-    const rows = answer.hypotheses.map(({ name, text }, number) => make("li", {},
-      make("button", { type: "button", onclick: () => takeHypothesis(number) }, `Show ${name}`), ` ${text}`));
-    fitted.replaceChildren(verdict(answer), make("ol", { class: "hypotheses", "aria-label": "Films that the data leave" }, ...rows),
-      make("details", {}, make("summary", {}, "All that was tried"), make("pre", { tabindex: 0 }, answer.summary)));
-  }
+  // ---- fit, and which film ----
+  const fits = new FitActions({
+    ask,
+    progress: () => call("fit_status", {}).catch(() => ({})),
+    body: (free) => ({ values: values(), ...(free && marked().length ? { free: marked() } : {}) }),
+    found: (answer) => {
+      setAll(answer.values, answer.errors);
+      plot.fitted = answer.curves ?? []; // with scale and offset
+    },
+    taken: takeHypothesis,
+  });
 
   /** Shows the scene of a hypothesis, whose free numbers can then be moved and fitted. */
   async function takeHypothesis(number) {
@@ -389,7 +361,7 @@ export async function explore(element, call, options = {}) {
   }
   const button = (text, onclick) => make("button", { type: "button", onclick }, text);
   const link = button("Copy link", () => copyText(window.location.href, link, element));
-  const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, fit, stop, which,
+  const buttons = make("div", { class: "buttons", role: "group", "aria-label": "Actions" }, ...fits.buttons,
     button("Recipe", () => showText("toml", "Recipe", "recipe.toml")),
     button("Python", () => showText("python", "Python", "film.py")),
     ...(options.changed ? [link] : []), button("Reset", reset));
@@ -413,7 +385,7 @@ export async function explore(element, call, options = {}) {
     sliders,
     make("section", { class: "spectrum", "aria-label": "Spectrum" }, alert, make("figure", {}, canvas, caption), reading),
     make("section", { class: "actions", "aria-label": "Data and results" },
-      make("div", { class: "zone" }, zone.element, stored, notes), buttons, status, fitted, warnings),
+      make("div", { class: "zone" }, zone.element, stored, notes, reader.element), buttons, status, fits.said, warnings),
     look,
     make("section", { class: "effects", "aria-labelledby": `${id}-plan` },
       make("h2", { id: `${id}-plan` }, "Plan: what is simulated, and why"), plan),
