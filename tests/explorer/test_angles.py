@@ -84,7 +84,7 @@ def test_wrong_angles_are_refused(session, angles):
 
 def test_a_cone_is_compiled_for_the_steepest_angle(session):
     at = {"instrument.numerical_aperture": 0.1}
-    structure = dict(session.view.structure(session.view.defaults() | at).active)
+    structure = dict(session.shown.view.structure(session.shown.view.defaults() | at).active)
     assert structure["angle"] == 75.0
     answer = view(session, ["curves"], [70.0, 88.0], **at)
     assert "beyond 89 degrees: the angle of incidence is 88" in answer["warnings"][0]
@@ -199,7 +199,7 @@ def test_folded_data_fold_the_curve():
     delta = np.minimum(data.delta, 360 - data.delta)
     about = {"delta": delta, "angle": data.angle, "folded": True}
     folded = pl.Spectrum(data.wavelength, data.values, "psi-delta", **about)
-    session.view = session.view.measured([folded])
+    session.shown.view = session.shown.view.measured([folded])
     for curve in view(session, ["curves"])["curves"]:
         if curve["signal"] == "Δ":
             truth = [seen(nm, 180.0, float(curve["setting"][:2]))[1] for nm in curve["x"][::40]]
@@ -231,15 +231,15 @@ def test_a_free_angle_cannot_stand_for_several(refuses):
     session = Session(pl.Scene(pl.Layer(1.7, 100.0), 3.9, light=pl.Light(angle=pl.Free(60, 70))))
     answer = session.answer("data", {"name": "a.csv", "text": csv(measured((60.0, 65.0), NM))})
     assert "one free angle cannot stand for them" in answer["error"]
-    refuses(pl.errors.UsageError, "which is free", Session, session.view.scene, wavelength=[500.0])
+    refuses(pl.errors.UsageError, "which is free", Session, session.shown.view.scene, wavelength=[500.0])
 
 
 def test_angles_of_each_wavelength():
     pairs = np.repeat(ANGLES, len(NM)), np.tile(NM, 3)
     light = pl.Light(pairs[1], pairs[0], "psi-delta")
     session = Session(pl.Scene(pl.Layer(1.7, 100.0), 3.9, light=light))
-    assert session.view.angles.tolist() == list(ANGLES)
-    assert session.view.wavelength.tolist() == NM.tolist()
+    assert session.shown.view.angles.tolist() == list(ANGLES)
+    assert session.shown.view.wavelength.tolist() == NM.tolist()
     with pytest.raises(pl.errors.UsageError, match="the same angles at each wavelength"):
         Session(scene(angle=np.linspace(60, 70, len(NM)), wavelength=NM))
     with pytest.raises(pl.errors.UsageError, match="up to 12 angles"):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.cli.explore import LightFlags, SceneFlags, _session
 from pellicle.explorer import background, dropped_files
 from pellicle.explorer.session import Session
 from pellicle.scene.free import Free
@@ -48,7 +49,7 @@ def test_light_and_range_of_the_data_replace_those_of_the_scene(session):
     about = session.answer("scene", {})
     assert about["signals"] == ["Ψ", "Δ"]
     assert {each["name"]: each["value"] for each in about["controls"]}["angle"] == 70.0
-    assert session.view.wavelength[0] == 500.0
+    assert session.shown.view.wavelength[0] == 500.0
 
 
 def test_new_data_replace_the_light_of_those_before_and_removing_them_restores_it(session):
@@ -76,7 +77,7 @@ def test_a_file_is_read_by_the_texts_of_fields_that_its_message_names(session, t
     [curve] = answer["curves"]
     assert (min(curve["x"]) >= 450, max(curve["x"]) <= 700) == (True, True)
     assert np.allclose(curve["y"], np.interp(curve["x"], NM, np.linspace(0.2, 0.4, 128)), atol=1e-6)
-    assert session.spectra[0].sigma == pytest.approx(0.004)
+    assert session.shown.spectra[0].sigma == pytest.approx(0.004)
     assert answer["reading"] == {"signal_unit": "percent", "range": "450:700", "noise": "0.4"}
     toml = session.answer("recipe", {})["toml"]
     assert 'signal_unit = "percent"' in toml
@@ -214,3 +215,31 @@ def test_a_film_is_identified_and_shown(session):
     assert np.abs(np.interp(NM, curve["x"], curve["y"]) - titania.values).max() < 0.02
     session.answer("data", {"name": "film.csv", "text": GOOD})
     assert "error" in session.answer("hypothesis", {"number": 0})  # of other data
+
+
+def test_files_of_a_recipe_are_shown_in_turn_with_their_own_angles(tmp_path, write):
+    """As the command opens a recipe of two reflectances, of which the second is at 60 degrees."""
+    for name, level in (("a.csv", 0.2), ("b.csv", 0.3)):
+        write(csv("wavelength_nm,R", NM, np.full(128, level)), name)
+    recipe = (
+        '[[data.file]]\npath = "a.csv"\n[[data.file]]\npath = "b.csv"\nangle = 60\n'
+        '[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 100\n'
+    )
+    session = _session(str(write(recipe, "two.toml")), SceneFlags(), LightFlags())
+
+    def state():
+        about = session.answer("scene", {})
+        angle = next(each["value"] for each in about["controls"] if each["name"] == "angle")
+        return about["files"], about["number"], angle, about["data"]["curves"][0]["y"][0]
+
+    files = ["a.csv", "b.csv"]
+    assert state() == (files, 0, 0.0, 0.2)
+    rows = [{"material": None}, {"was": 0, "material": "TiO2", "thickness": None}, {"material": None}]
+    session.answer("layers", {"rows": rows})
+    assert session.answer("tab", {"number": 1})["states_angle"]
+    assert state() == (files, 1, 60.0, 0.3)
+    assert session.answer("scene", {})["layers"][1]["material"] == "TiO2"
+    assert "no file 2" in session.answer("tab", {"number": 2})["error"]
+    session.answer("reset", {})
+    assert state() == (files, 0, 0.0, 0.2)
+    assert session.answer("scene", {})["layers"][1]["material"] == "SiO2"

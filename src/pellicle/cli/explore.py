@@ -18,6 +18,8 @@ from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.explorer.session import Session
+    from pellicle.explorer.shown import RecipeFile
+    from pellicle.recipes.read import FilmRecipe
 
 DEFAULTS = {"layer": "SiO2", "substrate": "Si", "thickness": "0:1000"}
 """Film that is shown without a recipe and without flags."""
@@ -85,7 +87,7 @@ def explore(
 
 def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
     """The session of a recipe, with the data of a film's first file, or of the flags."""
-    from pellicle.cli.reading import read, wavelengths
+    from pellicle.cli.reading import wavelengths
     from pellicle.explorer.session import Session
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
@@ -98,14 +100,30 @@ def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
         return Session(recipe.scene(), Path(path).parent, title=title)
-    first, spectra = recipe.first, []
+    data = recipe.tables.data
+    each = recipe.samples or [*[recipe] * len(data.files), *recipe.each]
+    first, spectra = (each or [recipe])[0], []
     scene, data = first.scene(), first.tables.data
-    if recipe.files and data.signal not in SPACES:
+    files = [] if data.signal in SPACES else [*map(_file, recipe.files, each)]
+    if files:
         try:
-            spectra = read(recipe.files[0], FileOptions(**first.reading), scene)
+            spectra = files[0].read()
         except DataError as error:
             say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(first, scene)
-    reading = {name: x for name, x in first.options.items() if name not in ("angle", "polarisation")}
-    about = {"title": title, "spectra": spectra, "reading": reading}
+    about = {"title": title, "spectra": spectra, "reading": _reading(first), "files": files}
     return Session(scene, Path(path).parent, wavelength=given, **about)
+
+
+def _reading(recipe: FilmRecipe) -> dict[str, Any]:
+    """The options by which a recipe reads and fits its file, but for those of the light."""
+    return {name: x for name, x in recipe.options.items() if name not in ("angle", "polarisation")}
+
+
+def _file(path: str, recipe: FilmRecipe) -> RecipeFile:
+    """One of the files of a recipe, by the recipe of this file."""
+    from pellicle.cli.reading import read
+    from pellicle.explorer.shown import RecipeFile
+
+    options = FileOptions(**recipe.reading)
+    return RecipeFile(path, recipe.scene, _reading(recipe), lambda: read(path, options, recipe.scene()))

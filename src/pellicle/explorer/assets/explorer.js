@@ -222,9 +222,9 @@ export async function explore(element, call, options = {}) {
     sliders.replaceChildren(layerList.element, ...groups.map((name) => make("fieldset", {}, make("legend", {}, name),
       ...controls.filter((each) => each.about.group === name).map((each) => each.element), ...(name === "light" ? list : []))));
     if (typing) angleList.input.focus();
-    stored.replaceChildren(...(scene.files ?? []).map((name) => make("button", {
-      type: "button", onclick: () => takeData(name, { file: name }),
-    }, `Load ${name}`)));
+    stored.replaceChildren(...(scene.files ?? []).map((name, number) => make("button", {
+      type: "button", "aria-pressed": String(number === scene.number), onclick: () => takeTab(number),
+    }, name)));
     layerList.show(scene.layers, scene.words);
     reader.make(scene.fields);
     film = scene.edited ? filmText(scene.layers) : "";
@@ -272,7 +272,7 @@ export async function explore(element, call, options = {}) {
   }
 
   // ---- data ----
-  const stored = make("p", { class: "buttons stored" });
+  const stored = make("div", { class: "buttons stored", role: "group", "aria-label": "Files of the recipe" });
   const zone = fileZone((file) => takeData(file.name, null, file), options.dropTarget ?? element, element);
 
   async function takeData(name, body, file) {
@@ -300,6 +300,12 @@ export async function explore(element, call, options = {}) {
 
   const reader = new ReadingFields(`${id}-reading`, (texts) => readData(lastName, { reading: texts }));
 
+  /** Shows another file of the recipe. */
+  async function takeTab(number) {
+    const answer = await ask("tab", { number });
+    await takeAnswer(answer.error ? answer : { ...answer, scene_changed: true });
+  }
+
   function showData(data) {
     const there = data.name !== null;
     if (there) lastName = data.name;
@@ -326,7 +332,10 @@ export async function explore(element, call, options = {}) {
     refresh();
   }
 
-  const removeData = async () => takeAnswer(await ask("remove"));
+  async function removeData() {
+    const answer = await ask("remove");
+    await takeAnswer(answer.error ? answer : { ...answer, scene_changed: true });
+  }
 
   // ---- fit, and which film ----
   const fits = new FitActions({
