@@ -7,13 +7,12 @@
 # ---
 
 # %% [markdown]
-# # Gradients: sensitivity, design, and the Cramér-Rao bound
+# # Gradients: sensitivity and the Cramér-Rao bound
 #
-# The optics of pellicle are differentiable. This notebook uses the derivatives to answer three questions.
+# The optics of pellicle are differentiable. This notebook uses the derivatives to answer two questions.
 #
 # 1. How fast does the colour of a film change with its thickness?
-# 2. Which layers make a good antireflection coating?
-# 3. At which angles and wavelengths should a film be measured, and how precisely can its parameters be
+# 2. At which angles and wavelengths should a film be measured, and how precisely can its parameters be
 #    determined?
 #
 # The derivatives are computed by [JAX](https://docs.jax.dev), the array library that pellicle is written
@@ -29,7 +28,6 @@ import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.optimize import minimize
 
 import pellicle as pl
 from pellicle.colour import film_colour
@@ -104,80 +102,6 @@ thin = jnp.linspace(0.0, 600.0, thickness.size).at[1].set(2.0)  # same length: n
 first = float(np.linalg.norm(colour(thin)[0][1] - lab[0]))
 print(f"2 nm of oxide change the colour by ΔE {first:.2f}")
 assert first < 0.5
-
-# %% [markdown]
-# ## Design: an antireflection coating
-#
-# Glass reflects about 4 % at each face. One layer of MgF2 with a thickness of a quarter wavelength reduces
-# this, mostly near one wavelength. Are three layers (MgF2, HfO2 and Al2O3 from the air down) better over
-# the whole visible range? The *loss* to be minimised is the mean reflectance from 420 to 680 nm.
-# `pl.reflectance` accepts a list of layers; `jax.value_and_grad` computes the loss and its derivative with
-# respect to all three thicknesses.
-#
-# SciPy's minimiser uses this derivative. It finds a local minimum, not necessarily the global one, so we
-# start from many random designs.
-
-# %%
-band = np.linspace(420.0, 680.0, 27)
-STACK = [pl.material(name) for name in ("MgF2", "HfO2", "Al2O3")]
-GLASS = pl.material("BK7")
-
-
-@jax.jit
-def spectrum(thicknesses):
-    """Return the reflectance of glass under three layers of these thicknesses (nm) over the band."""
-    return pl.reflectance(band, thicknesses, STACK, GLASS)
-
-
-def mean_percent(thicknesses):
-    return 100 * jnp.mean(spectrum(thicknesses))
-
-
-loss = jax.jit(jax.value_and_grad(mean_percent))
-random = np.random.default_rng(0)
-designs = [
-    minimize(loss, start, jac=True, method="L-BFGS-B", bounds=[(0, 300)] * 3)
-    for start in random.uniform(10, 200, (8 if SHORT else 64, 3))
-]
-losses = np.array([one.fun for one in designs])
-best = designs[int(np.argmin(losses))]
-
-bare = spectrum(np.zeros(3))
-quarter = 550 / 4 / float(pl.refractive_index(550.0, "MgF2").real)
-single = spectrum(np.array([quarter, 0.0, 0.0]))
-print(
-    f"mean reflectance: bare {100 * bare.mean():.2f} %, {quarter:.0f} nm of MgF2 {100 * single.mean():.2f} %,"
-)
-print(f"three layers {best.fun:.3f} %: {', '.join(f'{d:.1f}' for d in best.x)} nm from the air down")
-same = int(np.sum(losses < 1.02 * best.fun))
-print(f"{same} of {len(losses)} starts end there; the worst of the others at {losses.max():.2f} %")
-assert best.fun < 0.25 * 100 * single.mean()
-assert same < len(losses)
-
-# %%
-figure, axes = plt.subplots(figsize=(8, 3.2))
-for values, label, style in (
-    (bare, "bare glass", "k:"),
-    (single, f"{quarter:.0f} nm of MgF2", "C0--"),
-    (spectrum(best.x), "three layers", "C1-"),
-):
-    axes.plot(band, 100 * values, style, label=label)
-axes.set(xlabel="wavelength (nm)", ylabel="reflectance (%)", ylim=(0, None))
-axes.legend()
-plt.show()
-
-# %% [markdown]
-# The three layers reflect less than a quarter of the light that one layer reflects. Some starts end in
-# worse designs, so a single start would not be sufficient.
-#
-# At the minimum all three derivatives are zero, so small errors of the thicknesses have little effect. The
-# next cell computes the effect of a layer that is 5 nm too thick.
-
-# %%
-print("slopes at the minimum (% per nm):", np.round(loss(best.x)[1], 5))
-for i, name in enumerate(("MgF2", "HfO2", "Al2O3")):
-    print(f"{name:5} 5 nm too thick: {loss(best.x + 5.0 * np.eye(3)[i])[0] - best.fun:+.3f} %")
-assert np.all(np.abs(loss(best.x)[1]) < 1e-3)
 
 # %% [markdown]
 # ## The Cramér-Rao bound of a measurement

@@ -13,6 +13,7 @@ import pellicle as pl
 from pellicle.colour import delta_e2000, film, film_colour, integration_bands, lab, sensor
 
 from ..airy import airy
+from ..by_tmm import films
 
 THICKNESS = np.array([0.0, 40.0, 150.0, 420.0, 900.0, 1600.0])
 ANGLE = np.array([0.0, 55.0])[:, None]
@@ -132,3 +133,25 @@ def test_unknown_methods_are_refused(name, refuses):
 
 def test_an_absorbing_ambient_is_refused(refuses):
     refuses(ValueError, "ambient", film_colour, 100.0, 1.4, 1.5, ambient=1.0 + 0.1j)
+
+
+def test_ten_layers_with_an_opaque_one_agree_with_tmm():
+    """Multiplied out, not in the loop of longer stacks."""
+    depths, gold = [60.0, 40.0, 90.0, 500.0, 60.0, 40.0, 90.0, 30.0, 60.0, 40.0], 0.4 + 2.5j
+    indices = [1.46, 2.4, 1.46, gold, 1.46, 2.4, 1.38, gold, 1.46, 2.4]
+    bands = integration_bands("uniform-16", "1931", "D65")
+    for opaque in (500.0, 5.0):
+        depths[3] = opaque
+        colour = film_colour(depths, indices, 1.5 + 0.1j, angle=50.0, method="uniform-16")
+        R = films("sp", bands.wavelength, [1.0, *indices, 1.5 + 0.1j], depths, 50.0)
+        np.testing.assert_allclose(colour.xyz, R @ bands.weights, rtol=1e-5)
+
+
+def test_a_known_material_is_computed_as_a_medium_that_may_tunnel(monkeypatch):
+    """Of a known transparent one the phase has a closed form; the other way differentiates."""
+    thickness, angle = np.linspace(0.0, 900.0, 20), np.linspace(0.0, 85.0, 20)
+    oxide, silicon = pl.material("SiO2"), pl.material("Si")
+    plain = film_colour(thickness, oxide, silicon, angle=angle).xyz
+    monkeypatch.setattr("pellicle.colour.film.interface.propagates", lambda *_: False)
+    tunnelling = film_colour(thickness, oxide, silicon, angle=angle).xyz
+    np.testing.assert_allclose(plain, tunnelling, rtol=1e-5)

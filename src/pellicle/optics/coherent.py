@@ -332,6 +332,7 @@ def responses(
     propagating: bool = False,
     roughness: Sequence[Any] | None = None,
     repeats: Repeats | None = None,
+    few: int = FEW,
 ) -> tuple[Response, ...]:
     """Return the response of coherent layers between two half spaces, for each polarisation in its order.
 
@@ -350,6 +351,7 @@ def responses(
     - `roughness`: k₀σ of each interface from the top down, one more than there are layers.
     - `repeats`: groups of layers that are repeated, each of which is in `layers` once. The face above such a
       layer is as rough in all repeats.
+    - `few`: layers up to which the product is multiplied out.
 
     ```python
     >>> from pellicle.optics.response import reflectance
@@ -365,7 +367,7 @@ def responses(
     for letters in polarisations if apart else [polarisations]:
         above, *between, below = (seen_by(n, letters) for n in (ambient, *layers, substrate))
         several = repeats is not None and repeats.count > 1
-        if several or roughness is not None or is_graded(layers) or len(layers) > FEW:
+        if several or roughness is not None or is_graded(layers) or len(layers) > few:
             results += stack(above, between, below, phases, angle, letters, roughness, repeats)
         elif len(layers) == 1:
             results += film(above, between[0], below, phases[0], angle, letters, propagating)
