@@ -105,6 +105,7 @@ BAD = {
     "negative": csv("wavelength_nm,R", NM, -NM),
     "percent": csv("wavelength_nm,R", NM, 0 * NM + 40),
     "missing": "wavelength_nm,R\n500,0.2\n510,\n520,0.3\n",
+    "constants": csv("wavelength_nm,n,k", NM, NM / 400, 0 * NM),
     "html": "<html><body>not found</body></html>",
 }
 
@@ -194,6 +195,11 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     assert layer.roughness == 2.0
     assert isinstance(width, Free)
     assert width.lower == 0.0
+    answer = session.answer("recipe", body)  # which repeats this fit
+    (session.folder / "film.toml").write_text(answer["toml"])
+    again = pl.read_recipe(session.folder / "film.toml").scene()
+    assert (again.layers[0].thickness, again.instrument.bandwidth) == (layer.thickness, width)
+    assert answer["commands"]["toml"] == "Run it: pellicle fit recipe.toml, saved beside film.csv"
 
 
 def test_a_film_is_identified_and_shown(session):

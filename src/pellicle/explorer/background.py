@@ -2,7 +2,7 @@
 
 import atexit
 import threading
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from itertools import count
 from queue import PriorityQueue
 from typing import Any, TypeVar
@@ -88,11 +88,11 @@ class FitRun:
         self._running, self._stop = threading.Lock(), threading.Event()
         self._progress = ("", 0, 0)
 
-    def run(self, data: Sequence[Spectrum], scene: Scene) -> Fit | None:
-        """Fit a scene to spectra; None where it was stopped. Raises UsageError while another fit runs."""
-        return self.alone(
-            lambda: fit(data[0] if len(data) == 1 else list(data), scene, progress=self._report)
-        )
+    def run(self, data: Sequence[Spectrum], scene: Scene, options: Mapping[str, Any]) -> Fit | None:
+        """Fit a scene to spectra by options of a fit; None where it was stopped. Raises UsageError while
+        another fit runs."""
+        measured = data[0] if len(data) == 1 else list(data)
+        return self.alone(lambda: fit(measured, scene, progress=self._report, **options))
 
     def alone(self, work: Callable[[], Result]) -> Result | None:
         """Return what `work` returns, None where it was stopped. Raises UsageError while a fit runs."""

@@ -15,7 +15,7 @@ from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.base import AbstractDispersion
 from pellicle.errors import DataError, UsageError
-from pellicle.materials import Material
+from pellicle.materials import Material, materials_in
 from pellicle.materials.formats.detect import file_of, names_file
 from pellicle.recipes.media import medium
 from pellicle.recipes.write import recipe_text
@@ -136,6 +136,10 @@ class MaterialFiles:
             inside(self.folder, file_of(name))
             return medium(name, folder=self.folder)
         return medium(name, name="an index")
+
+    def used(self, scene: Scene | Surface) -> list[str]:
+        """Names of the files that were sent and that are media of a scene."""
+        return [material.page for material in materials_in(scene) if material.page in self._contents]
 
     def recipe(self, scene: Scene | Surface, folder: Path, **about: Any) -> str:
         """The recipe of a scene, with the names of the files that were sent. Raises as `recipe_text`."""

@@ -58,6 +58,9 @@ def in_words(message: str) -> str:
         value = value.replace('"', "").replace(", ", ":" if name == "range" else ",")
         return f"{_label(name)} {value}".rstrip()
 
+    message = message.replace(
+        "give the file as `layer` or `substrate`", "drop it on a layer or the substrate"
+    )
     return " ".join(_ARGUMENT.sub(field, message).replace("`", "").split())
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.data.options import FitOptions
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.explorer import reading_fields
@@ -127,7 +128,8 @@ class Session:
         scene = scene_with(view.scene, view.controls, values, names)
         if "angle" not in names and all(spectrum.angle is not None for spectrum in self.shown.spectra):
             scene = with_value(scene, ANGLE, 0.0)  # angles of the data, whatever the slider has
-        fit = self._fit_run.run(all_covered(self.shown.spectra, scene), scene)
+        options = FitOptions.of(self.shown.reading).given()
+        fit = self._fit_run.run(all_covered(self.shown.spectra, scene), scene, options)
         if fit is None:
             return {"stopped": True}
         answer = fit_to_json(fit, view.controls)
@@ -162,9 +164,11 @@ class Session:
 
     def _recipe(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self.shown.at(body)
-        scene, folder = view.stated(values_of(view, body)), self.folder or Path.cwd()
+        fitted = fitted_names(view.controls, body.get("free")) if self.shown.spectra else None
+        scene, folder = view.stated(values_of(view, body), fitted), self.folder or Path.cwd()
         if isinstance(scene, Surface) or isinstance(view, SurfaceExplorerView):
-            return {"toml": self.shown.materials.recipe(scene, folder), "python": python_program(scene)}
+            toml = self.shown.materials.recipe(scene, folder)
+            return {"toml": toml, "python": python_program(scene), "commands": _commands("simulate", "")}
         about: dict[str, Any] = {"wavelength": view.wavelength}
         program = python_program(view.sampled(scene))
         if self.shown.spectra:
@@ -172,7 +176,13 @@ class Session:
             about = {"files": files, "reading": self.shown.reading}
         if self.shown.spectra and np.ndim(scene.light.angle):  # those of the files
             scene = with_value(scene, ANGLE, 0.0)
-        return {"toml": self.shown.materials.recipe(scene, folder, **about), "python": program}
+        verb = "fit" if self.shown.spectra else "simulate"
+        beside = [Path(spectrum.path).name for spectrum in self.shown.spectra] + self.shown.materials.used(
+            scene
+        )
+        files = ", ".join(dict.fromkeys(beside))
+        toml = self.shown.materials.recipe(scene, folder, **about)
+        return {"toml": toml, "python": program, "commands": _commands(verb, files)}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, warnings = self.shown.at(body), []
@@ -225,3 +235,10 @@ class Session:
             # a ValueError, of a colour without data, is raised by the view that wants it
             with suppress(ValueError):
                 self._compiler.get((view.key(kind), needed), partial(view.compile, kind, needed), urgency)
+
+
+def _commands(verb: str, files: str) -> dict[str, str]:
+    """Sentences that say how to run a recipe and a program that are saved beside the files that they name."""
+    place = f", saved beside {files}" if files else ""
+    out = "" if verb == "fit" else " --out film.csv"
+    return {"toml": f"Run it: pellicle {verb} recipe.toml{out}{place}", "python": "Run it: python film.py"}

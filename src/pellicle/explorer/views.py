@@ -229,9 +229,11 @@ class FilmView:
         """Draw a ball with the `colours` that the program "sphere" computed, as a PNG."""
         return ball_rendering(colours, size)
 
-    def stated(self, values: Mapping[str, float]) -> Scene:
-        """Return the scene with these values, at which its own free numbers start, at no wavelengths."""
-        free = [control.name for control in self.controls if control.free is not None]
+    def stated(self, values: Mapping[str, float], fitted: Sequence[str] | None = None) -> Scene:
+        """Return the scene with these values, at which its free numbers start, its own or those that are
+        fitted; at no wavelengths."""
+        own = [control.name for control in self.controls if control.free is not None]
+        free = own if fitted is None else fitted
         one = len(self.angles) == 1
         scene = with_value(self.scene, ANGLE, float(self.angles[0])) if one else self.scene
         return scene_with(scene, self.controls, values, free)
@@ -340,7 +342,7 @@ class SurfaceExplorerView:
         """Return the surface with these values, fixed."""
         return replace(self.scene, numbers=self._numbers(values))
 
-    def stated(self, values: Mapping[str, float]) -> Surface:
+    def stated(self, values: Mapping[str, float], fitted: Sequence[str] | None = None) -> Surface:
         """Return the surface with these values, at which its own free numbers start."""
         numbers = self._numbers(values)
         for key, free in self.scene.numbers.items():

@@ -361,8 +361,8 @@ export async function explore(element, call, options = {}) {
   // ---- recipe, Python, link ----
   const dialog = textDialog(id);
   async function showText(kind, title, name) {
-    const answer = await ask("recipe", { values: values() });
-    if (!answer.error) dialog.show(title, answer[kind], name);
+    const answer = await ask("recipe", fits.body(true));
+    if (!answer.error) dialog.show(title, answer[kind], name, answer.commands[kind]);
   }
   async function reset() {
     const answer = await ask("reset");

@@ -58,10 +58,12 @@ function textDialog(id) {
   const copy = make("button", { type: "button", onclick: () => copyText(code.textContent, copy, element) }, "Copy");
   const save = make("a", { class: "button", download: "" }, "Download");
   const close = make("button", { type: "button", onclick: () => element.close() }, "Close");
-  const element = make("dialog", { "aria-labelledby": title.id }, title, make("pre", { tabindex: 0 }, code),
+  const how = make("p", { class: "soft" });
+  const element = make("dialog", { "aria-labelledby": title.id }, title, make("pre", { tabindex: 0 }, code), how,
     make("p", { class: "buttons" }, copy, save, close));
-  const show = (heading, text, name) => {
+  const show = (heading, text, name, command) => {
     title.textContent = heading;
+    how.textContent = command;
     code.textContent = text;
     URL.revokeObjectURL(save.href);
     save.href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
