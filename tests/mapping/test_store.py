@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from pellicle.fitting.batch.data import CODES
 from pellicle.mapping import run
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
+from pellicle.mapping.store import held
 from pellicle.reporting.map_text import cube_report
 
 pytestmark = pytest.mark.usefixtures("small_blocks")
@@ -144,7 +146,6 @@ def test_another_input_scene_or_option_is_not_mixed_in(mapped, cube, refuses):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="folders cannot be locked")
 def test_a_map_that_another_run_writes_is_left_alone(mapped, fake_fits):
     """The run is within its first block; the other one would remove its store."""
 
@@ -243,7 +244,6 @@ def test_arrays_of_a_map_in_a_temporary_folder_outlive_it(cube, scene, fake_fits
     assert int((dataset["status"] == CODES["converged"]).sum()) == 45 * 32 - 2
 
 
-@pytest.mark.skipif(os.name == "nt", reason="files are not locked")
 def test_two_runs_that_replace_a_map_at_once_do_not_share_its_store(mapped, fake_fits, monkeypatch, refuses):
     """The second run comes while the first has removed the old store and not made the new one."""
     mapped()
@@ -257,3 +257,35 @@ def test_two_runs_that_replace_a_map_at_once_do_not_share_its_store(mapped, fake
     made = mapped(overwrite=True)
     assert made.finished
     assert not list(made.path.parent.glob(".*"))  # the lock is removed
+
+
+@pytest.mark.skipif(os.name == "nt", reason="is tried by the test above")
+def test_a_place_is_held_without_fcntl(monkeypatch, tmp_path, refuses):
+    """As on Windows: another module locks, with another error, and no open file can be removed."""
+    import fcntl
+
+    class Msvcrt:
+        LK_NBLCK = 2
+
+        @staticmethod
+        def locking(handle, mode, count):
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise PermissionError(13, "Permission denied") from None
+
+    unlink, opened, close = Path.unlink, set(), os.close
+
+    def refused(path, **options):
+        if opened:
+            raise PermissionError(13, "used by another process")
+        unlink(path, **options)
+
+    monkeypatch.setitem(sys.modules, "msvcrt", Msvcrt)
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setattr(Path, "unlink", refused)
+    monkeypatch.setattr(os, "close", lambda handle: (close(handle), opened.clear()))
+    with held(tmp_path / "map.zarr"):
+        refuses(UsageError, "another run is writing there", held(tmp_path / "map.zarr").__enter__)
+        opened.add("lock")
+    assert not list(tmp_path.iterdir())

@@ -265,7 +265,8 @@ def test_sites_have_a_row_each_and_statistics_below():
     status = np.array([CODES[x] for x in ("converged", "converged", "misfit", "converged")])
     nm = np.array([98.0, 100.0, 500.0, 105.0])
     where = {"x": ("site", [0.0, 1, 2, 3], {"units": "mm"}), "y": ("site", [0.0, 0, 1, 1], {"units": "mm"})}
-    dataset = made(status, nm, ("site",), where | {"file": ("site", ["a.csv", "b.csv", "c.csv", "d.csv"])})
+    files = np.array(["a.csv", "b.csv", "c.csv", "d.csv"], np.dtypes.StringDType())  # as zarr has them
+    dataset = made(status, nm, ("site",), where | {"file": ("site", files)})
     header, *rows = sites_csv(dataset, summarise(dataset)).splitlines()
     errors = "thickness_stderr,thickness_stderr_noise"
     assert header == f"\ufeffsite,x (mm),y (mm),status,thickness (nm),{errors}"

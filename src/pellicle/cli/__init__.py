@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 from cyclopts import App, Parameter
 
 from pellicle.cli.chart import chart
+from pellicle.cli.console import print_every_sign
 from pellicle.cli.cost import cost, plan
 from pellicle.cli.doctor import doctor
 from pellicle.cli.explore import explore
@@ -92,6 +93,7 @@ def main() -> int:
     6 a limit of --spec that is not met, 130 interrupted. With --json an error is printed on stdout too, as a
     JSON object.
     """
+    print_every_sign()
     with interruptible():
         code, error = _outcome(sys.argv[1:])
     if error and "--json" in sys.argv:

@@ -291,16 +291,11 @@ def held(path: Path) -> Iterator[None]:
         yield
     finally:
         if handle is not None:
-            lock.unlink(missing_ok=True)
-            os.close(handle)
+            _release(handle, lock)
 
 
 def _locked(lock: Path, path: Path) -> int | None:
-    """An open and locked file; None where there are no locks, or none can be written."""
-    if os.name == "nt":
-        return None
-    import fcntl
-
+    """An open and locked file; None where the file system has no locks, or none can be written."""
     while True:
         try:
             lock.parent.mkdir(parents=True, exist_ok=True)
@@ -308,7 +303,7 @@ def _locked(lock: Path, path: Path) -> int | None:
         except OSError:  # reported by what writes the store
             return None
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(handle)
             if os.path.samestat(os.fstat(handle), lock.stat()):
                 return handle
         except BlockingIOError:
@@ -321,6 +316,32 @@ def _locked(lock: Path, path: Path) -> int | None:
         except OSError:  # a file system without locks
             return handle
         os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Lock an open file for this process. Raises BlockingIOError where another process has it."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        import msvcrt
+
+        try:
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # pyright: ignore[reportAttributeAccessIssue]
+        except PermissionError as error:
+            raise BlockingIOError(*error.args) from None
+    else:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _release(handle: int, lock: Path) -> None:
+    """Remove the file of a lock, and close it."""
+    try:
+        lock.unlink(missing_ok=True)
+        os.close(handle)
+    except PermissionError:  # Windows removes no open file
+        os.close(handle)
+        with suppress(PermissionError):  # of a run that has just taken it
+            lock.unlink(missing_ok=True)
 
 
 def write_dataset(path: str | os.PathLike[str], dataset: Dataset) -> None:

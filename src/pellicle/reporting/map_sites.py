@@ -30,8 +30,11 @@ def sites_csv(made: Dataset | Map, summary: MapSummary) -> str:
     frames = status.size // axes.x.values.size
     called = [name for name in ("name", "file", str(along)) if name in dataset.coords]
     names = dataset.coords[called[0]] if called else None
-    labels = np.arange(1, axes.x.values.size + 1).astype(str) if names is None else names.values.astype(str)
-    columns = {"site": [*np.tile(labels, frames), "mean", "standard deviation", "range", "uniformity (%)"]}
+    # texts of a store are of any length, which NumPy repeats only as objects
+    labels = np.arange(1, axes.x.values.size + 1) if names is None else np.asarray(names, dtype=object)
+    columns = {
+        "site": [*map(str, np.tile(labels, frames)), "mean", "standard deviation", "range", "uniformity (%)"]
+    }
     if axes.series is not None:
         columns[axes.series.label] = [*np.repeat(axes.series.values, axes.x.values.size), *[""] * 4]
     for axis in (axes.x, axes.y):
