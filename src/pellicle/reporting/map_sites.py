@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def sites_csv(made: Dataset | Map, summary: MapSummary) -> str:
     names = dataset.coords[called[0]] if called else None
     # texts of a store are of any length, which NumPy repeats only as objects
     labels = np.arange(1, axes.x.values.size + 1) if names is None else np.asarray(names, dtype=object)
-    columns = {
+    columns: dict[str, list[Any]] = {
         "site": [*map(str, np.tile(labels, frames)), "mean", "standard deviation", "range", "uniformity (%)"]
     }
     if axes.series is not None:

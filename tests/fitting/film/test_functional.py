@@ -8,6 +8,8 @@ import pytest
 import pellicle as pl
 from pellicle.errors import UsageError
 
+from ...airy import airy
+
 NM = np.linspace(400.0, 900.0, 120)
 STARTS = [{"A": 1.5, "thickness": 480.0}, {"A": 1.45, "thickness": 530.0}]
 
@@ -40,6 +42,26 @@ def spectra():
 
 def starts(problem):
     return np.array([[start[name] for name in problem.names] for start in STARTS])
+
+
+def test_the_log_density_is_half_of_chi_squared_with_its_slope(spectra):
+    """χ² by the Airy formula in NumPy, with a normal prior on A."""
+    prior = pl.Free(1.4, 1.6, prior=pl.priors.Normal(1.48, 0.01))
+    with jax.enable_x64(True):
+        problem = pl.fitting.prepare(spectra[0], film(prior, pl.Free(100, 900)))
+        at = starts(problem) + 1e-3
+        density, slope = jax.vmap(jax.value_and_grad(problem.log_density))(at)
+        step = np.array([1e-6, 1e-4])[:, None] * np.eye(2)
+        up, down = (jax.vmap(problem.log_density)(at[0] + sign * step) for sign in (1, -1))
+
+    def half_chi2(values):
+        named = dict(zip(problem.names, values, strict=True))
+        index = named["A"] + 3000.0 / NM**2
+        residual = (airy(NM, named["thickness"], index, 3.9, 1.0) - spectra[0].values) / 0.002
+        return 0.5 * np.sum(residual**2) + 0.5 * ((named["A"] - 1.48) / 0.01) ** 2
+
+    assert density[1] - density[0] == pytest.approx(half_chi2(at[0]) - half_chi2(at[1]), rel=1e-6)
+    np.testing.assert_allclose(slope[0], (up - down) / (2 * step.sum(axis=0)), rtol=1e-4)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.fitting.coordinates import Array, Box
-from pellicle.fitting.evaluation import Static, Until, polished
+from pellicle.fitting.evaluation import Static, Until, explained, polished
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.minima import MOST, STEPS
@@ -47,6 +47,17 @@ class Prepared(eqx.Module):
     @property
     def upper(self) -> Array:
         return self._box.upper
+
+    def log_density(self, values: ArrayLike) -> Array:
+        """Log of the likelihood times the priors at `values` (parameters,), up to a constant, for samplers.
+
+        Scale, offset and other linear nuisances are integrated out. Pure and differentiable, also by reverse
+        mode; the bounds are left to the caller. Without a σ of the data that of the first guess is used.
+        """
+        values = jnp.asarray(values)
+        box = self._box
+        views, at = explained(self._static, self._arrays, box, (values - box.lower) / (box.upper - box.lower))
+        return -0.5 * (sum(view.deviance for view in views) + jnp.sum(box.prior_rows(at) ** 2))
 
     def with_data(self, values: ArrayLike, sigma: ArrayLike | None = None, *, spectrum: int = 0) -> Prepared:
         """The problem with other values of one of its spectra, for `jax.vmap` over data.
