@@ -30,7 +30,8 @@ def film(session, tmp_path):
 
 
 def test_a_layer_is_added_and_others_keep_the_values_of_their_sliders(session, tmp_path):
-    rows = [AIR, {"was": None, "material": "TiO2", "thickness": "20:90"}, ITSELF, {"material": "1.5"}]
+    oxide = {**ITSELF, "thickness": "200:400"}
+    rows = [AIR, {"was": None, "material": "TiO2", "thickness": "20:90"}, oxide, {"material": "1.5"}]
     answer = session.answer("layers", {"rows": rows, "values": {"thickness": 321.0, "roughness": 2.0}})
     assert answer["scene_changed"]
     about = session.answer("scene", {})
@@ -41,9 +42,9 @@ def test_a_layer_is_added_and_others_keep_the_values_of_their_sliders(session, t
         2,
     )
     texts = [(row["material"], row.get("thickness")) for row in about["layers"]]
-    assert texts == [("air", None), ("TiO2", "20:90"), ("SiO2", "10:1000"), ("1.5", None)]
+    assert texts == [("air", None), ("TiO2", "20:90"), ("SiO2", "200:400"), ("1.5", None)]
     scene = film(session, tmp_path)
-    oxide = pl.Layer("SiO2", pl.Free(10, 1000, start=321.0), roughness=2.0)
+    oxide = pl.Layer("SiO2", pl.Free(200, 400, start=321.0), roughness=2.0)
     wanted = pl.Scene([pl.Layer("TiO2", pl.Free(20, 90)), oxide], 1.5)
     [curve] = session.answer("view", {"want": ["curves"], "wait": True})["curves"]
     assert np.allclose(curve["y"], pl.simulate(wanted, NM).values, atol=2e-7)
