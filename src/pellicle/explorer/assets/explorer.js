@@ -394,7 +394,7 @@ export async function explore(element, call, options = {}) {
     sliders,
     make("section", { class: "spectrum", "aria-label": "Spectrum" }, alert, make("figure", {}, canvas, caption), reading),
     make("section", { class: "actions", "aria-label": "Data and results" },
-      make("div", { class: "zone" }, zone.element, stored, notes, reader.element), buttons, status, fits.said, warnings),
+      make("div", { class: "zone" }, zone.element, stored, notes, reader.element), buttons, fits.said, status, warnings),
     look,
     make("section", { class: "effects", "aria-labelledby": `${id}-plan` },
       make("h2", { id: `${id}-plan` }, "Plan: what is simulated, and why"), plan),
