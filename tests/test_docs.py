@@ -302,6 +302,7 @@ def test_commands_parse_and_their_files_exist(page):
 LONG_BLOCKS = (
     "docs/howto/absorption.md",
     "docs/howto/colours.md",
+    "docs/howto/design_colour.md",
     "docs/howto/loops.md",
     "docs/howto/maps.md",
     "docs/howto/mueller.md",
