@@ -11,12 +11,13 @@ from pellicle.data.measurement import Measurement, check_measurement
 from pellicle.errors import UsageError
 from pellicle.fitting import joint
 from pellicle.fitting.brdf import fit as brdf
-from pellicle.fitting.comparison import Comparison
+from pellicle.fitting.comparison import Comparison, best_explained
 from pellicle.fitting.comparison import compare as compare_fits
 from pellicle.fitting.film.fit import fit as fit_spectra
 from pellicle.fitting.film.samples import shared_by_each
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Fit
+from pellicle.fitting.robust_losses import LEAST_SQUARES
 from pellicle.sampling.result import Posterior
 from pellicle.sampling.sample import OF_A_FILM, STEPS, measured, sampled, subject_of
 from pellicle.scene.common_range import covered
@@ -72,6 +73,20 @@ def fit(
 
     ```
     """
+    return fitted(data, scene, shared, tolerance, loss, residual, progress)
+
+
+def fitted(
+    data: Measurement,
+    scene: Scene | Surface | Sequence[Scene | Surface],
+    shared: Sequence[str] | None = None,
+    tolerance: float = 0.0,
+    loss: str = LEAST_SQUARES,
+    residual: str | None = None,
+    progress: Progress = quiet,
+    explained: bool = True,
+) -> Fit:
+    """Fit as `fit` does; causes of a misfit are looked for where it is to be `explained`."""
     check_measurement(data)
     check_scene(scene, several=True)
     data, said = _covered(data, scene)
@@ -84,7 +99,8 @@ def fit(
         return brdf.fitted(measured((BrdfSamples,), data), scene, tolerance, progress, loss, residual)[0]
     refuse("a Scene", residual=residual)
     films = measured(OF_A_FILM, data)
-    of_film = fit_spectra(films, both[1], shared=shared, tolerance=tolerance, loss=loss, progress=progress)
+    options = {"shared": shared, "tolerance": tolerance, "loss": loss, "progress": progress}
+    of_film = fit_spectra(films, both[1], **options, explained=explained)
     return replace(of_film, warnings=(*said, *of_film.warnings))
 
 
@@ -177,7 +193,11 @@ def compare(
         return compare_fits(data)
     if not isinstance(scenes, Mapping):
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
-    options = {"tolerance": tolerance, "residual": residual, "progress": progress}
     own = shared_by_each(scenes, shared)
     measured, _ = _covered(data, *scenes.values())
-    return compare_fits({n: fit(measured, scene, shared=own[n], **options) for n, scene in scenes.items()})
+
+    def of(name: str, explained: bool) -> Fit:
+        options = own[name], tolerance, LEAST_SQUARES, residual, progress, explained
+        return fitted(measured, scenes[name], *options)
+
+    return best_explained(scenes, of)

@@ -3,7 +3,7 @@
 from functools import partial
 from logging import getLogger
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -112,20 +112,22 @@ def _compare(
     candidates: dict[str, Inputs], position: int, paths: list[str], folder: Path | None, as_json: bool
 ) -> int:
     """Compare the fits of one group of files, print and write the result, and return its exit code."""
-    from pellicle.api.fits import fit
-    from pellicle.fitting.comparison import compare as compare_fits
+    from pellicle.api.fits import fitted
+    from pellicle.fitting.comparison import best_explained
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
 
-    label = ", ".join(paths)
-    fits = {}
+    label, first = ", ".join(paths), next(iter(candidates))
+
+    def fitted_by(name: str, explained: bool) -> Any:
+        log.info("comparison: now %s", name)
+        files, residual = candidates[name].groups[position], candidates[name].residual
+        data, scene = measurement(files, len(files) > 1, notes=name == first and not explained)
+        with Progress(f"{label}, {name}") as progress:
+            options = {"residual": residual, "progress": progress, "explained": explained}
+            return with_flags(fitted(data, scene, **options))
+
     try:
-        for name, candidate in candidates.items():
-            log.info("comparison: now %s", name)
-            files = candidate.groups[position]
-            data, scene = measurement(files, len(files) > 1, notes=not fits)
-            with Progress(f"{label}, {name}") as progress:
-                fits[name] = with_flags(fit(data, scene, residual=candidate.residual, progress=progress))
-        comparison = compare_fits(fits)
+        comparison = best_explained(candidates, fitted_by)
     except ValueError as error:
         message = error_message(error, [label])
         return reported(message, failure(label, message) if as_json else None)

@@ -27,6 +27,9 @@ ORDER = (
 )
 """The first status that holds is given."""
 
+REFUSED = (Status.MISFIT, Status.NOT_CONVERGED)
+"""Statuses of a fit of which causes are looked for by refits."""
+
 
 class Judged(NamedTuple):
     """Positions (...) of a status in `ORDER`, and the free parameters of the sample (..., parameters) that

@@ -40,12 +40,10 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.fitting.result import Estimate, Fit, Rival, Status
 from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.robust_losses import LEAST_SQUARES, ROBUST, check_loss
-from pellicle.fitting.status import expanded, verdict
+from pellicle.fitting.status import REFUSED, expanded, verdict
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, remembered
 
-_REFUSED = (Status.MISFIT, Status.NOT_CONVERGED)
-"""Statuses of a fit of which causes are looked for by refits."""
 Film: TypeAlias = Spectrum | Colours | Sequence[Spectrum | Colours]
 """Measurements of one film."""
 
@@ -58,6 +56,7 @@ def fit(
     tolerance: float = 0.0,
     loss: str = LEAST_SQUARES,
     progress: Progress = quiet,
+    explained: bool = True,
 ) -> Fit:
     """Fit the free parameters of `scene` to a spectrum or colours, in float64 whatever the caller's setting.
 
@@ -72,14 +71,15 @@ def fit(
 
     With the `loss` "huber" or "student-t" a few outliers hardly count; it is "least-squares" otherwise.
 
-    `progress` is called with a stage's name, how much is done and how much there is. Returns a
-    `Fit`: best parameters with errors, rivals, a status and what was simulated.
+    Where the scene does not fit, usual mistakes are tried by refits, which compile programs of their own; not
+    if it need not be `explained`. `progress` is called with a stage's name, how much is done and how much
+    there is. Returns a `Fit`: best parameters with errors, rivals, a status and what was simulated.
 
     **Raises:** UsageError where nothing is free, where scenes are not of one sample, an uncalibrated
     signal is given a fixed scale or the loss is unknown; ValueError where a material has no data at a
     wavelength, naming it.
     """
-    return fitted(data, scene, tolerance, progress, loss, shared)[0]
+    return fitted(data, scene, tolerance, progress, loss, shared, explained)[0]
 
 
 def fitted(
@@ -89,6 +89,7 @@ def fitted(
     progress: Progress,
     loss: str = LEAST_SQUARES,
     shared: Sequence[str] | None = None,
+    explained: bool = True,
 ) -> tuple[Fit, RankedMinima]:
     """The result of `fit`, and the ranked minima that it rests on."""
     check_loss(loss)
@@ -102,9 +103,9 @@ def fitted(
             gives = f"{expanded(lead)} ({robust.status})"
             remark = f'{spikes}: `loss="{ROBUST}"` lets them count less, and gives {lead.name} {gives}'
             fit = replace(fit, warnings=(remark, *fit.warnings))
-        if fit.status not in _REFUSED:
+        if fit.status not in REFUSED:
             return fit, ranked
-        if targets[0].scene.sample is not None:  # mistakes are those of one sample
+        if not explained or targets[0].scene.sample is not None:  # mistakes are those of one sample
             causes = likely_cause(discrepancy, ranked.problem.parameters)
             return replace(fit, warnings=(*causes, *fit.warnings)), ranked
 
@@ -207,7 +208,7 @@ def _fit(
         # the few residuals of colours have a cause in any case, where they are noise
         *(
             likely_cause(judged.best.discrepancy, ranked.problem.parameters)
-            if judged.conclusion.status not in _REFUSED and (judged.missed or not colours)
+            if judged.conclusion.status not in REFUSED and (judged.missed or not colours)
             else []
         ),
         *default_bounds.remarks(ranked, wider.binding),
