@@ -1,4 +1,4 @@
-"""Verdicts on isotropic and birefringent descriptions of one film, from fits written down by hand."""
+"""Verdicts on descriptions of one film, isotropic and birefringent ones, from fits written down by hand."""
 
 import dataclasses
 
@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.fitting.comparison import Candidate, Comparison
+from pellicle.fitting import comparison
+from pellicle.fitting.comparison import Candidate, Comparison, best_explained
 from pellicle.fitting.curves import BIREFRINGENCE, Curve, Index
-from pellicle.fitting.result import Estimate, Part
+from pellicle.fitting.result import Estimate, Part, Status
 from pellicle.forward_model.plan import Plan, Row
 from tests.made_fits import made_fit
 
@@ -73,3 +74,23 @@ def test_evidence_is_strong_where_the_number_is_beyond_its_total_error(error, wo
     native = Estimate("native.k", 1.0, error, "", 0.0, 9.0, True, stderr_noise=0.01)
     fit = dataclasses.replace(more.fit, parameters=more.fit.parameters | {"native.k": native})
     assert words in Comparison((plain, dataclasses.replace(more, fit=fit, free=3)), 100.0).verdict
+
+
+@pytest.mark.parametrize("status", [Status.CONVERGED, Status.MISFIT])
+def test_causes_are_looked_for_of_the_best_alone_and_only_of_a_misfit(monkeypatch, status):
+    worse, best = candidate("worse", -9.0), candidate("best", 0.0)
+    fits = {
+        "worse": dataclasses.replace(worse.fit, status=Status.MISFIT),
+        "best": dataclasses.replace(best.fit, status=status),
+    }
+
+    def fit(name, explained):
+        return dataclasses.replace(fits[name], warnings=("a cause",) if explained else ())
+
+    def compare(done):
+        rows = (dataclasses.replace(row, fit=done[row.name]) for row in (worse, best))
+        return Comparison(tuple(rows), 100.0)
+
+    monkeypatch.setattr(comparison, "compare", compare)
+    causes = {row.name: row.fit.warnings for row in best_explained(fits, fit).candidates}
+    assert causes == {"worse": (), "best": ("a cause",) if status is Status.MISFIT else ()}
