@@ -13,10 +13,11 @@ from pellicle.cli import app
 from pellicle.colour.spaces import camera_encoding
 from pellicle.data.movies import frames_of, is_movie, read_movie
 from pellicle.errors import DataError, UsageError
+from pellicle.mapping.movie_fit import levels_of
 from pellicle.mapping.movie_light import FilmLight, black_from, is_gone, noise_of, parts_of
 from pellicle.mapping.movie_paths import FAR, TURN, paths_of
 from pellicle.mapping.series_result import SURE
-from pellicle.mapping.thinning_law import thinning_laws
+from pellicle.mapping.thinning_law import Looks, thinning_laws
 from pellicle.mapping.trace_light import Light
 from pellicle.mapping.trace_path import Course
 
@@ -63,14 +64,14 @@ def front(start):
 
 
 def paths(thickness, colour=False, turn=TURN, **about):
-    """Paths of all places, and their distance from the truth in nm (times, places)."""
+    """Paths of all places, their distance from the truth in nm (times, places), their light and its model."""
     light = seen(thickness, colour, **about)
     noise, span = noise_of(light, 1e-4)
     lights = [Light(light[:, p], TIME, noise, span, (None, None)) for p in range(light.shape[1])]
     film = FilmLight(GRID, camera(GRID, colour), ORDER, True)
     found = paths_of(lights, (len(lights),), film, Course(turn, FAR * ORDER))
     away = np.stack([found.found[p].thickness for p in range(len(lights))], axis=1) - thickness
-    return found, away
+    return found, away, lights, film
 
 
 @pytest.mark.parametrize(
@@ -83,17 +84,23 @@ def paths(thickness, colour=False, turn=TURN, **about):
     ],
 )
 def test_the_order_is_that_of_the_film(thickness, colour):
-    found, away = paths(thickness, colour)
+    found, away, lights, film = paths(thickness, colour)
     assert found.sure > SURE
     # windows blur a sharp edge
     assert np.mean(np.abs(away) < 0.25 * ORDER) > 0.97
     assert np.mean(np.abs(away) < 0.75 * ORDER) == 1
     black = {p for p, path in found.found.items() if path.black is not None}
     assert black == {int(p) for p in np.flatnonzero((thickness[-9:] < 25).all(axis=0))}
+    if not colour and len(black) == 16:  # without a sharp edge
+        some = range(0, 16, 4)
+        levels = levels_of([lights[p] for p in some], [found.found[p] for p in some], film, found.gain)
+        error = np.sqrt(np.sum(levels.effects[:, levels.by_noise] ** 2, axis=1))
+        assert np.all(np.abs(levels.gain - [2.3, 0.06])[0] < 3 * error)
+        assert error[0] < 0.01 * 2.3 < np.abs(found.gain[0, 0] - 2.3)  # that of the paths alone
 
 
 def test_one_colour_without_a_black_film_decides_no_order():
-    found, _ = paths(wedge(60.0))
+    found, *_ = paths(wedge(60.0))
     assert found.sure < SURE
 
 
@@ -128,21 +135,41 @@ def test_jumps_of_all_places_are_breaks_or_left_out():
     assert parts_of(light[kept], TIME[kept], span)[0] == [range(154)]
 
 
+def laws_of(time, thickness, off, stderr=0.5, common=None):
+    """Laws of looks that are `off` a thickness, with independent errors and one in common."""
+    column = np.zeros((len(time), 0)) if common is None else common[:, None]
+    return thinning_laws(time, thickness, Looks(thickness + off, np.full(len(time), stderr), column))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_laws_of_thinning(seed):
     noise = np.random.default_rng(seed).normal(0, 0.5, 160)
-    stderr = np.full(160, 0.5)
     time = TIME + 5
-    power = thinning_laws(time, 2000 * time**-0.5 + noise, stderr)
+    power = laws_of(time, 2000 * time**-0.5, noise)
     assert {law.name for law in power[:2]} == {"power", "power-shifted"}
     value, error = next(law for law in power if law.name == "power").numbers["exponent"]
     assert abs(value - 0.5) < 4 * error < 0.02
-    exponential = thinning_laws(TIME, 900 * np.exp(-TIME / 40) + noise, stderr)[0]
+    exponential = laws_of(TIME, 900 * np.exp(-TIME / 40), noise)[0]
     assert exponential.name == "exponential"
     value, error = exponential.numbers["time constant"]
     assert abs(value - 40) < 4 * error < 1.5
     np.testing.assert_allclose(exponential.thickness(TIME), 900 * np.exp(-TIME / 40), rtol=0.02)
-    assert thinning_laws(TIME[:5], np.ones(5), stderr[:5]) == []
+    assert laws_of(TIME[:5], np.ones(5), noise[:5]) == []
+
+
+def test_errors_of_laws_hold_errors_that_all_times_have_in_common():
+    """A gain that is off bends all thicknesses coherently, by less than the noise of each."""
+    bend, away = TIME / 100, []
+    for seed in range(16):
+        random = np.random.default_rng(seed)
+        off = random.normal(0, 2, 160) + random.standard_normal() * bend
+        law = next(
+            x for x in laws_of(TIME, 900 * np.exp(-TIME / 40), off, 2, bend) if x.name == "exponential"
+        )
+        value, error = law.numbers["time constant"]
+        away.append((value - 40) / error)
+    assert np.mean(np.abs(away) < 1.96) >= 0.9
+    assert 0.6 < np.sqrt(np.mean(np.square(away))) < 1.3
 
 
 def written(folder, light, bits=8, skipped=()):

@@ -8,7 +8,7 @@ then joins all times of a place, linearised around its path, again after each pa
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from logging import getLogger
 from typing import TYPE_CHECKING, Any
@@ -20,14 +20,13 @@ from pellicle.data.movies import Movie, frames_of, read_movie
 from pellicle.data.read_colours import check_photograph
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES, NO_DATA, STATUSES
-from pellicle.fitting.noise import correlation_length
 from pellicle.fitting.result import Status
 from pellicle.mapping.growth import TIME
+from pellicle.mapping.movie_fit import levels_of, smoothed_place
 from pellicle.mapping.movie_light import BLACK, FilmLight, film_light, is_gone, noise_of, parts_of
-from pellicle.mapping.movie_paths import FAR, TURN, Paths, PlacePath, levels, paths_of
+from pellicle.mapping.movie_paths import FAR, TURN, Paths, paths_of
 from pellicle.mapping.series_result import SURE, decided_share, status_counts
-from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
-from pellicle.mapping.thinning_law import Law, thinning_laws
+from pellicle.mapping.thinning_law import Law, Looks, thinning_laws
 from pellicle.mapping.trace import lost
 from pellicle.mapping.trace_light import LEAST, Light
 from pellicle.mapping.trace_path import Course
@@ -40,15 +39,8 @@ if TYPE_CHECKING:
 
 log = getLogger(__name__)
 
-_PASSES = 5
-_SHORT = 1 / 12
-"""Largest change of a thickness in a pass, in orders."""
-_MODEL = 0.005
-"""Error of the model as a share of the range of the light."""
-_LEVEL, _FOR_GAIN = 0.005, 12
-"""Error of gain and dark level, relative and as a share of the range of the light; places that give them."""
-_EDGE = 0.15
-"""Step of a path at the border of the black film, in orders, at which the rate starts anew."""
+_FOR_GAIN = 12
+"""Places that give gain and dark level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +159,9 @@ def _fitted(
     noise, span = noise_of(movie.light, movie.step)
     parts, out = parts_of(movie.light, movie.time, span)
     values = np.where(out[:, None, None], np.nan, movie.light)
-    answer = _Answer.empty(values.shape[:2])
+    relative = float(np.hypot(scene.uncertainty.index, scene.uncertainty.wavelength / (nm or 550.0)))
+    chosen = _chosen(points, movie)
+    answer = _Answer.empty(values.shape[:2], chosen, relative)
     every, told = list[Paths](), list[str]()
     for part in parts:
         some, time = values[part.start : part.stop], movie.time[part.start : part.stop]
@@ -184,10 +178,8 @@ def _fitted(
             answer.put(part, lights, film, found)
     if not every:
         raise UsageError(f"{movie.path}: no thickness within its bounds follows the light: widen them")
-    relative = np.hypot(scene.uncertainty.index, scene.uncertainty.wavelength / (nm or 550.0))
-    dataset = answer.dataset(movie, film, relative)
-    chosen = _chosen(points, movie)
-    laws = tuple(_laws(dataset, movie, place) for place in chosen)
+    dataset = answer.dataset(movie)
+    laws = tuple(answer.laws(movie.time, place) for place in chosen)
     breaks = tuple(float(movie.time[part.start]) for part in parts[1:])
     black = answer.first_black(movie.time)
     told += _warnings(movie, dataset, parts, out, black is not None)
@@ -201,47 +193,44 @@ def _fitted(
 
 @dataclass
 class _Answer:
-    """Arrays (times, places) of a result while it is filled."""
+    """Arrays (times, places) of a result while it is filled, and looks at the chosen places; `relative` is
+    the error that all thicknesses have in common."""
 
     values: dict[str, np.ndarray]
     status: np.ndarray
-    blacks: dict[int, int]
-    gains: list[np.ndarray]
+    chosen: tuple[int, ...]
+    relative: float
+    looks: dict[int, Looks] = field(default_factory=dict)
+    blacks: dict[int, int] = field(default_factory=dict)
+    gains: list[np.ndarray] = field(default_factory=list)
 
     @classmethod
-    def empty(cls, shape: tuple[int, ...]) -> _Answer:
-        names = "thickness", "noise", "common", "rate", "rate_noise", "rival"
-        return cls({name: np.full(shape, np.nan) for name in names}, np.zeros(shape, np.uint8), {}, [])
+    def empty(cls, shape: tuple[int, ...], chosen: tuple[int, ...], relative: float) -> _Answer:
+        names = "thickness", "noise", "common", "rate", "rate_noise", "rate_common", "rival"
+        values = {name: np.full(shape, np.nan) for name in names}
+        return cls(values, np.zeros(shape, np.uint8), chosen, relative)
 
     def put(self, part: range, lights: list[Light], film: FilmLight, found: Paths) -> None:
         """Smooth the paths of a part, from the surest place on, and take over the answer."""
-        rows, like, gain = slice(part.start, part.stop), None, found.gain
-        some, refined = list(found.found)[:: -(-len(found.found) // _FOR_GAIN)], {}
-        # the stiffness of the place that changes most is enough for the others
-        some.sort(key=lambda p: -np.abs(np.diff(found.found[p].thickness)).sum())
-        for place in some:  # windows are longer than frames, and blur the extrema
-            made, _ = _smoothed(lights[place], found.found[place], film, gain, like)
-            like = like or made
-            refined[place] = film.grid[0] + (film.grid[-1] - film.grid[0]) * made.mean[:, 0]
-        gain = levels(lights, refined, film)
-        self.gains.append(gain)
+        rows, some = slice(part.start, part.stop), list(found.found)[:: -(-len(found.found) // _FOR_GAIN)]
+        levels = levels_of([lights[p] for p in some], [found.found[p] for p in some], film, found.gain)
+        self.gains.append(levels.gain)
         for place, path in found.found.items():
             light = lights[place]
-            made, residual = _smoothed(light, path, film, gain, like)
+            fit = smoothed_place(light, path, film, levels)
             known = np.asarray(np.isfinite(light.values).all(axis=1))
-            scale = film.grid[-1] - film.grid[0]
-            columns = {
-                "thickness": film.grid[0] + scale * made.mean[:, 0],
-                "noise": scale * np.sqrt(made.variance[:, 0]),
-                "common": scale * np.sqrt(made.systematic[:, 0]),
-                "rate": scale * made.rate[:, 0],
-                "rate_noise": scale * np.sqrt(made.rate_variance[:, 0]),
-                "rival": np.minimum(path.rival, found.sure),
-            }
+            columns = fit.columns(levels) | {"rival": np.minimum(path.rival, found.sure)}
             for name, column in columns.items():
                 self.values[name][rows, place] = np.where(known, column, np.nan)
+            if place in self.chosen:
+                looks = fit.looks(self.relative)
+                whole = self.looks.setdefault(
+                    place, Looks(*(np.full((len(self.status), *x.shape[1:]), np.nan) for x in looks))
+                )
+                for column, values in zip(whole, looks, strict=True):
+                    column[rows] = values
             status = np.full(len(known), CODES[BY_NEIGHBOURS], np.uint8)
-            astray = lost(residual, light)
+            astray = lost(fit.residual, light)
             if path.black is not None:
                 status[path.black :] = CODES[str(Status.CONVERGED)]
                 self.blacks[place] = part.start + path.black
@@ -256,16 +245,25 @@ class _Answer:
         place = min(self.blacks, key=self.blacks.__getitem__)
         return place, float(time[self.blacks[place]])
 
-    def dataset(self, movie: Movie, film: FilmLight, relative: float) -> Dataset:
-        """The result with its axes; `relative` is the error that all thicknesses have in common."""
+    def laws(self, time: np.ndarray, place: int) -> list[Law]:
+        """Thinning laws of a chosen place, without its black film and undecided times."""
+        if place not in self.looks:
+            return []
+        decided = self.status[:, place] == CODES[BY_NEIGHBOURS]
+        known = np.where(decided, self.values["thickness"][:, place], np.nan)
+        return thinning_laws(time, known, self.looks[place])
+
+    def dataset(self, movie: Movie) -> Dataset:
+        """The result with its axes."""
         import xarray
 
         dims, shape = (TIME, *movie.coords), (len(movie.time), *movie.shape)
         arrays = {name: x.reshape(shape).astype(np.float32) for name, x in self.values.items()}
-        noise, rate = arrays["noise"], f"nm/{movie.unit}"
-        common = np.hypot(arrays["common"], relative * arrays["thickness"])
-        arrays["stderr"] = np.hypot(noise, common)
-        arrays["rate_stderr"] = np.hypot(arrays["rate_noise"], relative * arrays["rate"])
+        rate = f"nm/{movie.unit}"
+        for name, of in ("stderr", "thickness"), ("rate_stderr", "rate"):
+            before = "" if of == "thickness" else "rate_"
+            common = np.hypot(arrays[f"{before}common"], self.relative * arrays[of])
+            arrays[name] = np.hypot(arrays[f"{before}noise"], common)
         about = (
             ("thickness", "thickness", "thickness", "nm"),
             ("thickness_stderr", "stderr", "standard error of the thickness", "nm"),
@@ -291,44 +289,6 @@ class _Answer:
         return xarray.Dataset(made, axes, {"Conventions": "CF-1.11", "source": movie.path})
 
 
-def _smoothed(
-    light: Light, path: PlacePath, film: FilmLight, gain: np.ndarray, like: Smoothed | None
-) -> tuple[Smoothed, np.ndarray]:
-    """The thickness of a place from all its times together, and the residuals (times, channels)."""
-    low, scale = film.grid[0], film.grid[-1] - film.grid[0]
-    thickness = path.thickness.copy()
-    known = np.asarray(np.isfinite(light.values).all(axis=1))
-    breaks = np.zeros(len(thickness), bool)
-    if path.black is not None and path.black > 0:
-        near = thickness[max(path.black - 2, 0) : path.black + 2]
-        breaks[path.black] = np.ptp(near) > _EDGE * film.order
-    steps = np.abs(np.diff(thickness)) / (np.diff(light.time) / np.median(np.diff(light.time)))
-    fastest = 10 * float(steps.max()) / scale + 1e-6
-    weight = known[:, None] / (light.noise**2 + (_MODEL * light.span) ** 2)
-    made, residual = like, np.zeros_like(light.values)
-    for number in range(_PASSES):
-        slope = gain[:, 0] * film.slope(thickness) * scale
-        residual = np.nan_to_num(light.values - gain[:, 0] * film.at(thickness) - gain[:, 1])
-        if number == 2:
-            square = np.sum(residual**2, axis=0) / max(known.sum(), 1)
-            together = np.array([correlation_length(column) for column in residual[known].T])
-            weight = known[:, None] / np.maximum(square * together, light.noise**2)
-        point = ((thickness - low) / scale)[:, None]
-        information = np.sum(weight * slope**2, axis=1)[:, None, None]
-        vector = information[..., 0] * point + np.sum(weight * slope * residual, axis=1)[:, None]
-        # errors of gain and dark level that all times have in common
-        errors = np.stack([gain[:, 0] * film.at(thickness), np.broadcast_to(light.span, slope.shape)], axis=2)
-        pushes = np.einsum("tb,tb,tbe->te", weight, slope, _LEVEL * errors)[:, None]
-        quadratics = Quadratics(vector, information, pushes)
-        again = like is None and number in (0, 2)
-        made = smooth(light.time, quadratics, (SLOWLY,), breaks, fastest, None if again else made)
-        step = low + scale * made.mean[:, 0] - thickness
-        limit = _SHORT * film.order
-        thickness = np.clip(thickness + np.clip(step, -limit, limit), low, film.grid[-1])
-    assert made is not None
-    return made, residual
-
-
 def _chosen(points: Any, movie: Movie) -> tuple[int, ...]:
     """The places nearest to points "x,y;x,y", or "x;x" along a line; by default three of them."""
     axes = list(movie.coords.values())
@@ -350,16 +310,6 @@ def _chosen(points: Any, movie: Movie) -> tuple[int, ...]:
         nearest = [int(np.argmin(np.abs(axis - x))) for axis, x in zip(axes, numbers[::-1], strict=True)]
         chosen.append(int(np.ravel_multi_index(nearest, movie.shape)))
     return tuple(dict.fromkeys(chosen))
-
-
-def _laws(dataset: Dataset, movie: Movie, place: int) -> list[Law]:
-    """Thinning laws of a place, without its black film and undecided times."""
-    names = "status", "thickness", "thickness_stderr_noise"
-    status, thickness, stderr = (
-        dataset[name].values.reshape(len(movie.time), -1)[:, place].astype(float) for name in names
-    )
-    known = np.where(status == CODES[BY_NEIGHBOURS], thickness, np.nan)
-    return thinning_laws(movie.time, known, stderr)
 
 
 def _warnings(movie: Movie, dataset: Dataset, parts: list[range], out: np.ndarray, black: bool) -> list[str]:

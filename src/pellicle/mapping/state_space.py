@@ -48,20 +48,30 @@ class Smoothed(NamedTuple):
     """Parameters at all times in the unit cube, and rates of those that vary slowly.
 
     `mean` and `variance` (times, parameters); `rate` and `rate_variance` (times, parameters), per unit of
-    time, NaN for the others; the variances are those of the noise, and `systematic` and `rate_systematic`
-    those of the effects together; `derivatives`: states of each of these, and `stiffness` (slow,) the
-    logarithms of their process noise; `deviance`: −2 ln of the marginal likelihood, up to a constant.
+    time, NaN for the others; the variances are those of the noise, and `changes` and `rate_changes` (times,
+    parameters, effects) those by each effect; `derivatives`: states of each of these, and `stiffness` (slow,)
+    the logarithms of their process noise; `deviance`: −2 ln of the marginal likelihood, up to a constant.
     """
 
     mean: np.ndarray
     variance: np.ndarray
     rate: np.ndarray
     rate_variance: np.ndarray
-    systematic: np.ndarray
-    rate_systematic: np.ndarray
+    changes: np.ndarray
+    rate_changes: np.ndarray
     derivatives: int
     stiffness: np.ndarray
     deviance: float = np.nan
+
+    @property
+    def systematic(self) -> np.ndarray:
+        """Variances (times, parameters) by all effects together."""
+        return np.sum(self.changes**2, axis=2)
+
+    @property
+    def rate_systematic(self) -> np.ndarray:
+        """Variances (times, parameters) of rates by all effects together."""
+        return np.sum(self.rate_changes**2, axis=2)
 
 
 class _Chain(NamedTuple):
@@ -105,15 +115,16 @@ def smooth(
         found = _smoothed(series.chain(best, states), *arrays)
         states_mean, spread, answer, certainty, deviance = map(np.asarray, found)
     # where the data have no noise, a variance of zero may round below it
-    varying = states_mean[..., 0], np.maximum(spread, 0.0), np.sum(states_mean[..., 1:] ** 2, axis=2)
-    common = answer[:, 0], certainty, np.sum(answer[:, 1:] ** 2, axis=1)
-    values, rates = np.empty((3, len(time), len(kinds))), np.full((3, len(time), len(kinds)), np.nan)
-    at, first = np.flatnonzero(~shared)[slow], len(own) + (states - 1) * np.arange(len(slow))
-    for i, power in enumerate((1, 2, 2)):
-        values[i][:, shared], values[i][:, ~shared] = common[i], varying[i][:, : len(own)]
-        rates[i][:, at] = varying[i][:, first] / unit**power
-    (mean, variance, systematic), (rate, rate_variance, of_rate) = values, rates
-    return Smoothed(mean, variance, rate, rate_variance, systematic, of_rate, states, best, float(deviance))
+    spread, count = np.maximum(spread, 0.0), len(own)
+    means, rates = np.full((2, len(time), len(kinds), answer.shape[1]), np.nan)
+    variance, rate_variance = np.full((2, len(time), len(kinds)), np.nan)
+    means[:, shared], means[:, ~shared] = answer, states_mean[:, :count]
+    variance[:, shared], variance[:, ~shared] = certainty, spread[:, :count]
+    at, first = np.flatnonzero(~shared)[slow], count + (states - 1) * np.arange(len(slow))
+    rates[:, at], rate_variance[:, at] = states_mean[:, first] / unit, spread[:, first] / unit**2
+    of_means, of_rates = (means[..., 0], variance), (rates[..., 0], rate_variance)
+    changes = means[..., 1:], rates[..., 1:]
+    return Smoothed(*of_means, *of_rates, *changes, states, best, float(deviance))
 
 
 def _best(series: _Times) -> tuple[int, np.ndarray]:

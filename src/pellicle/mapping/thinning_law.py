@@ -1,7 +1,7 @@
 """Thinning laws: power law and exponential of a thickness against time, with errors.
 
-Laws are fitted to the logarithm of the thickness. Residuals that are larger than the errors, or hang
-together, enlarge the errors of the law.
+Laws are fitted to what each time says by itself, whose errors are independent: those of a smoothed thickness
+hang together. Residuals that are larger than the errors, or hang together, enlarge the errors of the law.
 
 **Source:** Schwarz 1978, Ann. Stat. 6, 461 (choice between laws of different numbers of parameters).
 """
@@ -25,8 +25,19 @@ FORMULAS = {
 _FEWEST = 8
 _FAR = 3.0
 """Most times the length of the movie from the origin of a power law to the first time."""
+_HIGHEST = 30.0
+"""Logarithm of the largest thickness in nm that a search may try."""
 _LEAST = 1e-3
 """Relative error that no thickness falls below."""
+
+
+class Looks(NamedTuple):
+    """Thickness (times,) in nm by each time alone, its standard error, and what errors that all times have in
+    common change it by (times, effects)."""
+
+    value: np.ndarray
+    stderr: np.ndarray
+    common: np.ndarray
 
 
 class Law(NamedTuple):
@@ -46,17 +57,17 @@ class Law(NamedTuple):
         return a * (time - (rest[1] if len(rest) > 1 else 0.0)) ** -rest[0]
 
 
-def thinning_laws(time: np.ndarray, thickness: np.ndarray, stderr: np.ndarray) -> list[Law]:
-    """Fit the laws to a thickness in nm, the best one first; empty for fewer than eight times.
+def thinning_laws(time: np.ndarray, thickness: np.ndarray, looks: Looks) -> list[Law]:
+    """Fit the laws to looks at a thickness in nm, the best one first; empty for fewer than eight times.
 
     Times count from that of the data: a power law without an origin needs the time since the film was made,
-    and leaves out what is not after 0.
+    and leaves out what is not after 0. `thickness` is the smoothed one, NaN at times that are left out.
     """
-    used = np.isfinite(thickness) & (thickness > 0) & np.isfinite(stderr)
+    used = np.isfinite(thickness) & (thickness > 0) & np.isfinite(looks.stderr)
     if used.sum() < _FEWEST:
         return []
-    time, value = time[used], np.log(thickness[used])
-    sigma = np.maximum(stderr[used] / thickness[used], _LEAST)
+    time, value, looks = time[used], np.log(thickness[used]), Looks(*(x[used] for x in looks))
+    looks = looks._replace(stderr=np.maximum(looks.stderr, _LEAST * thickness[used]))
     span = float(np.ptp(time))
     rows: list[tuple[str, tuple[str, ...], Callable[[np.ndarray], np.ndarray], list[np.ndarray], np.ndarray]]
     slope = -np.polyfit(time, value, 1)[0]
@@ -81,7 +92,7 @@ def thinning_laws(time: np.ndarray, thickness: np.ndarray, stderr: np.ndarray) -
         at = np.log(np.where(later, time, 1.0))
         power = np.array([value[-1], 0.5])
         rows.append((POWER, ("A", "exponent"), lambda p: p[0] - p[1] * at, [power], later))
-    found = [_fitted(time, value, sigma, *row) for row in rows]
+    found = [_fitted(time, value, looks, *row) for row in rows]
     least = min(score for _, score in found)
     laws = [law._replace(worse=score - least) for law, score in found]
     return sorted(laws, key=lambda law: law.worse)
@@ -90,7 +101,7 @@ def thinning_laws(time: np.ndarray, thickness: np.ndarray, stderr: np.ndarray) -
 def _fitted(
     time: np.ndarray,
     value: np.ndarray,
-    sigma: np.ndarray,
+    looks: Looks,
     name: str,
     names: tuple[str, ...],
     curve: Callable[[np.ndarray], np.ndarray],
@@ -100,7 +111,7 @@ def _fitted(
     """One law and its score: the criterion for as many independent residuals as there are."""
 
     def missed(p: np.ndarray) -> np.ndarray:
-        return ((curve(p) - value) / sigma)[used]
+        return ((np.exp(np.minimum(curve(p), _HIGHEST)) - looks.value) / looks.stderr)[used]
 
     highest = np.full(len(starts[0]), np.inf)
     if name == SHIFTED:  # a power law with a farther origin is an exponential
@@ -110,7 +121,9 @@ def _fitted(
     residual, count = best.fun, int(used.sum())
     together = correlation_length(residual)
     reduced = max(float(np.sum(residual**2)) / max(count - len(best.x), 1), 1.0)
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * reduced * together
+    inverse = np.linalg.pinv(best.jac.T @ best.jac)
+    common = inverse @ best.jac.T @ (looks.common / looks.stderr[:, None])[used]
+    covariance = inverse * reduced * together + common @ common.T
     p, jacobian = best.x, np.eye(len(best.x))
     numbers = p.copy()
     if name == EXPONENTIAL:
@@ -127,9 +140,8 @@ def _fitted(
         numbers[0] = np.exp(p[0])
         jacobian[0, 0] = numbers[0]
     errors = np.sqrt(np.diagonal(jacobian @ covariance @ jacobian.T))
-    rms = float(np.sqrt(np.mean((residual * sigma[used]) ** 2)))
+    rms = float(np.sqrt(np.mean((curve(p) - value)[used] ** 2)))
     # a law that leaves out times is compared on the others
-    square = max(float(np.mean((residual * sigma[used]) ** 2)), _LEAST**2)
-    score = count / together * np.log(square) + len(p) * np.log(max(count / together, 2.0))
+    score = count / together * np.log(np.mean(residual**2)) + len(p) * np.log(max(count / together, 2.0))
     pairs = {key: (float(v), float(e)) for key, v, e in zip(names, numbers, errors, strict=True)}
     return Law(name, pairs, rms, 0.0), float(score)
