@@ -25,6 +25,16 @@ _RANGE = 2.0
 """Range of a state, in units of the level: a gain of the lamp, or the light itself."""
 
 
+class _Linear(NamedTuple):
+    """Models of some times `at` points, square roots of the weights (times, points) of the data, weighted
+    slopes (times, points, parameters and states), and the best states (times, states) there."""
+
+    at: polish.Best
+    weight: np.ndarray
+    slope: np.ndarray
+    states: np.ndarray
+
+
 class LampStates(NamedTuple):
     """Gain and offset that are states: their `names`, kinds of change, and the sizes of their ranges."""
 
@@ -46,7 +56,7 @@ class LampStates(NamedTuple):
             return curved, np.zeros((len(units), 0))
         gradients, hessians, best = [], [], []
         for own, data in spectra.blocks():
-            slope, states = self._linear(spectra.model, data, units[own])
+            _, _, slope, states = self._linear(spectra.model, data, units[own])
             own_size = units.shape[1]
             square = np.einsum("tpi,tpj->tij", slope, slope)
             cross, states_square = square[:, :own_size, own_size:], square[:, own_size:, own_size:]
@@ -58,34 +68,30 @@ class LampStates(NamedTuple):
             best.append(states)
         return polish.Curved(np.concatenate(gradients), np.concatenate(hessians)), np.concatenate(best)
 
-    def _linear(self, model: PixelModel, data: Any, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted slopes (times, points, parameters and states) of the light, and the best states (times,
-        states) at the points `units`."""
-        search, parameters = model.search, model.parameters
+    def _linear(self, model: PixelModel, data: Any, units: np.ndarray) -> _Linear:
+        """The light around the points `units` (times, parameters)."""
+        search = model.search
         at = polish.in_rows(polish.at_best, search.static, search.common, data, units)
-        span = np.array([p.upper - p.lower for p in parameters])
+        span = np.array([p.upper - p.lower for p in model.parameters])
         weight = data.weight * np.sqrt(np.asarray(search.common.data.independent_fraction))
         own = np.asarray(at.gain)[..., None] * np.asarray(at.slope) * span
-        states = [self.column(name, data, np.asarray(at.signal)) for name in self.names]
-        slope = np.concatenate([own, np.stack(states, axis=2)], axis=2) * weight[..., None]
-        values = [np.asarray(at.gain if name == "scale" else at.offset)[:, 0] for name in self.names]
-        return slope, np.stack(values, axis=1) / self.sizes
+        columns = [self.column(name, data, np.asarray(at.signal)) for name in self.names]
+        slope = np.concatenate([own, np.stack(columns, axis=2)], axis=2) * weight[..., None]
+        best = [np.asarray(at.gain if name == "scale" else at.offset)[:, 0] for name in self.names]
+        return _Linear(at, weight, slope, np.stack(best, axis=1) / self.sizes)
 
     def pushes(self, spectra: Spectra, units: np.ndarray, share: np.ndarray) -> np.ndarray:
         """Changes (times, parameters and states, effects) of the misfits' slopes by systematic effects, each
         multiplied by the `share` (times,)."""
-        model, found = spectra.model, []
-        lower = np.array([p.lower for p in model.parameters])
-        span = np.array([p.upper - p.lower for p in model.parameters])
-        search = model.search
+        model, found, none = spectra.model, [], np.zeros(0)
+        lower, upper = (np.array([getattr(p, side) for p in model.parameters]) for side in ("lower", "upper"))
         for own, data in spectra.blocks():
-            slope, _ = self._linear(model, data, units[own])
-            best = polish.in_rows(polish.at_best, search.static, search.common, data, units[own])
-            names, none = ("signal", "slope", "model", "gain", "offset"), np.zeros(0)
+            best, weight, slope, _ = self._linear(model, data, units[own])
+            names = "signal", "slope", "model", "gain", "offset"
             curves = {name: np.asarray(getattr(best, name)) for name in names}
             at = Local(**curves, layer=none, layer_slope=none)
-            effects = model.errors.effects.changes(search.view, at, lower + units[own] * span)
-            weight = data.weight * np.sqrt(np.asarray(search.common.data.independent_fraction))
+            values = lower + units[own] * (upper - lower)
+            effects = model.errors.effects.changes(model.search.view, at, values)
             changes = [np.asarray(x.change).reshape(len(slope), -1) * weight for x in effects]
             pushed = [np.einsum("tpi,tp->ti", slope, change) for change in changes]
             found.append(np.stack([*pushed, *np.zeros((0, *slope.shape[::2]))], axis=2))
