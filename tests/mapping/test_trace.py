@@ -12,8 +12,10 @@ from pellicle.cli import app
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.batch.data import CODES
 from pellicle.mapping.trace import lost
+from pellicle.mapping.trace_branches import Start
 from pellicle.mapping.trace_light import Light
 from pellicle.mapping.trace_path import KINK, Candidates, Course, trace_path
+from pellicle.mapping.trace_turns import going_on
 
 LASER, INDEX = 633.0, 1.46
 FRINGE = LASER / 2 / INDEX
@@ -62,6 +64,16 @@ def test_a_laser_follows_a_film_from_a_known_start():
     np.testing.assert_allclose(
         made.light[:, 0] - made.residual[:, 0], 0.13 + 2.7 * reflectance(grown), atol=noise
     )
+
+
+def test_a_path_that_comes_to_rest_has_a_rival_that_goes_on():
+    """Without it a trace of the benchmark was wrong and decided at 84 % of its times (absorbs, draw 1)."""
+    time, kinks = np.arange(100.0), np.zeros(100, bool)
+    at, course = going_on(Start(time, np.minimum(4 * time, 200.0), kinks), 0.0, 300.0) or (0, None)
+    assert at == 45
+    assert course is not None
+    np.testing.assert_allclose(course.thickness, np.minimum(4 * time, 300.0))
+    assert going_on(Start(time, 2 * time, kinks), 0.0, 300.0) is None
 
 
 def test_a_film_whose_fringes_die_out_goes_on():

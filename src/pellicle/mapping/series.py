@@ -78,6 +78,7 @@ def fit_series(data: Any, scene: Scene, **options: Any) -> Series:
     if (lamp := options.pop("lamp_curve", None)) is not None:
         cube = lamp_curve_of(lamp, cube, scene).correct(cube)
     model = prepare(cube, scene, _ORDERS)
+    _kinds_of_spectra(model.parameters)  # before the work is done
     return smoothed_series(cube, model, map_cube(cube, scene, model=model, **options))
 
 
@@ -91,9 +92,7 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None 
     dataset = made.dataset.load()
     times = *elapsed(dataset[TIME], None), first_date(dataset[TIME])
     time = times[0]
-    kinds = _kinds(model.parameters)
-    if join is None and MONOTONIC in kinds:
-        raise UsageError('varies = "monotonic" is of the thickness of a trace: write "slowly" for spectra')
+    kinds = (_kinds if join else _kinds_of_spectra)(model.parameters)
     with jax.enable_x64(True):
         joined = (join or _joined)(model, cube, dataset, time, kinds)
         spectra = Spectra(model, cube, joined.used)
@@ -129,6 +128,14 @@ def _kinds(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
     kinds = tuple(p.varies or (SLOWLY if p.key == "thickness" else SHARED) for p in parameters)
     if not {SLOWLY, MONOTONIC, FREELY} & {*kinds}:
         raise UsageError("nothing varies in this series: free a thickness")
+    return kinds
+
+
+def _kinds_of_spectra(parameters: tuple[Parameter, ...]) -> tuple[str, ...]:
+    """Kinds of change of the parameters of spectra. Raises UsageError for a monotonic one."""
+    kinds = _kinds(parameters)
+    if MONOTONIC in kinds:
+        raise UsageError('varies = "monotonic" is of the thickness of a trace: write "slowly" for spectra')
     return kinds
 
 

@@ -33,7 +33,7 @@ from pellicle.mapping.trace_branches import Branches, Start, branches_of, signal
 from pellicle.mapping.trace_fit import Fit, Fitter
 from pellicle.mapping.trace_light import Light, averaged, light_of
 from pellicle.mapping.trace_path import Course
-from pellicle.mapping.trace_turns import Mirrors
+from pellicle.mapping.trace_turns import Mirrors, going_on
 from pellicle.scene.film import Scene
 from pellicle.scene.free import MONOTONIC, SLOWLY
 from pellicle.scene.instrument import Drift
@@ -185,10 +185,23 @@ def _decided(fit: Fitter, light: Light, found: Branches) -> tuple[Start, np.ndar
             turns = {time: less - above for time, less in turns.items()}
         turns[float(own.time[after])] = abs(above)
         rival[differ] = np.minimum(rival[differ], abs(above))
+    made = _going_on(fit, own, found, best) if mirrors is not None else None
+    if made is not None:
+        above, differ = made.deviance - best.deviance, np.interp(centre, own.time, fit.apart(made, best)) > 0
+        best = made if above < 0 else best
+        rival[differ] = np.minimum(rival[differ], abs(above))
     plausible = [time for time, less in turns.items() if less <= SURE]
     every = np.full(len(found.centre), np.inf)
     every[found.inside] = np.minimum(rival, left)
     return Start(own.time, fit.thickness(best), best.about["kinks"] > 0), every, plausible
+
+
+def _going_on(fit: Fitter, own: Light, found: Branches, best: Fit) -> Fit | None:
+    """The fit of a course that goes on where the best one comes to rest, None where it does not."""
+    parameter, path = fit.model.parameters[fit.depth], fit.thickness(best)
+    course = Start(own.time, path, best.about["kinks"] > 0)
+    beyond = going_on(course, parameter.lower, parameter.upper)
+    return None if beyond is None else fit(own, beyond[1], found, best)
 
 
 def _gains(light: Light, fit: Fit, wavelength: np.ndarray, smoothed: Smoothed) -> dict[str, tuple[Any, ...]]:

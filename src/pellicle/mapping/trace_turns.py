@@ -23,6 +23,10 @@ _ABRUPT = 7.4
 of six extrema, 2 ln(6 / 0.15)."""
 
 
+_REACHED, _EARLY = (0.6, 0.9), 0.9
+"""Shares of its longest way between which a path has its rate, and of the times before which it ends it."""
+
+
 class Mirrored(NamedTuple):
     """Fits to be tried that are mirrored from a position `at` on, in the `run` of positions near it."""
 
@@ -78,6 +82,20 @@ class Mirrors(NamedTuple):
                     every = [bent, kinks & ~bent] if turns else [bent]
                     events.append(Mirrored(at, run, [Start(time, other, x) for x in every]))
         return min(events, key=lambda event: event.at, default=None)
+
+
+def going_on(start: Start, lower: float, upper: float) -> tuple[int, Start] | None:
+    """A course that goes on at its rate from a position on, where a path turns back or comes to rest; None
+    for a path that does neither. Where the fringes of an absorbing film have died out, no light tells."""
+    time, thickness, kinks = start
+    way = thickness - thickness[0]
+    way *= np.sign(way[np.argmax(np.abs(way))])
+    before, last, top = (int(np.argmax(way >= share * way.max())) for share in (*_REACHED, 1.0))
+    if not before < last < top < _EARLY * len(way):
+        return None
+    rate = (thickness[last] - thickness[before]) / (time[last] - time[before])
+    on = thickness[last] + rate * (time - time[last])
+    return last, Start(time, np.where(time < time[last], thickness, np.clip(on, lower, upper)), kinks)
 
 
 def _runs(true: np.ndarray) -> list[np.ndarray]:
