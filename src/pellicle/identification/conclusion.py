@@ -21,6 +21,8 @@ _DEMANDED = 12.0
 """Δ ln Z to the best single film from which a second layer is needed, however thick."""
 NOISY = 2.0
 """Ratio of unexplained residuals to noise above which nothing is identified."""
+STRAINED = 3.0
+"""Size of an effect, in standard uncertainties, above which nothing is identified."""
 MISSTATED = 0.3
 """Shift of the angle of incidence (degrees) above which it was stated wrongly: six times a usual error."""
 _LIKE = 0.02
@@ -50,7 +52,9 @@ def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
     if not kept:
         return Outcome.NONE
     best = kept[0]
-    if best.remaining > NOISY or not all(same(problem, best, x) for x in kept[1:]):
+    if max(best.remaining / NOISY, best.excess[1] / STRAINED) > 1 or not all(
+        same(problem, best, x) for x in kept[1:]
+    ):
         return Outcome.UNDECIDED
     parts = list(zip(best.structure.numbers, best.x, best.stderr, strict=True))
     off = any(n.name == "angle_shift" and abs(v) > MISSTATED for n, v, _ in parts)

@@ -143,6 +143,8 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
     enough = growth.done(_FLEXIBLE)
     if layers > 1 and time.monotonic() < deadline:
         pairs.grow(growth, settled=enough)
+    if layers > 1 and not growth.done():
+        _pair_effects(growth)
     growth.weighed = weigh(problem, growth.attempts, growth.columns)
     return growth
 
@@ -190,7 +192,23 @@ def _effects(growth: Growth) -> None:
         tried["angle_shift"] = (-2.0, -0.4, 0.4, 2.0)
     for base in bases:
         x, layers = base.attempt.x, base.structure.layers
-        for effect, starts in tried.items():
-            growth.add(layers, [np.append(x, value) for value in starts], effect)
+        _with_each(growth, base, tried)
         if growth.oxidised and layers[-1].name != "SiO2" and "SiO2" in growth.order:
             growth.add([*layers, Material("SiO2", OXIDE)], [np.append(x, value) for value in (3.0, 15.0)])
+
+
+def _with_each(growth: Growth, base: Weighed, tried: dict[str, tuple[float, ...]]) -> None:
+    """Add a structure with each effect, from its starts."""
+    for effect, starts in tried.items():
+        x = base.attempt.x
+        growth.add(base.structure.layers, [np.append(x, value) for value in starts], effect)
+
+
+def _pair_effects(growth: Growth) -> None:
+    """Effects on the best two layers, and both of these with a free index: 29 nm of polystyrene on 454 nm of
+    uneven hafnia had no hypothesis in Ψ and Δ."""
+    found = [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]
+    for pair in found[:1]:
+        _with_each(growth, pair, {"roughness": (6.0,), "thickness_spread": (5.0,)})
+    for pair in [x for x in found if {y.name for y in x.structure.layers if y.modelled} == {"cauchy"}][:1]:
+        pairs.free_both(growth, pair)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from pellicle.identification.evidence import weigh
+from pellicle.identification.evidence import Weighed, weigh
 from pellicle.identification.hypothesis import TABLE_UNCERTAINTY
 from pellicle.identification.problem import Problem
+from pellicle.identification.search import descended
 from pellicle.identification.structure import Structure
 
 if TYPE_CHECKING:
@@ -27,16 +28,19 @@ choice of a material 3.5, and a rival may lie 5 below."""
 _NOISE = 1.0
 """Ratio of the residuals of one film to the noise below which they need no second layer: of an oxide in a
 reflectometer (0.92), 28 nm of MgF2 on it took up what its wavelengths are off."""
+_STRAINED = 2.5
+"""Size of an effect, in standard uncertainties, above which two layers are tried nonetheless: 32 nm of
+polystyrene on 394 nm of Y2O3 in R were one film with a slope of the lamp of 3.3 (Δ ln Z 11)."""
 _THICK = np.arange(24.0, 1200.0, 24.0)
 _THIN = np.array([6.0, 16, 28, 42, 58, 76, 96, 120, 146, 174, 204, 234])
 """Thicknesses (nm) of the grid: a minimum is 50 nm wide where n is 2.4."""
-_MINIMA, _ROUNDS, _NEAR, _KEPT, _FREE, _NAMED = 3, 9, 30.0, 8, 3, 4
-"""Starts of a pair, steps from each, χ² above the best and number of pairs that are polished, and of those
-that a free index and near tables follow."""
-
-
-_CHANGE = 0.05
-"""Relative change of an index beyond which another table is nearer."""
+_MINIMA, _ROUNDS, _NEAR, _KEPT, _FREE, _NAMED = 3, 9, 30.0, 8, 6, 4
+"""Starts of a pair, steps from each, χ² above the best and number of pairs that are polished, number of those
+with a free index, and of those that near tables follow."""
+_PARTNERED = 6
+"""Pairs of a partner from which its free index starts."""
+_CHANGE, _FREED = 0.05, 0.25
+"""Relative change of an index beyond which another table is nearer, and that of a free one."""
 
 
 class Pair(NamedTuple):
@@ -49,9 +53,10 @@ class Pair(NamedTuple):
 
 
 def grow(growth: Growth, settled: bool) -> None:
-    """Try two layers. Where one film describes the data (`settled`), only with residuals above the noise, and
-    only pairs that are far better."""
-    if settled and growth.weighed[0].remaining < _NOISE:
+    """Try two layers. Where one film describes the data (`settled`), only with residuals above the noise or a
+    large error of the instrument or the sample, and only pairs that are far better."""
+    film = growth.weighed[0]
+    if settled and film.remaining < _NOISE and film.excess[1] < _STRAINED:
         return
     names = [x for x in dict.fromkeys([*PARTNERS, *growth.order[:2]]) if x in growth.order]
     pairs = _scanned(growth, names)
@@ -62,13 +67,8 @@ def grow(growth: Growth, settled: bool) -> None:
         return
     for pair in [x for x in pairs if x.cost < pairs[0].cost + _NEAR][:_KEPT]:
         _add(growth, pair.names, pair.depth)
-    seen = set()
-    for pair in pairs[: 2 * _FREE]:
-        for i in (0, 1):
-            partner = pair.names[1 - i]
-            if (i, partner) not in seen and len(seen) < 2 * _FREE:
-                seen.add((i, partner))
-                _with_free_index(growth, pair, i)
+    for i, pair in _freed(growth, pairs)[:_FREE]:
+        _with_free_index(growth, pair, i)
     _named(growth)
 
 
@@ -93,15 +93,18 @@ def _scanned(growth: Growth, names: list[str]) -> list[Pair]:
         of += [pair] * len(found)
     if not of:
         return []
-    every = [
-        np.stack([[growth.tables(name)[v] for name in pair] for pair in of])
-        for v in range(len(problem.views))
-    ]
-    x, costs = _refined(problem, every, np.stack(starts), np.full((len(of), 2), most))
+    change = np.full((len(of), 2), _CHANGE)
+    x, costs = _refined(problem, _stacked(growth, of), np.stack(starts), 0 * change + most, change)
     best: dict[tuple[str, str], Pair] = {}
     for names_, row, cost in sorted(zip(of, x, costs, strict=True), key=lambda entry: entry[2]):
         best.setdefault(names_, Pair(names_, row[:2], 1 + row[2:], float(cost)))
     return list(best.values())
+
+
+def _stacked(growth: Growth, pairs: list[tuple[str, str]]) -> list[np.ndarray]:
+    """Indices (pairs, 2, padded points) of pairs in each view."""
+    count = len(growth.scanned.views)
+    return [np.stack([[growth.tables(name)[v] for name in pair] for pair in pairs]) for v in range(count)]
 
 
 def _lowest(costs: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> list[tuple[float, np.ndarray]]:
@@ -114,33 +117,23 @@ def _lowest(costs: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> list[tup
 
 
 def _refined(
-    problem: Problem, index: list[np.ndarray], depth: np.ndarray, most: np.ndarray
+    problem: Problem, index: list[np.ndarray], depth: np.ndarray, most: np.ndarray, change: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Thicknesses and relative changes of the indices (rows, 4) of many pairs, and χ², after steps of all.
 
     `index` (rows, 2, padded points) is that of each view, `depth` (rows, 2) where to start, `most` (rows, 2)
-    the largest thicknesses; the changes have the uncertainty of a table. Levenberg-Marquardt.
+    the largest thicknesses and `change` (rows, 2) the largest changes: those of up to `_CHANGE` have the
+    uncertainty of a table, larger ones none.
     """
-    prior = np.array([0.0, 0.0, *2 * [TABLE_UNCERTAINTY**-2]])
-    upper = np.concatenate([most, np.full_like(most, _CHANGE)], axis=1)
-    lower = np.concatenate([np.zeros_like(most), np.full_like(most, -_CHANGE)], axis=1)
-    x = trial = np.concatenate([np.minimum(depth, most), np.zeros_like(depth)], axis=1)
-    best, damping = np.full(len(x), np.inf), np.full(len(x), 1e-2)
-    normal, gradient = np.zeros((len(x), 4, 4)), np.zeros((len(x), 4))
-    for _ in range(_ROUNDS):
-        values, slopes = _linearised(problem, index, trial)
-        left = problem.data - values
-        cost = problem.metric.costs(left) + trial**2 @ prior
-        better = cost < best
-        own, pull = problem.metric.grams(slopes * (upper > lower)[..., None], left)
-        normal = np.where(better[:, None, None], own + np.diag(prior), normal)
-        gradient = np.where(better[:, None], pull - prior * trial, gradient)
-        x, best = np.where(better[:, None], trial, x), np.where(better, cost, best)
-        damping = np.where(better, damping / 5, damping * 8)
-        diagonal = damping[:, None] * np.einsum("rii->ri", normal) + 1e-9
-        step = np.linalg.solve(normal + diagonal[..., None] * np.eye(4), gradient[..., None])[..., 0]
-        trial = np.clip(x + step, lower, upper)
-    return x, best
+
+    def at(rows: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return _linearised(problem, [own[rows] for own in index], x)
+
+    bounds = np.concatenate([0 * most, -change], axis=1), np.concatenate([most, change], axis=1)
+    prior = np.concatenate([0 * most, np.where(change > _CHANGE, 0.0, TABLE_UNCERTAINTY**-2)], axis=1)
+    start = np.concatenate([depth, 0 * depth], axis=1)
+    found = descended(problem, at, start, bounds, _ROUNDS, prior)
+    return found.x, found.cost
 
 
 def _linearised(problem: Problem, index: list[np.ndarray], x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -164,19 +157,52 @@ def _single_cost(growth: Growth) -> float:
     costs = [*problem.metric.costs(np.concatenate(values) - problem.data)]
     if tables:
         names = [x.structure.layers[0].name for x in tables]
-        index = [np.stack([[view.tables[name]] * 2 for name in names]) for view in problem.views]
         depth = np.array([[x.x[0], 0.0] for x in tables])
-        costs += [*_refined(problem, index, depth, depth * 0 + [growth.problem.thickest, 0.0])[1]]
+        index, most = _stacked(growth, [(x, x) for x in names]), 0 * depth + [growth.problem.thickest, 0.0]
+        costs += [*_refined(problem, index, depth, most, 0 * depth + [_CHANGE, 0.0])[1]]
     return float(min(costs))
+
+
+def _freed(growth: Growth, pairs: list[Pair]) -> list[tuple[int, Pair]]:
+    """Pairs with the index of one layer free, the best first: its position, and the pair there.
+
+    Each material in each position is the partner of a free index, which starts from the best pairs of it:
+    rutile has an index a fifth above the TiO2 of the catalogue, and is in no pair of tables on oxide.
+    """
+    partners = dict.fromkeys((1 - i, x.names[i]) for x in pairs for i in (0, 1))
+    starts = [
+        (i, x) for i, name in partners for x in [x for x in pairs if x.names[1 - i] == name][:_PARTNERED]
+    ]
+    index = _stacked(growth, [x.names for _, x in starts])
+    depth = np.stack([x.depth for _, x in starts])
+    change = np.array([[_FREED if j == i else _CHANGE for j in (0, 1)] for i, _ in starts])
+    most = np.full_like(depth, growth.problem.thickest)
+    x, costs = _refined(growth.scanned, index, depth, most, change)
+    best: dict[tuple[int, str], tuple[int, Pair]] = {}
+    for k in np.argsort(costs):
+        i, pair = starts[k]
+        found = Pair(pair.names, x[k, :2], 1 + x[k, 2:], float(costs[k]))
+        best.setdefault((i, pair.names[1 - i]), (i, found))
+    return list(best.values())
 
 
 def _with_free_index(growth: Growth, pair: Pair, position: int) -> None:
     """Add a pair with a free index in place of one of its tables."""
-    free = as_cauchy(growth.tables(pair.names[position])[0] * pair.factors[position])
+    view, index = growth.scanned.views[0], growth.tables(pair.names[position])[0]
+    free = as_cauchy(index * pair.factors[position], view.wavelength)
     own, other = [pair.depth[position], *free], [pair.depth[1 - position]]
     names = ["cauchy", pair.names[1 - position]]
     start = np.array([*own, *other] if position == 0 else [*other, *own])
     _add(growth, names if position == 0 else names[::-1], start)
+
+
+def free_both(growth: Growth, pair: Weighed) -> None:
+    """Add a pair of which one index is free with the other free too."""
+    x, view, parts = pair.attempt.x, growth.problem.views[0], []
+    for i, layer in enumerate(pair.structure.layers):
+        own = [value for number, value in zip(pair.structure.numbers, x, strict=True) if number.layer == i]
+        parts += own if layer.modelled else [*own, *as_cauchy(view.tables[layer.name], view.wavelength)]
+    _add(growth, ["cauchy", "cauchy"], np.array(parts))
 
 
 def _add(growth: Growth, names: Sequence[str], start: np.ndarray) -> None:
@@ -209,8 +235,7 @@ def _named(growth: Growth) -> None:
                     _add(growth, [x.name for x in pair], depths)
 
 
-def as_cauchy(index: Any) -> tuple[float, float]:
+def as_cauchy(index: Any, wavelength: np.ndarray) -> tuple[float, float]:
     """A and B of a free index near a table's."""
-    mean = float(np.mean(index.real))
-    slope = float(np.clip(1.2e4 * (mean - 1) ** 2, 0.0, 9e4))
-    return float(np.clip(mean - slope / 3.6e5, 1.26, 2.8)), slope
+    slope, mean = np.polynomial.Polynomial.fit(wavelength**-2.0, index.real, 1).convert().coef[::-1]
+    return float(np.clip(mean, 1.25, 2.9)), float(np.clip(slope, 0.0, 1.9e5))

@@ -49,11 +49,6 @@ class Metric:
         lower = np.linalg.cholesky(np.eye(scaled.shape[1]) + scaled.T @ scaled)
         self._basis = np.linalg.solve(lower, scaled.T)
 
-    def gram(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """aᵀ C⁻¹ b of (values, ...) each."""
-        a, b = (x.T / self.sigma for x in (a, b))
-        return a @ b.T - (a @ self._basis.T) @ (b @ self._basis.T).T
-
     def grams(self, slopes: np.ndarray, residuals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sᵀ C⁻¹ S and Sᵀ C⁻¹ r of slopes (rows, numbers, values) and residuals (rows, values)."""
         a, b = slopes / self.sigma, residuals / self.sigma
@@ -87,16 +82,18 @@ class Problem:
         return [slice(*pair) for pair in pairwise(ends)]
 
     def simulate(self, structure: Structure, x: np.ndarray) -> np.ndarray:
-        """Simulate the values (rows, values) of a structure at numbers (rows, numbers)."""
+        """Simulate the values (rows, values) of a structure at `x` (rows, numbers)."""
         return np.concatenate([structure.simulate(x, view) for view in self.views], axis=1)
 
     def linearised(self, structure: Structure, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (values,) and slopes (values, numbers) of a structure at numbers (numbers,)."""
+        """Values (rows, values) and slopes (rows, numbers, values) of a structure at `x` (rows, numbers)."""
         span = structure.upper - structure.lower
         step = np.where(span < 100, 1e-4 * span, np.maximum(1e-3, _STEP * span))
         step = np.where(x + step > structure.upper, -step, step)
-        rows = self.simulate(structure, np.concatenate([x[None], x + np.diag(step)]))
-        return rows[0], ((rows[1:] - rows[0]) / step[:, None]).T
+        steps = np.concatenate([np.zeros_like(x)[:, None], step[..., None] * np.eye(x.shape[1])], axis=1)
+        found = self.simulate(structure, (x[:, None] + steps).reshape(-1, x.shape[1]))
+        found = found.reshape(len(x), -1, self.data.size)
+        return found[:, 0], (found[:, 1:] - found[:, :1]) / step[..., None]
 
     def by_channel(self, values: np.ndarray) -> list[tuple[SignalView, np.ndarray]]:
         """Each view and its values (points, channels)."""

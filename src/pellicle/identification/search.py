@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +15,8 @@ ROUNDS, _TRIED = 25, 4
 """Steps of a polish, most of which need 6 to 12, and those from each of several starts."""
 _SCANNED = 2
 """Layers of a scan."""
-_ENOUGH = 1e-4
-"""Relative fall of χ² below which a polish ends."""
+_ENOUGH, _FAILURES = 1e-4, 4
+"""Relative fall of χ² below which a polish ends, and steps without a fall that it takes."""
 THICK = 20_000.0
 """Largest thickness (nm) that is tried."""
 
@@ -56,44 +57,72 @@ def minima(costs: np.ndarray, most: int) -> np.ndarray:
 
 def polished(problem: Problem, structure: Structure, starts: Sequence[np.ndarray]) -> Attempt:
     """The best minimum from several starts (numbers,) each: a few steps from all, then more from the best."""
-    metric = problem.metric
 
-    def at(x: np.ndarray) -> Attempt:
-        values, slopes = problem.linearised(structure, x)
-        cost = float(metric.costs((problem.data - values)[None])[0])
-        return Attempt(structure, x, values, slopes, cost)
+    def at(_: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return problem.linearised(structure, x)
 
-    first = [np.clip(np.asarray(x, float), structure.lower, structure.upper) for x in starts]
-    if len(first) == 1:
-        return _descended(problem, at, at(first[0]), ROUNDS)
-    tried = [_descended(problem, at, at(x), _TRIED) for x in first]
-    return _descended(problem, at, min(tried, key=lambda found: found.cost), ROUNDS)
+    x, bounds = np.stack(starts), (structure.lower, structure.upper)
+    if len(x) > 1:
+        tried = descended(problem, at, x, bounds, _TRIED)
+        x = tried.x[[np.argmin(tried.cost)]]
+    found = descended(problem, at, x, bounds, ROUNDS)
+    return Attempt(structure, found.x[0], found.values[0], found.slopes[0].T, float(found.cost[0]))
 
 
-def _descended(problem: Problem, at: Callable[[np.ndarray], Attempt], here: Attempt, rounds: int) -> Attempt:
-    """Bounded Levenberg-Marquardt steps: each evaluates a point with its slopes in one call."""
-    structure = here.structure
-    lower, span, damping, failed = structure.lower, structure.upper - structure.lower, 1e-3, 0
-    for _ in range(rounds):
-        scaled, residual = here.slopes * span, problem.data - here.values
-        gram = problem.metric.gram(scaled, np.concatenate([scaled, residual[:, None]], axis=1))
-        normal, gradient = gram[:, :-1], gram[:, -1]
+class Descent(NamedTuple):
+    """Rows of numbers at the end of steps: values (rows, values), slopes (rows, numbers, values), χ²."""
+
+    x: np.ndarray
+    values: np.ndarray
+    slopes: np.ndarray
+    cost: np.ndarray
+
+
+def descended(
+    problem: Problem,
+    at: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    x: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    rounds: int,
+    prior: np.ndarray | float = 0.0,
+) -> Descent:
+    """Bounded Levenberg-Marquardt steps from many rows of numbers `x` (rows, numbers) at once.
+
+    `at(rows, x)` returns the values and slopes of these rows; each step evaluates a point of every row that
+    still falls. `prior` is the inverse variance of numbers around 0, (rows or 1, numbers).
+    """
+    data, metric = problem.data, problem.metric
+    lower, upper, prior = (np.broadcast_to(b, x.shape) for b in (*bounds, prior))
+    span, unit = np.where(upper > lower, upper - lower, 1.0), np.eye(x.shape[1])
+    x = np.clip(x, lower, upper)
+    trial, best = x.copy(), np.full(len(x), np.inf)
+    damping, failed = np.full(len(x), 5e-3), np.zeros(len(x), int)
+    values, slopes = np.zeros((len(x), data.size)), np.zeros((*x.shape, data.size))
+    normal, gradient, rows = np.zeros((*x.shape, len(unit))), np.zeros(x.shape), np.arange(len(x))
+    for _ in range(rounds + 1):
+        new, by = at(rows, trial)
+        left = data - new
+        cost = metric.costs(left) + np.sum(prior[rows] * trial**2, axis=1)
+        better = cost < best[rows]
+        done = better & (best[rows] - cost < _ENOUGH * np.minimum(best[rows], 1e300))
+        on = rows[better]
+        x[on], values[on], slopes[on], best[on] = trial[better], new[better], by[better], cost[better]
+        own, pull = metric.grams(slopes[on] * span[on][..., None], left[better])
+        pinned = prior[on] * span[on]
+        normal[on] = own + (pinned * span[on])[:, None] * unit
+        gradient[on] = pull - pinned * x[on]
+        failed[rows] = np.where(better, 0, failed[rows] + 1)
+        damping[rows] = np.where(better, np.maximum(damping[rows] / 5, 1e-9), damping[rows] * 8)
         # a number at its bound that would leave it stays
-        unit = (here.x - lower) / span
-        free = np.flatnonzero(~((unit <= 1e-9) & (gradient < 0)) & ~((unit >= 1 - 1e-9) & (gradient > 0)))
-        if not free.size:
+        free = ~((x <= lower) & (gradient < 0) | (x >= upper) & (gradient > 0) | (lower == upper))
+        rows = rows[~done & (failed[rows] <= _FAILURES) & free[rows].any(axis=1)]
+        if not rows.size:
             break
-        own, step = normal[np.ix_(free, free)], np.zeros(len(span))
-        diagonal = np.diag(own) + 1e-9 * np.trace(own) + 1e-12
-        step[free] = np.linalg.solve(own + damping * np.diag(diagonal), gradient[free])
-        trial = at(np.clip(here.x + span * step, structure.lower, structure.upper))
-        if trial.cost < here.cost:
-            gain = (here.cost - trial.cost) / here.cost
-            here, damping, failed = trial, max(damping / 5, 1e-9), 0
-            if gain < _ENOUGH:
-                break
-        else:
-            damping, failed = damping * 8, failed + 1
-            if failed > 4:
-                break
-    return here
+        held = ~free[rows]
+        matrix = normal[rows] * ~(held[:, :, None] | held[:, None])
+        diagonal = np.einsum("rii->ri", matrix)
+        diagonal = diagonal + 1e-9 * diagonal.sum(axis=1, keepdims=True) + 1e-12
+        matrix = matrix + (damping[rows, None] * diagonal + held)[..., None] * unit
+        step = np.linalg.solve(matrix, (gradient[rows] * ~held)[..., None])[..., 0]
+        trial = np.clip(x[rows] + span[rows] * step, lower[rows], upper[rows])
+    return Descent(x, values, slopes, best)
