@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import decisions
+import nested
 import numpy as np
 import real
 from scoring import Answer, described, failures, films, goals, score, table, truth_of, write_csv
@@ -50,12 +51,14 @@ def answer(case: Case, seed: int) -> Answer:
     else:
         verdict, status = found.verdict, str(found.status)
         outcome, layers = score(case, found)
+    seconds = time.perf_counter() - began
     close = found is not None and bool(found.hypotheses) and found.hypotheses[0].remaining < NOISE_LIKE
     return Answer(
         *(case.name, case.group, status, outcome, layers, len(films(case)), close, truth_of(case)),
         answer="" if found is None else described(found),
         verdict=verdict,
-        seconds=time.perf_counter() - began,
+        seconds=seconds,
+        gain=nested.gain(case, data) if case.group == "there" else np.nan,
     )
 
 
