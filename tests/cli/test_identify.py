@@ -66,10 +66,12 @@ def test_files_at_several_angles_are_one_sample(pellicle, tmp_path):
 def test_what_is_missing_is_said(pellicle, film):
     assert "no substrate" in pellicle("identify", film, code=2).err
     assert "no data" in pellicle("identify", "--substrate", "Si", code=2).err
-    assert (
-        "layers=1 or layers=2"
-        in pellicle("identify", film, "--substrate", "Si", "--allow", "layers=x", code=2).err
-    )
+    for word in ("layers=x", "lamp"):
+        answer = pellicle("identify", film, "--substrate", "Si", "--allow", word, code=2)
+        assert (
+            f"--allow takes a list of layers=1, layers=2, calibration, plate, substrate, not {word}"
+            in answer.err
+        )
     assert "Sii" in pellicle("identify", film, "--substrate", "Sii", code=2).err
     for flags, message in (
         (("--budget", "-3"), "--budget must be above 0 seconds"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.identification.free_models import CONDUCTOR, FREE_MODELS, built
 from pellicle.identification.hypothesis import Outcome
 from tests import by_tmm
 
@@ -106,6 +107,23 @@ def test_a_wrong_back_face_is_at_most_undecided():
     assert abs(right.best.layers[0].thickness.value - 80) < 3 * right.best.layers[0].thickness.stderr < 5
 
 
+def test_another_glass_is_named_and_never_certain():
+    spectrum = reflectance(("Y2O3", 400.0), substrate="BK7")
+    found = pl.identify(spectrum, "SF10/HOYA", among=["Y2O3", "SiO2", "ZrO2"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert found.best.condition == "the substrate is another glass, as BK7"
+    assert " thick on BK7." in found.verdict
+    assert found.best.layers[0].thickness.value == pytest.approx(400, abs=5)
+
+
+def test_a_file_without_an_angle_is_said_where_nothing_describes_it():
+    pair = [reflectance(("SiO2", 300.0)), reflectance(("SiO2", 500.0))]
+    found = pl.identify(pair, "Si", among=["SiO2"], layers=1, allow=())
+    assert found.status is Outcome.NONE
+    assert "Spectra without an angle of incidence were compared at one" in found.verdict
+    assert "--angle 8,60" in found.verdict
+
+
 def test_data_beyond_most_tables_are_left_out():
     """Polystyrene is tabulated from 437 nm on; this one absorbs below 430 nm."""
     nm = np.linspace(380, 880, 120)
@@ -148,6 +166,39 @@ def test_two_layers_are_found_unasked():
     assert ("TiO2" in upper.like, "SiO2" in lower.like) == (True, True)
     assert abs(upper.thickness.value - 60) < 3 * upper.thickness.stderr
     assert abs(lower.thickness.value - 300) < 3 * lower.thickness.stderr
+
+
+def test_free_charges_stand_beside_dispersion():
+    """An index of free charges and one resonance, which no film of the catalogue has."""
+    energy = 1239.84 / NM
+    epsilon = 1 + 2.5 * 36 / (36 - energy**2 - 0.3j * energy) - 2.25 / (energy**2 + 0.8j * energy)
+    values = by_tmm.films("s", NM, (1.0, np.sqrt(epsilon), index("Si")), [200.0])
+    noise = 0.001 * np.random.default_rng(1).normal(size=NM.size)
+    found = pl.identify(pl.Spectrum(NM, values + noise, "R"), "Si", among=["SiO2", "ITO"], layers=1)
+    every = {x.name: x for x in (*found.hypotheses, *found.excluded)}
+    conductor = every["drude with lorentz"]
+    assert conductor in found.hypotheses
+    assert abs(conductor.layers[0].thickness.value - 200) < conductor.layers[0].thickness.stderr
+    assert conductor.ln_z > every["cauchy"].ln_z + 20
+    numbers = dict(zip(FREE_MODELS[CONDUCTOR], (1.5, 0.8, 2.5, 6.0, 0.3), strict=True))
+    made = built(CONDUCTOR, numbers).index(NM)
+    np.testing.assert_allclose(made.re + 1j * made.im, np.sqrt(epsilon), rtol=1e-4)
+
+
+@pytest.mark.slow  # ψ and Δ, two layers
+def test_an_index_that_no_table_is_near_is_found_below_which_lies_oxide():
+    """Rutile, a fifth above the TiO2 of the catalogue, on oxide."""
+    rutile = 2.6 + 1.0e5 / NM**2 + 0j
+    ncs = by_tmm.ncs(NM, (1.0, rutile, index("SiO2"), index("Si")), [30.0, 260.0], 70.0)
+    psi, delta = by_tmm.psi_delta(*ncs.T)
+    noise = 0.05 * np.random.default_rng(1).normal(size=(2, NM.size))
+    data = pl.Spectrum(
+        NM, psi + noise[0], "psi-delta", delta=(delta + noise[1]) % 360, angle=np.full(NM.size, 70.0)
+    )
+    upper, lower = pl.identify(data, "Si").best.layers
+    assert upper.thickness.value == pytest.approx(30, abs=1.5)
+    assert lower.thickness.value == pytest.approx(260, abs=3)
+    assert "SiO2" in lower.like
 
 
 @pytest.mark.slow  # compiles a fit of the film

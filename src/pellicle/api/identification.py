@@ -6,11 +6,12 @@ from collections.abc import Sequence
 import jax
 
 from pellicle.data.measurement import check_measurement
+from pellicle.data.options import CONDITIONS
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.identification import films
 from pellicle.identification.hypothesis import Identification
-from pellicle.identification.identify import CONDITIONS, Request, identified
+from pellicle.identification.identify import Request, identified
 from pellicle.scene.film import Light
 from pellicle.scene.layers import MediumLike, Substrate, medium
 
@@ -44,8 +45,8 @@ def identify(
       "semiconductor" or "metal". By default all of these.
     - `layers`: the largest number of layers beside a native oxide, 1 or 2.
     - `allow`: usual mistakes that are tried where nothing describes the data as stated: "calibration", a
-      reflectance relative to another mirror, and "plate", light from a back face. What they explain is never
-      more than undecided.
+      reflectance relative to another mirror, "plate", light from a back face, and "substrate", another glass.
+      What they explain is never more than undecided.
     - `budget`: seconds after which no more structures are tried.
 
     **Returns:** `Identification`: a status, the hypotheses that are left with their probabilities, the

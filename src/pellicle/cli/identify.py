@@ -14,7 +14,7 @@ from pellicle.cli.flags import OUTPUT, SCENE, FileFlags, flag, switch
 from pellicle.cli.messages import Progress, show
 from pellicle.cli.reading import check_words, is_of_colours, read
 from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
-from pellicle.data.options import FileOptions, parse_number
+from pellicle.data.options import CONDITIONS, FileOptions, parse_number
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def identify(
         flag(SCENE, "Films to try: oxide, nitride, fluoride, polymer, semiconductor or metal; or all."),
     ] = None,
     allow: Annotated[
-        str | None, flag(SCENE, "Layers, and mistakes to look for (layers=2,calibration,plate).")
+        str | None, flag(SCENE, "Layers, and mistakes to look for (layers=2,calibration,plate,substrate).")
     ] = None,
     budget: Annotated[str | None, flag(SCENE, "Time after which no more structures are tried: 20s.")] = None,
     next: Annotated[
@@ -142,7 +142,8 @@ def _allowed(allow: str | None) -> dict[str, Any]:
         return {}
     words = [word.strip() for word in allow.split(",")]
     layers = [word.removeprefix("layers=") for word in words if word.startswith("layers=")]
-    if any(not x.isdigit() for x in layers):
-        raise UsageError(f"--allow takes layers=1 or layers=2, not layers={layers[0]}")
-    mistakes = {"allow": [word for word in words if not word.startswith("layers=")]}
-    return mistakes | ({"layers": int(layers[-1])} if layers else {})
+    mistakes = [word for word in words if word not in ("layers=1", "layers=2")]
+    if unknown := [word for word in mistakes if word not in CONDITIONS]:
+        known = ", ".join(("layers=1", "layers=2", *CONDITIONS))
+        raise UsageError(f"--allow takes a list of {known}, not {unknown[0]}")
+    return {"allow": mistakes} | ({"layers": int(layers[-1])} if layers else {})

@@ -21,6 +21,9 @@ SPACES = ("srgb", "rgb", "xyz", "lab")
 SIGNALS = ("R", "T", "psi-delta", "mueller", "generalised-psi-delta", "contrast", *SPACES)
 """Signals of films, beside "brdf" of a surface's recipe."""
 
+CONDITIONS = ("calibration", "plate", "substrate")
+"""Statements about a measurement that may be wrong, as an identification supposes."""
+
 # fmt: off
 Family = Literal[
     "metal", "semiconductor", "oxide", "fluoride", "halide", "sulfide", "selenide", "telluride", "nitride",

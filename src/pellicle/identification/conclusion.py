@@ -47,12 +47,20 @@ def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
     return []
 
 
+def shapeless(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """Structures that leave but noise and have a free index of another shape than any model's, if the best
+    are such: 249 nm of ITO in Ψ and Δ was 249.7 ± 3.1 nm, with an index that is bent by 2 %."""
+    best = weighed[0].ln_z
+    near = [x for x in weighed if best - x.ln_z < DECIDED and needed(x)]
+    return [x for x in near if x.shapeless and x.remaining < NOISE_LIKE]
+
+
 def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
     """The outcome of an identification that leaves these structures."""
     if not kept:
         return Outcome.NONE
     best = kept[0]
-    if max(best.remaining / NOISY, best.excess[1] / STRAINED) > 1 or not all(
+    if max(best.remaining / NOISY, best.strain / STRAINED) > 1 or not all(
         same(problem, best, x) for x in kept[1:]
     ):
         return Outcome.UNDECIDED

@@ -73,8 +73,10 @@ class Weighed(NamedTuple):
 
     `x` are its numbers with the effects at their best sizes, `stderr` their errors with these, `stderr_noise`
     by the noise alone, `index_changes` the relative change of the index of each layer that the effects make.
+    `shapeless` is true where it would be adequate but for the shape of a free index.
     `remaining` is the ratio of residuals that no effect explains to the noise, `excess`
-    the named effect that must be largest, and its size in standard uncertainties.
+    the named effect that must be largest, and its size in standard uncertainties, `strain` the largest of
+    those but an error of the wavelengths: those of a real reflectometer were off by 4 of its usual errors.
     """
 
     attempt: Attempt
@@ -85,7 +87,9 @@ class Weighed(NamedTuple):
     ln_z: float
     remaining: float
     adequate: bool
+    shapeless: bool
     excess: tuple[str, float]
+    strain: float
 
     @property
     def structure(self) -> Structure:
@@ -129,7 +133,9 @@ def _weighed(problem: Problem, system: System, factor: float, sigma: np.ndarray)
     named = np.array([x.named for x in columns])
     sizes = np.abs(solution[count:]) * named
     remaining = float(np.sqrt(np.mean(left**2)))
-    implausible = float(np.sum(sizes**2)) > improbable(int(named.sum()))
+    rest = sizes * np.array([x.name != "dispersion" for x in columns])
+    implausible, otherwise = (float(x @ x) > improbable(int(named.sum())) for x in (sizes, rest))
+    large = remaining > LARGE and _too_large(problem, left * sigma)
     worst = int(np.argmax(sizes))
     of_tables = {x.name: TABLE_UNCERTAINTY * size for x, size in zip(columns, solution[count:], strict=True)}
     return Weighed(
@@ -140,8 +146,10 @@ def _weighed(problem: Problem, system: System, factor: float, sigma: np.ndarray)
         tuple(of_tables.get(_index_effect(x), 0.0) for x in structure.layers),
         ln_z,
         remaining,
-        not implausible and not (remaining > LARGE and _too_large(problem, left * sigma)),
+        not implausible and not large,
+        not otherwise and not large and any(layer.modelled for layer in structure.layers),
         (columns[worst].name, float(sizes[worst])),
+        float(max(size for x, size in zip(columns, sizes, strict=True) if x.name != "wavelength")),
     )
 
 

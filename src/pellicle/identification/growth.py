@@ -10,11 +10,11 @@ import numpy as np
 
 from pellicle.identification import pairs
 from pellicle.identification.evidence import NATIVE, Weighed, weigh
+from pellicle.identification.free_models import CONDUCTOR, FREE_MODELS
 from pellicle.identification.hypothesis import EFFECTS
 from pellicle.identification.problem import Attempt, Column, Problem
 from pellicle.identification.search import minima, polished, scan, thickness_grid
 from pellicle.identification.structure import OXIDE, Material, Structure
-from pellicle.recipes.dispersion_models import MODELS
 
 NOISE_LIKE = 1.3
 """Ratio of unexplained residuals to noise up to which growth ends."""
@@ -42,6 +42,11 @@ _STARTS: dict[str, list[dict[str, float]]] = {
     "cauchy-urbach": [
         {"A": a, "B": 1e4, "k0": k, "Eu": 0.4} for a in (1.5, 1.8, 2.1, 2.5) for k in (0.05, 0.4)
     ],
+    CONDUCTOR: [
+        {"term1.Ep": p, "term1.gamma": g, "term2.A": a, "term2.E0": e, "term2.gamma": 0.2}
+        for p, g in ((1.0, 1.0), (1.8, 0.2))
+        for a, e in ((2.1, 4.6), (2.0, 6.0), (2.8, 7.3), (4.0, 7.3))
+    ],
     "drude": [{"eps_inf": e, "Ep": p, "gamma": 0.15} for e in (2.5, 3.5, 4.5) for p in (1.0, 1.7, 2.5)],
     "lorentz": [
         {"eps_inf": 2.0, "A": a, "E0": e, "gamma": 0.6} for a in (1.0, 4.0) for e in (2.2, 3.0, 3.8, 5.0)
@@ -66,7 +71,8 @@ def needed(x: Weighed) -> bool:
         if extra and abs(value) < SIGNIFICANT * error:
             return False
         low = number.name == "A" and value < number.lower + reach
-        if held and (low or value > number.upper - reach):
+        # an oxide at the largest thickness of a native one is a film
+        if (held or number.upper == BARE) and (low or value > number.upper - reach):
             return False
     return True
 
@@ -136,7 +142,7 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
     _single_films(growth, names)
     growth.add([growth.film("cauchy")], _model_starts(growth, "cauchy", 4))
     if not growth.done():
-        for model in ("sellmeier", "cauchy-urbach", "drude", "lorentz", "tauc-lorentz"):
+        for model in ("sellmeier", "cauchy-urbach", CONDUCTOR, "drude", "lorentz", "tauc-lorentz"):
             growth.add([growth.film(model)], _model_starts(growth, model, 3))
     if not growth.done(_FLEXIBLE):
         _effects(growth)
@@ -168,7 +174,7 @@ def _model_starts(growth: Growth, model: str, keep: int) -> list[np.ndarray]:
     """The best starts of a film of a model: its numbers with the thickness that a scan finds."""
     grid, found = thickness_grid(growth.problem), []
     structure = Structure((growth.film(model),))
-    keys = [key for key, spec in MODELS[model].items() if spec.free]
+    keys = FREE_MODELS[model]
     for start in _STARTS[model]:
         x = np.array([[0.0, *(start[key] for key in keys)]])
         index = [[structure.index(0, x, view)[0]] for view in growth.scanned.views]

@@ -13,7 +13,7 @@ import numpy as np
 from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.report_methods import PlotMixin
 from pellicle.fitting.result import Estimate
-from pellicle.recipes.dispersion_models import MODELS, build_model
+from pellicle.identification.free_models import FREE_MODELS, built
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.layers import Interface, Layer
@@ -63,7 +63,7 @@ class SupposedLayer:
     @property
     def modelled(self) -> bool:
         """True for a dispersion model, False for a page of the catalogue."""
-        return self.material in MODELS
+        return self.material in FREE_MODELS
 
     def layers(self, name: str) -> list[Layer | Interface]:
         """Return it as a layer of a scene, `name`, with its numbers free from their estimates, below a
@@ -72,7 +72,7 @@ class SupposedLayer:
         rough = [Interface(free.pop(ROUGH), name=ROUGH)] if ROUGH in free else []
         own = {key: free.pop(key) for key in ("thickness", "thickness_spread") if key in free}
         if self.modelled:
-            return [*rough, Layer(build_model(self.material, free), name=name, **own)]
+            return [*rough, Layer(built(self.material, free), name=name, **own)]
         uncertain = TABLE_UNCERTAINTY
         return [*rough, Layer(self.material, name=name, index_uncertainty=uncertain, **own)]
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.data.options import CONDITIONS
 from pellicle.data.spectrum import Spectrum, within
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.film.fringes import fringes
@@ -38,8 +39,14 @@ _USUAL, _FRINGED = 3000.0, 8000.0
 _MOST_TABLES = 0.7
 """Share of the tables that cover a part of the data which is compared alone: films of a spectrometer's whole
 range, from 190 nm, are those of 15 of 35 materials."""
-CONDITIONS = ("calibration", "plate")
-"""Statements about a measurement that may be wrong."""
+_SHAPE = "the index of the film has a shape that no model has"
+GLASSES = ("BK7", "fused silica", "SF10/HOYA")
+_GLASSY, _ANOTHER = 1.9, 0.02
+"""Index below which a substrate may be another glass, and relative difference of the index of another."""
+_ANGLES = (
+    "Spectra without an angle of incidence were compared at one: if they are of several, state each, as"
+    " `angle` of its spectrum or in the order of the files, as in --angle 8,60."
+)
 REFERENCES = ("substrate", "Al")
 """Mirrors against which a reflectance may have been measured."""
 
@@ -72,6 +79,8 @@ def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> I
     spectra = [covered(spectrum, request.around()) for spectrum in spectra]
     deadline = time.monotonic() + request.budget
     found = _identified(spectra, request, began, deadline)
+    if found.status is Outcome.NONE and len(spectra) > 1 and any(x.angle is None for x in spectra):
+        found = replace(found, verdict=f"{found.verdict} {_ANGLES}")
     if time.monotonic() < deadline:
         return found
     ended = f"The budget of {request.budget:g} s ended before all was tried."
@@ -100,14 +109,16 @@ def _identified(
         again, rest = _grown(*other, deadline, 1)
         found = [x for x in conclusion.survivors(again.weighed) if x.remaining < conclusion.NOISY]
         if found:
-            return _record(again, found, Outcome.UNDECIDED, condition, rest, request, began)
-    return _record(growth, [], Outcome.NONE, "", left_out, request, began)
+            return _record(again, found, Outcome.UNDECIDED, condition, rest, other[1], began)
+    kept = conclusion.shapeless(growth.weighed)
+    status, condition = (Outcome.UNDECIDED, _SHAPE) if kept else (Outcome.NONE, "")
+    return _record(growth, kept, status, condition, left_out, request, began)
 
 
 def _grown(
     spectra: Sequence[Spectrum], request: Request, deadline: float, layers: int
 ) -> tuple[Growth, list[NotTried]]:
-    problem, left_out = _problem(spectra, request)
+    problem, left_out = problem_of(spectra, request)
     tried = [name for name in request.names if name in problem.views[0].tables]
     return grown(problem, tried, deadline, layers), left_out
 
@@ -159,7 +170,7 @@ def check(spectrum: Spectrum, request: Request) -> None:
         raise UsageError(f"{name}: psi and delta need the `angle` of incidence, and the data do not state it")
 
 
-def _problem(spectra: Sequence[Spectrum], request: Request) -> tuple[Problem, list[NotTried]]:
+def problem_of(spectra: Sequence[Spectrum], request: Request) -> tuple[Problem, list[NotTried]]:
     """The problem of spectra, and materials that do not cover them."""
     around = request.around()
     paths = [_optical_path(x) for x in spectra]
@@ -216,6 +227,17 @@ def _conditions(
     face = _other_face(spectra, request)
     if face is not None:
         yield face[0], (spectra, face[1])
+    stated: Any = growth.problem.views[0].media[1]
+    for name in GLASSES if "substrate" in request.conditions and stated.real.max() < _GLASSY else ():
+        index = SignalView(spectra[0], request.around()).index_of(medium(name))
+        if np.all(np.isfinite(index)) and abs(index.mean() / stated.mean() - 1) > _ANOTHER:
+            yield (
+                f"the substrate is another glass, as {name}",
+                (
+                    spectra,
+                    replace(request, substrate=replace(below, material=medium(name))),
+                ),
+            )
 
 
 def _within_tables(spectra: Sequence[Spectrum], request: Request) -> list[Spectrum] | None:
@@ -254,7 +276,7 @@ def _better_face(problem: Problem, best: Weighed, spectra: Sequence[Spectrum], r
     face = _other_face(spectra, request)
     if face is None:
         return ""
-    other, _ = _problem(spectra, face[1])
+    other, _ = problem_of(spectra, face[1])
     if not all(x.name in other.views[0].tables or x.modelled for x in best.structure.layers):
         return ""
     [stated] = weigh(problem, [best.attempt], {})

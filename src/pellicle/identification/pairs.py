@@ -56,7 +56,7 @@ def grow(growth: Growth, settled: bool) -> None:
     """Try two layers. Where one film describes the data (`settled`), only with residuals above the noise or a
     large error of the instrument or the sample, and only pairs that are far better."""
     film = growth.weighed[0]
-    if settled and film.remaining < _NOISE and film.excess[1] < _STRAINED:
+    if settled and film.remaining < _NOISE and film.strain < _STRAINED:
         return
     names = [x for x in dict.fromkeys([*PARTNERS, *growth.order[:2]]) if x in growth.order]
     pairs = _scanned(growth, names)

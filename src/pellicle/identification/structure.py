@@ -11,9 +11,9 @@ from numpy.polynomial.hermite_e import hermegauss
 
 from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.dispersion.empirical import Tabulated
+from pellicle.identification.free_models import FREE_MODELS, built
 from pellicle.identification.signal_view import SLOTS, SignalView, as_complex
 from pellicle.optics.pair import to_pair
-from pellicle.recipes.dispersion_models import MODELS, build_model
 
 ROUGHEST = 20.0
 """Thickness (nm) of a mixture of half and half up to which it is roughness; more is a layer of its own."""
@@ -25,8 +25,6 @@ _BOUNDS = {
     "angle_shift": (-3.0, 3.0, "deg"),
 }
 """Bounds and units of the numbers of effects."""
-_WIDER = {("cauchy", "B"): 2e5, ("sellmeier", "B1"): 10.0, ("sellmeier", "C1"): 1e5}
-"""Upper bounds of models beyond those of a fit: rutile has 1.0e5, 6.1 and 6.3e4 from 450 to 950 nm."""
 _NODES, _WEIGHTS = hermegauss(7)
 
 
@@ -48,7 +46,7 @@ class Material(NamedTuple):
 
     @property
     def modelled(self) -> bool:
-        return self.name in MODELS
+        return self.name in FREE_MODELS
 
 
 @dataclass(frozen=True)
@@ -69,9 +67,7 @@ class Structure:
         for i, layer in enumerate(self.layers):
             found.append(Number("thickness", 0.0, layer.most, "nm", i))
             if layer.modelled:
-                specs = MODELS[layer.name].items()
-                own = [(key, x.lower, _WIDER.get((layer.name, key), x.upper)) for key, x in specs if x.free]
-                found += [Number(*bounds, "", i) for bounds in own]
+                found += [Number(key, *x, "", i) for key, x in FREE_MODELS[layer.name].items()]
         for effect in self.effects:
             found.append(Number(effect, *_BOUNDS[effect], None if effect == "angle_shift" else 0))
         return tuple(found)
@@ -94,9 +90,9 @@ class Structure:
         if not material.modelled:
             return np.broadcast_to(view.tables[material.name], (len(x), view.wavelength.size))
         own = {n.name: x[:, [i]] for i, n in enumerate(self.numbers) if n.layer == layer}
-        values = {key: own[key] for key, spec in MODELS[material.name].items() if spec.free}
+        values = {key: own[key] for key in FREE_MODELS[material.name]}
         with np.errstate(all="ignore"):
-            found = build_model(material.name, values).index(view.wavelength)
+            found = built(material.name, values).index(view.wavelength)
         return np.broadcast_to(as_complex(found), (len(x), view.wavelength.size))
 
     def thicknesses(self, x: np.ndarray) -> np.ndarray:
