@@ -82,6 +82,12 @@ def test_error_of_the_constants_of_belcour_and_barla(refuses):
     refuses(ValueError, "gaussians-8", film_colour, 100.0, 2.0 + 0.1j, 1.5, method="belcour-barla")
 
 
+def test_a_material_may_be_an_argument_of_the_users_program():
+    layer, options = pl.material("TiO2"), {"method": "gaussians-8"}
+    inside = jax.jit(lambda medium: film_colour(300.0, medium, 1.52, **options).lab)(layer)
+    np.testing.assert_allclose(inside, film_colour(300.0, layer, 1.52, **options).lab, rtol=1e-9)
+
+
 @pytest.mark.slow
 def test_dispersive_media():
     """Samples are accurate for hematite and gold (measured: 0.009 at most).

@@ -6,6 +6,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from pellicle.colour import spaces
@@ -111,7 +112,9 @@ def reflectance(
     if several:
         raise ValueError('several layers need single wavelengths: give `method="uniform-64"`')
     # of a known material by NumPy: JAX's numbers are unknown within a program
-    known = layer.index(np.asarray(bands.wavelength)) if isinstance(layer, AbstractDispersion) else layer
+    known, traced = layer, any(isinstance(x, Tracer) for x in jax.tree.leaves(layer))
+    if isinstance(layer, AbstractDispersion) and not traced:
+        known = layer.index(np.asarray(bands.wavelength))
     propagating = interface.propagates(known, ambient, 90.0)  # and so at any angle
     if not propagating:
         n1 = interface.allow_tunnelling(n1)
