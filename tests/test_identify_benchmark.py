@@ -93,10 +93,14 @@ def test_layers_of_one_index_are_one_film(bench):
 
 def test_shares_of_a_run(bench):
     about = {"films": 2, "close": True, "truth": "", "answer": "", "verdict": "", "seconds": 1.0}
+    rows = [("clean", "right", np.nan), ("clean", "wrong", np.nan), ("there", "listed", 9.0)]
     made = [
-        bench.scoring.Answer(f"{i}", group, "identified", outcome, True, **about)
-        for i, (group, outcome) in enumerate([("clean", "right"), ("clean", "wrong"), ("there", "listed")])
+        bench.scoring.Answer(f"{i}", group, "identified", outcome, True, gain=gain, **about)
+        for i, (group, outcome, gain) in enumerate(rows)
     ]
+    assert "a layer that is there and that the data need: 1 of 1 (100 %); goal all" in bench.scoring.goals(
+        made
+    )
     assert bench.scoring.goals(made)[0] == "confidently wrong: 1 of 3 (33 %); goal 3 %"
     assert "| all | 3 | 1 | 1 | 1 | 0 | 0 | 1.0 |" in bench.scoring.table(made)
     assert bench.scoring.failures(made).startswith("- 1: truth")
