@@ -1,6 +1,7 @@
 """Text on consoles that do not print UTF-8: signs that they lack are written out, as chi for χ."""
 
 import codecs
+import io
 import sys
 import unicodedata
 
@@ -12,7 +13,7 @@ def print_every_sign() -> None:
     """Let stdout and stderr write out what their encoding lacks, instead of raising an error."""
     codecs.register_error("pellicle", _written_out)
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # not where another program has put its own
+        if isinstance(stream, io.TextIOWrapper):  # not where another program has put its own
             stream.reconfigure(errors="pellicle")
 
 
