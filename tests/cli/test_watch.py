@@ -72,7 +72,7 @@ def test_a_file_that_is_no_spectrum_of_the_series_is_said(live):
     made, _ = live
     told = {name: fit.error for name, fit in made.fits.items() if fit.error}
     assert set(told) == {"99s.csv", "no_time.csv", "run2_05s.csv"}
-    assert "state no times" in told["no_time.csv"]
+    assert "states no time" in told["no_time.csv"]
     assert "has the time of run_05s.csv" in told["run2_05s.csv"]
 
 

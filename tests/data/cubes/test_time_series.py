@@ -41,6 +41,12 @@ def test_times_of_a_table_of_columns(tmp_path):
     np.testing.assert_allclose(cube.pixels((slice(None),))["values"][:, 3], [0.1, 0.2, 0.3])
 
 
+def test_columns_are_taken_by_their_times(tmp_path):
+    cube = read_cube([matrix(tmp_path, ["0 s", "9 s", "4 s"])], signal="R")
+    np.testing.assert_allclose(cube.pixels((slice(None),))["values"][:, 3], [0.1, 0.3, 0.2])
+    assert "the times run back at 4 s: the columns are taken by their times" in cube.notes
+
+
 def test_times_from_dates_headers_and_tables(tmp_path):
     files = [write(tmp_path, f"{x}.csv", above=f"# 2026-05-04T12:0{i}:30\n") for i, x in enumerate("cab")]
     for i, file in enumerate(files):
@@ -64,6 +70,7 @@ def test_points_that_one_spectrum_lacks_are_missing(tmp_path):
 @pytest.mark.parametrize(
     ("names", "told"),
     [
+        (["a.csv"], "a.csv: is one spectrum, whose name states no time"),
         (["a.csv", "b.csv"], "state no times"),
         (["a1.csv", "a2.csv"], "have no unit"),
         (["1s.csv", "1.0s.csv"], "has the time of"),

@@ -56,6 +56,10 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
             if len(found) != 1:
                 raise DataError(f"{path}: holds {len(found)} spectra, and a series of files has one in each")
             spectra.append(found[0])
+    back = np.flatnonzero(np.diff(np.asarray(time)) < 0) if len(paths) == 1 else []
+    by_time = [
+        f"the times run back at {names[i + 1]}: the columns are taken by their times" for i in back[:1]
+    ]
     order = np.argsort(time, kind="stable")
     twice = np.flatnonzero(np.diff(np.asarray(time)[order]) == 0)
     if twice.size:
@@ -78,16 +82,15 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
         angle=angle,
         coords={TIME: np.asarray(time, float)[order]},
         units={TIME: unit},
-        notes=(f"{len(spectra)} spectra, times from {where}", *shared),
+        notes=(f"{len(spectra)} spectra, times from {where}", *by_time, *shared),
     )
 
 
 def file_times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
     """Times of files, their unit, their source; by dates since the first, of one file since 1970."""
     if time_from == BY_NAME:
-        return *numbers_of(
-            [file.stem for file in files], str(files[0].parent), "files"
-        ), "the names of the files"
+        path = files[0] if len(files) == 1 else files[0].parent
+        return *numbers_of([file.stem for file in files], str(path), "files"), "the names of the files"
     if time_from == BY_DATE:
         stamps = np.array([file.stat().st_mtime for file in files])
         return *_since_first(stamps, datetime.UTC), "the dates of the files"
@@ -112,6 +115,11 @@ def numbers_of(names: Sequence[str], path: str, what: str, unit: str | None = No
     """The number in which names differ, with its unit, or counted in a `unit` of its own; of a single name
     the one that has a unit."""
     found = [_NUMBER.findall(name) for name in names]
+    if len(names) == 1 and not found[0]:
+        raise DataError(
+            f"{path}: is one spectrum, whose name states no time: give a folder of spectra, a table with a"
+            " column for each time, or --time-from FILE"
+        )
     if any(len(one) != len(found[0]) for one in found) or not found[0]:
         raise DataError(f"{path}: the names of its {what} state no times: give a table with --time-from FILE")
     columns = [[one[i] for one in found] for i in range(len(found[0]))]
