@@ -7,6 +7,7 @@ directions.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import jax
@@ -46,21 +47,18 @@ def directional_albedo(
     light, azimuth = direction(theta, phi), np.arange(spokes) * (360 / spokes)
     node, weight = np.polynomial.legendre.leggauss(rings)
     polar = np.rad2deg(np.arcsin(np.sqrt(0.5 + 0.5 * node)))[:, None]
-    o = direction(polar, azimuth)
-    i = jnp.broadcast_to(light, o.shape)
-    values = brdf(parameters, i, o) * (1 - _narrow(half_vector(i, o)))[..., None]
-    wide = (np.pi / 2) * jnp.tensordot(jnp.asarray(weight, values.dtype), values.mean(axis=1), axes=1)
-
     step = np.log(10) * (_DECADES[1] - _DECADES[0]) / (rings - 1)
     tilt = np.arctan(10 ** np.linspace(*_DECADES, rings))[:, None]
     h = direction(np.rad2deg(tilt), azimuth)
     i = jnp.broadcast_to(light, h.shape)
-    o, across = reflect(i, h), jnp.sum(i * h, axis=-1)
+    away, towards = direction(polar, azimuth), reflect(i, h)
     # dω_o = 4 ⟨i, h⟩ dω_h, and dω_h = sin² θ cos θ d(ln tan θ) dφ
-    measure = 4 * jnp.maximum(across, 0.0) * jnp.maximum(o[..., 2], 0.0) * _narrow(h)
-    values = brdf(parameters, i, o) * measure[..., None]
-    rows = jnp.asarray(np.sin(tilt[:, 0]) ** 2 * np.cos(tilt[:, 0]), values.dtype)
-    return wide + 2 * np.pi * step * jnp.tensordot(rows, values.mean(axis=1), axes=1)
+    measure = 4 * jnp.maximum(jnp.sum(i * h, axis=-1), 0.0) * jnp.maximum(towards[..., 2], 0.0) * _narrow(h)
+    shares = jnp.concatenate([1 - _narrow(half_vector(i, away)), measure])
+    # both integrals by one evaluation: its compilation takes most of the time
+    values = brdf(parameters, jnp.concatenate([i, i]), jnp.concatenate([away, towards])) * shares[..., None]
+    rows = [np.pi / 2 * weight, 2 * np.pi * step * np.sin(tilt[:, 0]) ** 2 * np.cos(tilt[:, 0])]
+    return jnp.tensordot(jnp.asarray(np.concatenate(rows), values.dtype), values.mean(axis=1), axes=1)
 
 
 def _narrow(h: Any) -> Any:
@@ -71,8 +69,13 @@ def _narrow(h: Any) -> Any:
 
 def max_albedo(brdf: Callable, parameters: Parameters) -> float:
     """Return the largest directional albedo over `ANGLES` and channels; above 1, energy is created."""
-    albedo = jax.jit(jax.vmap(lambda theta: directional_albedo(brdf, parameters, theta)))
-    return float(jnp.max(albedo(jnp.asarray(ANGLES))))
+    return float(np.max(np.asarray(_albedos(brdf, dict(parameters)))))
+
+
+@partial(jax.jit, static_argnums=0)
+def _albedos(brdf: Callable, parameters: dict[str, Any]) -> Any:
+    albedo = partial(directional_albedo, brdf, parameters)
+    return jax.vmap(albedo)(jnp.asarray(ANGLES))
 
 
 def energy_warning(brdf: Callable, parameters: Parameters) -> str | None:

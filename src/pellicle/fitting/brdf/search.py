@@ -165,37 +165,36 @@ def scan(
     coordinates, form = static
 
     def one(unit):
-        weights = solve_weights(static, samples, fixed, box, unit)
-        values = coordinates.values(box, jnp.concatenate([unit, weights]))
-        return Candidates(form.explain((samples, fixed), values).deviance, weights)
+        if len(unit) == len(form.keys):
+            values = coordinates.values(box, unit)
+            return Candidates(form.explain((samples, fixed), values).deviance, jnp.zeros(0))
+        return solve_weights(static, samples, fixed, box, unit)
 
     return jax.vmap(one)(units)
 
 
 def solve_weights(
     static: tuple[Coordinates, SamplesForm], samples: Samples, fixed: dict[str, Any], box: Box, unit: Any
-) -> Any:
-    """The best weights, in the unit cube, for nonlinear parameters at `unit`.
+) -> Candidates:
+    """The best weights, in the unit cube, for nonlinear parameters at `unit`, and χ² with them.
 
     They are exact where residuals are linear in them; else residuals are linearised at the data.
     """
     coordinates, form = static
     first = len(unit)
-    lower, upper = box.lower[first:], box.upper[first:]
     size = len(form.keys) - first
-    if not size:
-        return jnp.zeros(0)
     by_channel = form.channels[first] is not None
     groups = samples.values.shape[1] if by_channel else 1
     count = size // groups
+    at_zero = coordinates.values(box, jnp.concatenate([unit, jnp.zeros(size)]))
 
     def at(weights):
-        values = coordinates.values(box, jnp.concatenate([unit, jnp.zeros(size)]))
-        values = values.at[first:].set(jnp.repeat(weights, groups))
+        values = at_zero.at[first:].set(jnp.repeat(weights, groups))
         return form.evaluate(form.numbers(values, fixed), samples.i, samples.o)
 
-    nothing = at(jnp.zeros(count))
-    columns = jnp.stack([at(one) - nothing for one in jnp.eye(count)])
+    # a BRDF is affine in its weights: what does not depend on them is evaluated once, here and for χ²
+    nothing, *each = jax.vmap(at)(jnp.concatenate([jnp.zeros((1, count)), jnp.eye(count)]))
+    columns = jnp.stack(each) - nothing
     change = samples.weight * slope(
         RESIDUALS[form.residual], samples.values, samples.i[:, 2:3], samples.floor
     )
@@ -204,19 +203,23 @@ def solve_weights(
     right = jnp.einsum("knc,nc->ck", weighted, (samples.values - nothing) * change)
     if not by_channel:
         normal, right = normal.sum(0, keepdims=True), right.sum(0, keepdims=True)
-    weights = jax.vmap(_nonnegative)(normal, right).T.reshape(-1)
-    return jnp.clip((weights - lower) / (upper - lower), 0.0, 1.0)
+    lower, upper = (side[first:].reshape(count, groups) for side in (box.lower, box.upper))
+    weights = jnp.clip(jax.vmap(_nonnegative)(normal, right).T, lower, upper)
+    residual = form.compare(samples, nothing + jnp.sum(weights[:, None] * columns, axis=0))
+    chi2 = jnp.sum(residual**2) * samples.independent_fraction
+    return Candidates(chi2, ((weights - lower) / (upper - lower)).reshape(-1))
 
 
 def _nonnegative(normal: Any, right: Any) -> Any:
     """min wᵀNw − 2 wᵀr over w ≥ 0, exactly: the best of all sets of weights that are not 0."""
     scale = jnp.sqrt(jnp.maximum(jnp.diag(normal), 1e-300))
     matrix, vector = normal / jnp.outer(scale, scale), right / scale
-    best, least = jnp.zeros_like(vector), jnp.zeros(())
-    for chosen in itertools.product((False, True), repeat=len(vector)):
-        mask = jnp.array(chosen)
-        part = jnp.where(mask[:, None] & mask[None, :], matrix, 0) + jnp.diag(jnp.where(mask, 1e-12, 1.0))
-        w = solve_positive(part, jnp.where(mask, vector, 0))
-        cost = jnp.where(jnp.all(w >= 0), w @ matrix @ w - 2 * w @ vector, jnp.inf)
-        best, least = jnp.where(cost < least, w, best), jnp.minimum(cost, least)
-    return best / scale
+
+    def solved(chosen):
+        part = jnp.where(chosen[:, None] & chosen, matrix, 0) + jnp.diag(jnp.where(chosen, 1e-12, 1.0))
+        w = solve_positive(part, jnp.where(chosen, vector, 0))
+        return w, jnp.where(jnp.all(w >= 0), w @ matrix @ w - 2 * w @ vector, jnp.inf)
+
+    every = jnp.array(list(itertools.product((False, True), repeat=len(vector))))
+    candidates, costs = jax.vmap(solved)(every)
+    return candidates[jnp.argmin(costs)] / scale
