@@ -1,7 +1,7 @@
 """Status of a fit, the first that holds, and its verdict in one or two sentences."""
 
 import math
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -123,16 +123,11 @@ def verdict(
     leads = _leading(status, parameters, rivals)
     if not leads:
         return "Nothing was free to fit."
-    lead, more = leads[0], len(leads) - MOST_NAMED
-    value, each = (
-        expanded(lead),
-        " and ".join(f"{p.name} {p.value:.4g}{_unit(p)}" for p in leads[:MOST_NAMED]),
-    )
-    best = found or f"{each}{f' and {more} more' if more > 0 else ''}"
+    lead, value = leads[0], expanded(leads[0])
+    best = found or _listed(leads, " ", lambda p: f"{p.value:.4g}{_unit(p)}")
     besides = "".join(f" But {sentence}." for sentence in trading[:1])
     if status is Status.CONVERGED:
-        each = " and ".join(f"{p.name}: {expanded(p)}" for p in leads[:MOST_NAMED])
-        return f"The data determine {each}{f' and {more} more' if more > 0 else ''}.{besides}"
+        return f"The data determine {_listed(leads, ': ', expanded)}.{besides}"
     if status is Status.AT_BOUND:
         resting = [p for p in parameters.values() if p.binding]
         given = [p for p in resting if not p.default_bounds]
@@ -162,6 +157,13 @@ def verdict(
             f"{f', most of all {where}' if where else ''}. Its {best} should not be used."
         )
     return f"The fit did not converge: its best point so far, {best}, should not be used."
+
+
+def _listed(leads: Sequence[Estimate], between: str, text: Callable[[Estimate], str]) -> str:
+    """Names and numbers in a row, the first `MOST_NAMED` of many."""
+    rest = len(leads) - MOST_NAMED
+    each = " and ".join(f"{p.name}{between}{text(p)}" for p in leads[:MOST_NAMED])
+    return f"{each} and {rest} more" if rest > 0 else each
 
 
 def _leading(status: Status, parameters: Mapping[str, Estimate], rivals: tuple[Rival, ...]) -> list[Estimate]:
