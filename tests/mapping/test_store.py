@@ -18,9 +18,9 @@ import pellicle as pl
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.batch.data import CODES
 from pellicle.mapping import run
+from pellicle.mapping.locks import held
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
-from pellicle.mapping.store import held
 from pellicle.reporting.map_text import cube_report
 
 pytestmark = pytest.mark.usefixtures("small_blocks")

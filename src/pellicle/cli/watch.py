@@ -55,7 +55,7 @@ def watch(
     start()
     from pellicle.data.arrivals import Arrivals
     from pellicle.mapping.live_series import LiveSeries
-    from pellicle.mapping.store import held
+    from pellicle.mapping.locks import held
 
     live = LiveSeries(scene, time_from, **(cube or CubeFlags()).arguments(described))
     table = None if out is None else _Table(Path(out), source, live)

@@ -25,9 +25,10 @@ from pellicle.fitting.progress import Progress, quiet
 from pellicle.mapping.block_fit import Fitted, Fitter, Job, fit_block
 from pellicle.mapping.continuity import record_of, row
 from pellicle.mapping.lamp import LampCurve, lamp_curve_of
+from pellicle.mapping.locks import held
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import PixelModel, bands_off, fit_pixels, prepare
-from pellicle.mapping.store import BYTES, FORMAT, begin, held
+from pellicle.mapping.store import BYTES, FORMAT, begin
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
