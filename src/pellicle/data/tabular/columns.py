@@ -156,6 +156,10 @@ UNSTATED = "unit not stated"
 """Unit in the name of a column whose unit must be asked for."""
 
 
+_LISTED = 8
+"""Most columns that a message names."""
+
+
 @dataclass(frozen=True)
 class Column:
     """One column: position, name, role and unit.
@@ -291,5 +295,6 @@ def unknown_unit(column: Column) -> str:
 
 
 def listed(columns: Sequence[Column]) -> str:
-    """Return the names of columns, for a message."""
-    return ", ".join(repr(column.name) for column in columns)
+    """Return the names of columns, of many the first and the last, for a message."""
+    names = [repr(column.name) for column in columns]
+    return ", ".join(names if len(names) <= _LISTED else [*names[:2], "...", names[-1]])

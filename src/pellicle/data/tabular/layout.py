@@ -142,14 +142,18 @@ def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, in
 
 
 def _dialect(lines: Sequence[Line]) -> tuple[str, str]:
-    """Delimiter with which most lines are all numbers (ties: tab, `;`, `,`, blank), and decimal mark."""
+    """Delimiter with which most lines are all numbers, else have two of them, and decimal mark.
+
+    In a tie the order is tab, `;`, `,`, blank.
+    """
     sample = lines[:: max(1, len(lines) // _SAMPLE)]
     if any(SELECTED in line.bare for line in sample):
         return SELECTED, ","
 
     def votes(delimiter: str) -> tuple[int, int]:
         counted = [_numbers_in(line, delimiter) for line in sample]
-        return sum(n == cells >= 2 for n, cells in counted), sum(n >= 2 for n, cells in counted)
+        complete = sum(n == cells >= 2 for n, cells in counted)
+        return complete, 0 if complete else sum(n >= 2 for n, cells in counted)  # "0.0 s" are not two cells
 
     delimiter = max(DELIMITERS, key=votes)
     grouped = next((match[0] for line in sample if (match := _GROUPED.search(line.text))), None)
