@@ -122,6 +122,8 @@ def test_what_is_no_series_is_refused(tmp_path):
         pl.series(data.isel(time=[0, 2, 1, 3]), SCENE)
     with pytest.raises(UsageError, match="three times"):
         pl.series(data.isel(time=[0, 1]), SCENE)
+    with pytest.raises(UsageError, match="its times are numbers without a unit"):
+        pl.series(data.assign_coords(time=TIME), SCENE)
     with pytest.raises(UsageError, match="along `time` only"):
         pl.series(data.rename(time="x").expand_dims(y=[0.0]), SCENE)
     fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 3000, varies="shared")), 3.9)

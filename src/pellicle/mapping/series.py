@@ -104,12 +104,17 @@ def smoothed_series(cube: Cube, model: PixelModel, made: Map, join: Join | None 
 
 
 def _check_times(cube: Cube) -> None:
-    """Raise UsageError for times that are absent, go back or stand twice."""
+    """Raise UsageError for times that are absent, have no unit, go back or stand twice."""
     if TIME not in cube.coords:
         raise UsageError(
             f"{cube.path or 'data'}: has no coordinate `time`: assign the times, with their `units`"
         )
     time = np.asarray(cube.coords[TIME])
+    if time.dtype.kind not in "mM" and not cube.units.get(TIME):
+        raise UsageError(
+            f"{cube.path or 'data'}: its times are numbers without a unit: give the coordinate `time` the"
+            ' attribute `units`, such as "s"'
+        )
     if time.size < 3:
         raise UsageError(
             f"{cube.path or 'series'}: a series needs three times at least, and this has {time.size}"

@@ -18,6 +18,7 @@ import equinox as eqx
 import numpy as np
 
 from pellicle.data.cube import Cube
+from pellicle.data.cubes.traces import FEW
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import CODES, NO_DATA, ORDERS, BatchFits
 from pellicle.fitting.film.parameters import bounds
@@ -43,8 +44,6 @@ if TYPE_CHECKING:
 
 log = getLogger(__name__)
 
-FEW = 4
-"""Most wavelengths of a trace; more are spectra, and each of them has a fit of its own first."""
 _OTHERS, _FAR = 16, 40.0
 """Most other paths whose likelihood is computed, and the Δχ² of the path from which none is."""
 _STRETCH, _LOST = 16, 0.1

@@ -1,4 +1,4 @@
-"""Series of files and tables with a column for each time: times, units, and what is refused."""
+"""Series of files and tables with a column or a row for each time: times, units, and what is refused."""
 
 import os
 
@@ -39,6 +39,30 @@ def test_times_of_a_table_of_columns(tmp_path):
     assert cube.units["time"] == "min"
     np.testing.assert_array_equal(cube.coords["time"], [0, 0.5, 2])
     np.testing.assert_allclose(cube.pixels((slice(None),))["values"][:, 3], [0.1, 0.2, 0.3])
+
+
+def test_times_of_a_table_of_columns_between_tabs(tmp_path):
+    """A head such as 2.0 s is not a number and a unit beside it, and a file without a head has no times."""
+    path = matrix(tmp_path, [f"{2 * i:.1f} s" for i in range(12)])
+    path.write_text(path.read_text().replace(",", "\t"))
+    cube = read_cube([path], signal="R")
+    np.testing.assert_array_equal(cube.coords["time"], 2 * np.arange(12))
+    np.testing.assert_allclose(cube.pixels((slice(None),))["values"][7], 0.8)
+
+
+@pytest.mark.parametrize("unit", [" nm", " nm R", ""])
+def test_rows_of_times_are_a_series_of_spectra(tmp_path, unit):
+    path = tmp_path / "rows.txt"
+    rows = [f"{30 * i}\t" + "\t".join(f"{(i + x / 1e3) / 10:.4f}" for x in NM) for i in range(4)]
+    path.write_text("\n".join(["\t".join(["Time (s)", *(f"{x:g}{unit}" for x in NM)]), *rows]))
+    cube = read_cube(path, signal="R")
+    assert (cube.dims, cube.units["time"], cube.calibrated) == (("time",), "s", True)
+    np.testing.assert_allclose(cube.wavelength, NM)
+    np.testing.assert_array_equal(cube.coords["time"], [0, 30, 60, 90])
+    np.testing.assert_allclose(cube.pixels((slice(None),))["values"][2], (2 + NM / 1e3) / 10)
+    if not unit:
+        with pytest.raises(UsageError, match="its heads name no quantity"):
+            read_cube(path)
 
 
 def test_columns_are_taken_by_their_times(tmp_path):
