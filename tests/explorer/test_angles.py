@@ -6,7 +6,7 @@ import tmm
 
 import pellicle as pl
 from pellicle.cli.reading import measured_scene
-from pellicle.explorer import background
+from pellicle.explorer import session as session_module
 from pellicle.explorer.session import Session
 
 NM = np.linspace(420.0, 800.0, 20)
@@ -159,7 +159,7 @@ def test_data_at_several_angles_replace_the_light_and_are_fitted_together(monkey
         assert np.allclose(curve["y"], truth[rows], atol=1e-4)
     assert session.answer("scene", {})["angles"] == [60.0, 72.0]
     given = []
-    monkeypatch.setattr(background, "fit", lambda data, scene, progress: given.append((data, scene)))
+    monkeypatch.setattr(session_module, "fit_film", lambda data, scene, progress: given.append((data, scene)))
     several = {"values": {"thickness": 100.0}, "angles": [60.0, 65.0]}
     assert session.answer("fit", several) == {"stopped": True}
     assert session.answer("fit", {"values": {"angle": 30.0}, "angles": [60.0]}) == {"stopped": True}

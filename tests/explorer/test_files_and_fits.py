@@ -8,7 +8,8 @@ import pytest
 
 import pellicle as pl
 from pellicle.cli.explore import LightFlags, SceneFlags, _session
-from pellicle.explorer import background, dropped_files
+from pellicle.explorer import dropped_files
+from pellicle.explorer import session as session_module
 from pellicle.explorer.session import Session
 from pellicle.scene.free import Free
 
@@ -175,7 +176,7 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
         assert go_on.wait(20)
         progress("scan", 4, 10)
 
-    monkeypatch.setattr(background, "fit", slow)
+    monkeypatch.setattr(session_module, "fit_film", slow)
     answers = []
     body = {"values": {"thickness": 300.0, "roughness": 2.0}, "free": ["thickness", "instrument.bandwidth"]}
     thread = threading.Thread(target=lambda: answers.append(session.answer("fit", body)))

@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -90,6 +91,15 @@ def csv(thickness=320.0, noise=0.002):
     values += noise * np.random.default_rng(1).standard_normal(len(values))
     rows = "\n".join(f"{x:g},{y:.6f}" for x, y in zip(wavelength, values, strict=True))
     return f"wavelength_nm,R\n{rows}\n".encode()
+
+
+def samples(thickness):
+    """File of BRDF samples of the surface with another thickness, with noise of 0.002/sr."""
+    numbers = {"thickness": thickness, "n": 1.46, "roughness": 0.2, "base_n": 2.9, "base_k": 3.0}
+    measured = pl.simulate(pl.Surface("microfacet-film", numbers), noise=0.002)
+    columns = [measured.theta_i, measured.phi_i, measured.theta_o, measured.phi_o, measured.values]
+    rows = (",".join(f"{x:.9g}" for x in row) for row in np.column_stack(columns))
+    return "\n".join(["theta_i,phi_i,theta_o,phi_o,R,G,B", *rows]).encode()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -244,6 +254,41 @@ def test_a_layer_is_added_in_the_page_and_a_reload_keeps_it(opened):
     wait_for(page, lambda: "film=" not in page.url)
 
 
+SLOWLY = """() => {
+  const before = window.fetch;
+  window.fetch = async (address, options) => {
+    if (address.endsWith("/api/layers")) await new Promise((ended) => setTimeout(ended, 1500));
+    return before(address, options);
+  };
+}"""
+"""Answers to changes of layers come late."""
+
+
+def test_what_is_typed_while_the_page_is_made_anew_stays(opened):
+    """Slow answers: one field is typed during the change of another, a second one is left."""
+    page = opened()
+    page.evaluate(SLOWLY)
+    page.get_by_role("combobox", name="material of substrate").fill("BK7")
+    page.keyboard.press("Enter")
+    thickness = page.get_by_role("textbox", name="thickness in nm of layer 1")
+    thickness.fill("100:40")
+    page.get_by_role("combobox", name="material of ambient").fill("1.3")
+    page.keyboard.press("Tab")
+    thickness.focus()
+    page.keyboard.press("End")
+    wait_for(page, lambda: "BK7" in page.url)
+    settle(page)
+    assert thickness.evaluate("(field) => field === document.activeElement")
+    page.keyboard.type("0")
+    page.keyboard.press("Enter")
+    settle(page)
+    wait_for(page, lambda: "1.3|SiO2@100:400|BK7" in unquote(page.url))
+    scene = pl.Scene(pl.Layer("SiO2", float(number(page).input_value())), "BK7", ambient=1.3)
+    assert np.allclose(curve(page), pl.simulate(scene, np.asarray(curve(page, axis="x"))).values, atol=2e-6)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    wait_for(page, lambda: "film=" not in page.url)
+
+
 BAD = {
     "words.csv": b"this is a letter\nand no spectrum\n",
     "empty.csv": b"",
@@ -327,7 +372,7 @@ def test_a_server_that_ended_is_said_in_one_sentence(browser, tmp_path):
     page.close()
 
 
-def test_a_surface_shows_its_lobes_in_one_panel_and_takes_no_data(browser, tmp_path):
+def test_a_surface_shows_its_lobes_in_one_panel(browser, tmp_path):
     with explorer(tmp_path, SURFACE) as (_, address), opening(browser, address) as open_page:
         page = open_page()
         lobes = [curve(page, name) for name in ("645 nm", "525 nm", "445 nm")]
@@ -337,4 +382,24 @@ def test_a_surface_shows_its_lobes_in_one_panel_and_takes_no_data(browser, tmp_p
         settle(page)
         assert curve(page, "645 nm") != lobes[0]
         assert page.locator(".patch").is_hidden()
-        assert page.get_by_role("button", name="Open data").is_hidden()
+        assert page.get_by_role("button", name="Which film?").is_hidden()
+
+
+def test_samples_dropped_on_a_surface_are_drawn_fitted_and_removed(browser, tmp_path):
+    with explorer(tmp_path, SURFACE) as (_, address), opening(browser, address) as open_page:
+        page = open_page()
+        drop(page, "blade.csv", samples(230.0))
+        page.locator(".notes").get_by_text("blade.csv").first.wait_for()
+        settle(page)
+        assert len(curve(page, "525 nm data")) == len(curve(page, "525 nm")) == 400
+        assert np.std(curve(page, "525 nm residual")) > 0.01  # 180 nm are not 230
+        page.get_by_role("button", name="Fit", exact=True).click()
+        page.wait_for_selector(".verdict", timeout=300_000)
+        settle(page)
+        assert float(number(page).input_value()) == pytest.approx(230.0, abs=1.0)
+        assert "Evidence of a layer" in page.locator(".verdict.good").inner_text()
+        assert np.std(curve(page, "525 nm residual")) < 0.003
+        page.get_by_role("button", name="Remove blade.csv").click()
+        page.get_by_role("slider", name="angle of incidence of the lobes").wait_for()
+        settle(page)
+        assert curve(page, "525 nm data") is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -86,9 +87,10 @@ def explore(
 
 
 def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
-    """The session of a recipe, with the data of a film's first file, or of the flags."""
+    """The session of a recipe, with the data of its first file, or of the flags."""
     from pellicle.cli.reading import wavelengths
     from pellicle.explorer.session import Session
+    from pellicle.explorer.shown import RecipeFile
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     if path is None:
@@ -99,20 +101,29 @@ def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
         return session
     recipe, title = read_recipe(path), Path(path).name
     if isinstance(recipe, SurfaceRecipe):
-        return Session(recipe.scene(), Path(path).parent, title=title)
+        surface, reading = recipe.scene(), recipe.tables.data.model_dump(exclude_none=True)
+        reading = {name: x for name, x in reading.items() if name not in ("files", "signal")}
+        read: Any = recipe.read
+        files = [RecipeFile(x, lambda: surface, reading, lambda x=x: [read(x)]) for x in recipe.files]
+        about = {"spectra": _first(files), "reading": reading, "files": files}
+        return Session(surface, Path(path).parent, title=title, **about)
     data = recipe.tables.data
     each = recipe.samples or [*[recipe] * len(data.files), *recipe.each]
-    first, spectra = (each or [recipe])[0], []
+    first = (each or [recipe])[0]
     scene, data = first.scene(), first.tables.data
     files = [] if data.signal in SPACES else [*map(_file, recipe.files, each)]
-    if files:
-        try:
-            spectra = files[0].read()
-        except DataError as error:
-            say(f"{error} (the explorer starts without data)")
     given = None if data.wavelengths is None else wavelengths(first, scene)
-    about = {"title": title, "spectra": spectra, "reading": _reading(first), "files": files}
+    about = {"title": title, "spectra": _first(files), "reading": _reading(first), "files": files}
     return Session(scene, Path(path).parent, wavelength=given, **about)
+
+
+def _first(files: list[RecipeFile]) -> Sequence[Any]:
+    """The data of the first file; none, with a line on stderr, where it cannot be read."""
+    try:
+        return files[0].read() if files else []
+    except DataError as error:
+        say(f"{error} (the explorer starts without data)")
+        return []
 
 
 def _reading(recipe: FilmRecipe) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pellicle.colour import lab, sensor
 from pellicle.colour.spaces import srgb_matrix
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.explorer.controls import Control
 from pellicle.explorer.programs import COSINES, MOST, Curve, measured_angles, named, thinned
@@ -166,6 +167,13 @@ def _curves(
         for rows, x, setting in drawn
         for label, values in columns.items()
     ]
+
+
+def samples_text(samples: BrdfSamples, drawn: int) -> list[str]:
+    """Sentences on BRDF samples that were read, of which some are drawn."""
+    about = f"{samples.path}: BRDF, {len(samples)} samples of {', '.join(samples.channels)}"
+    fewer = [f"{drawn} samples are drawn, spread over the file; a fit uses all of them"]
+    return [about, *samples.notes, *(fewer if drawn < len(samples) else [])]
 
 
 def data_text(spectra: Sequence[Spectrum]) -> list[str]:

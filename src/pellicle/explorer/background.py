@@ -2,16 +2,14 @@
 
 import atexit
 import threading
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable
 from itertools import count
 from queue import PriorityQueue
 from typing import Any, TypeVar
 
-from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
-from pellicle.fitting.film.fit import fit
+from pellicle.fitting.progress import Progress
 from pellicle.fitting.result import Fit
-from pellicle.scene.film import Scene
 
 Result = TypeVar("Result")
 NOW, SOON = 0, 1
@@ -88,11 +86,10 @@ class FitRun:
         self._running, self._stop = threading.Lock(), threading.Event()
         self._progress = ("", 0, 0)
 
-    def run(self, data: Sequence[Spectrum], scene: Scene, options: Mapping[str, Any]) -> Fit | None:
-        """Fit a scene to spectra by options of a fit; None where it was stopped. Raises UsageError while
-        another fit runs."""
-        measured = data[0] if len(data) == 1 else list(data)
-        return self.alone(lambda: fit(measured, scene, progress=self._report, **options))
+    def run(self, fit: Callable[[Progress], Fit]) -> Fit | None:
+        """Return a fit that reports its progress; None where it was stopped. Raises UsageError while another
+        fit runs."""
+        return self.alone(lambda: fit(self._report))
 
     def alone(self, work: Callable[[], Result]) -> Result | None:
         """Return what `work` returns, None where it was stopped. Raises UsageError while a fit runs."""

@@ -1,16 +1,17 @@
-"""Files that a page sends, and those in the folder of the recipe: spectra, and n and k of materials."""
+"""Files that a page sends, and those in the folder of the recipe: data, and n and k of materials."""
 
 import os
 import tempfile
 from base64 import b64decode
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.read_spectrum import read_spectra
 from pellicle.data.spectrum import Spectrum
 from pellicle.dispersion.base import AbstractDispersion
@@ -27,26 +28,27 @@ LARGEST_FILE = 20_000_000
 _LONGEST_NAME = 120
 
 
-def measured_spectra(
-    source: Mapping[str, Any] | Path, folder: Path | None, signal: str, options: Mapping[str, Any]
-) -> list[Spectrum]:
-    """Read the spectra of a request by options of reading: `name` with `text` or `base64`, or `file`, one in
-    the folder. A path is that of a recipe.
+Data = TypeVar("Data", Spectrum, BrdfSamples)
 
-    A file that does not state its signal has that of the scene. **Raises:** DataError or UsageError in one
-    sentence.
+
+def measured(
+    source: Mapping[str, Any] | Path, folder: Path | None, read: Callable[[Path], list[Data]]
+) -> list[Data]:
+    """Data of a request, read from a path by a function: `name` with `text` or `base64`, or `file`, one in
+    the folder. A path is that of a recipe. Data and errors bear the file's name without its folder.
+
+    **Raises:** DataError or UsageError in one sentence.
     """
     if isinstance(source, Path):
-        return _read(source, os.path.relpath(source, folder or Path.cwd()), signal, options)
-    body = source
-    if "file" in body:
-        path = inside(folder, body["file"])
-        return _read(path, path.name, signal, options)
-    name, content = _content(body)
+        return _named(source, os.path.relpath(source, folder or Path.cwd()), read)
+    if "file" in source:
+        path = inside(folder, source["file"])
+        return _named(path, path.name, read)
+    name, content = _content(source)
     with tempfile.TemporaryDirectory(prefix="pellicle-") as place:
         path = Path(place) / name
         path.write_bytes(content)
-        return _read(path, name, signal, options)
+        return _named(path, name, read)
 
 
 def _content(body: Mapping[str, Any]) -> tuple[str, bytes]:
@@ -85,22 +87,26 @@ def inside(folder: Path | None, name: Any) -> Path:
     return path
 
 
-def _read(path: Path, name: str, signal: str, options: Mapping[str, Any]) -> list[Spectrum]:
-    """Read a file whose errors and spectra bear its name without the folder."""
+def spectra_of(path: Path, signal: str, options: Mapping[str, Any]) -> list[Spectrum]:
+    """Read spectra; a file that does not state its signal has that of the scene. Raises as `measured`."""
     try:
+        return read_spectra(path, **options)
+    except UsageError as error:
         try:
-            spectra = read_spectra(path, **options)
-        except UsageError as error:
-            try:
-                spectra = read_spectra(path, **{"signal": signal, **options})
-            except UsageError:
-                raise error from None
-            note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
-            spectra = [replace(each, notes=(*each.notes, note)) for each in spectra]
+            spectra = read_spectra(path, **{"signal": signal, **options})
+        except UsageError:
+            raise error from None
+        note = f"the file does not say what it is: taken as {signal}, the signal of the scene"
+        return [replace(each, notes=(*each.notes, note)) for each in spectra]
+
+
+def _named(path: Path, name: str, read: Callable[[Path], list[Data]]) -> list[Data]:
+    try:
+        data = read(path)
     except (UsageError, DataError) as error:
         raise type(error)(str(error).replace(str(path), name)) from None
-    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in spectra]
-    return [replace(each, path=name, notes=own) for each, own in zip(spectra, notes, strict=True)]
+    notes = [tuple(note.replace(str(path), name) for note in each.notes) for each in data]
+    return [replace(each, path=name, notes=own) for each, own in zip(data, notes, strict=True)]
 
 
 class MaterialFiles:

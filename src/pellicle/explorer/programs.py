@@ -12,6 +12,7 @@ import numpy as np
 from jax.tree_util import GetAttrKey
 
 from pellicle.colour import integration_bands
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
@@ -55,9 +56,9 @@ def light_angles(light: Light, count: int) -> np.ndarray:
     return angles
 
 
-def measured_angles(spectra: Sequence[Spectrum]) -> np.ndarray:
-    """Return every angle that spectra state, (angles,) in degrees and rising."""
-    stated = [spectrum.angle for spectrum in spectra if spectrum.angle is not None]
+def measured_angles(spectra: Sequence[Spectrum | BrdfSamples]) -> np.ndarray:
+    """Return every angle that spectra state, (angles,) in degrees and rising; none of BRDF samples."""
+    stated = [x.angle for x in spectra if isinstance(x, Spectrum) and x.angle is not None]
     return np.unique(np.concatenate(stated)) if stated else np.zeros(0)
 
 

@@ -1,7 +1,7 @@
 """Fields of a page for options of reading a file, and messages that name them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pellicle.data.options import ReadingOptions
@@ -9,13 +9,15 @@ from pellicle.errors import UsageError
 
 FIELDS = ("signal", "wavelength_unit", "signal_unit", "columns", "range", "spectrum", "polarisation", "noise")
 """Options that a file of a spectrum may need."""
+OF_SAMPLES = ("columns", "noise")
+"""Those of BRDF samples."""
 _ARGUMENT = re.compile(r"`(\w+)(?:=([^`]*))?`")
 
 
-def described() -> list[dict[str, Any]]:
+def described(names: Sequence[str] = FIELDS) -> list[dict[str, Any]]:
     """Return the name, label, help and words of each field."""
     fields = []
-    for name in FIELDS:
+    for name in names:
         option = ReadingOptions.declared()[name][1]
         known = option.words if option.find is None else option.find("")[1]
         form = option.metavar.replace("SIGMA", "") or ", ".join(known[:3])

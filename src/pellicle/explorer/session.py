@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.options import FitOptions
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
@@ -30,8 +31,11 @@ from pellicle.explorer.dropped_files import LARGEST_FILE
 from pellicle.explorer.film_texts import described, words
 from pellicle.explorer.programs import ANGLE, measured_angles
 from pellicle.explorer.shown import RecipeFile, Shown, View, all_covered, sentence, values_of
+from pellicle.explorer.surface_views import SurfaceExplorerView
 from pellicle.explorer.unknown_film import identification, identification_to_json
-from pellicle.explorer.views import FilmView, SurfaceExplorerView
+from pellicle.explorer.views import FilmView
+from pellicle.fitting.brdf.fit import fitted as fit_samples
+from pellicle.fitting.film.fit import fit as fit_film
 from pellicle.identification.hypothesis import Hypothesis
 from pellicle.recipes.python_text import python_program
 from pellicle.scene.film import Scene
@@ -64,7 +68,7 @@ class Session:
         *,
         wavelength: Any = None,
         title: str = "",
-        spectra: Sequence[Spectrum] = (),
+        spectra: Sequence[Spectrum | BrdfSamples] = (),
         reading: Mapping[str, Any] = MappingProxyType({}),
         files: Sequence[RecipeFile] = (),
     ) -> None:
@@ -111,25 +115,36 @@ class Session:
     def _scene(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self.shown.at(body)
         about = {"title": self.title, "kind": view.kind, "limit": LARGEST_FILE, "edited": self.shown.edited}
-        data = {"data": self.shown.data_shown()} if self.shown.spectra else {}
-        if isinstance(view, FilmView):
+        data: dict[str, Any] = {"data": self.shown.data_shown()} if self.shown.spectra else {}
+        film = isinstance(view, FilmView)
+        if film:
             data |= {"layers": described(view.scene), "words": words()}
-            data |= {"fields": reading_fields.described(), "number": self.shown.number}
-            if len(self.shown.files) > 1:
-                data["files"] = [os.path.basename(file.path) for file in self.shown.files]
+        fields = reading_fields.described(reading_fields.FIELDS if film else reading_fields.OF_SAMPLES)
+        data |= {"fields": fields, "number": self.shown.number}
+        if len(self.shown.files) > 1:
+            data["files"] = [os.path.basename(file.path) for file in self.shown.files]
         return {**about, **view.describe(), **data}
 
     def _fit(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self.shown.at(body)
-        if not self.shown.spectra or isinstance(view, SurfaceExplorerView):
+        if not self.shown.spectra:
             raise UsageError("there are no data to fit: open a file first")
         values = values_of(view, body)
         names = fitted_names(view.controls, body.get("free"))
+        options = FitOptions.of(self.shown.reading).given()
+        if isinstance(view, SurfaceExplorerView):
+            surface, samples = view.stated(values, names), self.shown.spectra[0]
+            options = {"tolerance": 0.0, "residual": self.shown.reading.get("residual"), **options}
+            fit = self._fit_run.run(
+                lambda progress: fit_samples(samples, surface, progress=progress, **options)[0]
+            )
+            return {"stopped": True} if fit is None else fit_to_json(fit, view.controls)
         scene = scene_with(view.scene, view.controls, values, names)
         if "angle" not in names and all(spectrum.angle is not None for spectrum in self.shown.spectra):
             scene = with_value(scene, ANGLE, 0.0)  # angles of the data, whatever the slider has
-        options = FitOptions.of(self.shown.reading).given()
-        fit = self._fit_run.run(all_covered(self.shown.spectra, scene), scene, options)
+        spectra = all_covered(self.shown.spectra, scene)
+        measured: Any = spectra[0] if len(spectra) == 1 else spectra
+        fit = self._fit_run.run(lambda progress: fit_film(measured, scene, progress=progress, **options))
         if fit is None:
             return {"stopped": True}
         answer = fit_to_json(fit, view.controls)
@@ -142,7 +157,7 @@ class Session:
     def _identify(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view = self.shown.at(body)
         if not self.shown.spectra or isinstance(view, SurfaceExplorerView):
-            raise UsageError("there are no data to identify: open a file first")
+            raise UsageError("there are no data to identify: open a file of a spectrum first")
         values = values_of(view, body)
         spectra = all_covered(self.shown.spectra, view.scene)
         found = self._fit_run.alone(lambda: identification(spectra, view.scene, values))
@@ -166,16 +181,16 @@ class Session:
         view = self.shown.at(body)
         fitted = fitted_names(view.controls, body.get("free")) if self.shown.spectra else None
         scene, folder = view.stated(values_of(view, body), fitted), self.folder or Path.cwd()
-        if isinstance(scene, Surface) or isinstance(view, SurfaceExplorerView):
-            toml = self.shown.materials.recipe(scene, folder)
-            return {"toml": toml, "python": python_program(scene), "commands": _commands("simulate", "")}
-        about: dict[str, Any] = {"wavelength": view.wavelength}
-        program = python_program(view.sampled(scene))
+        about: dict[str, Any] = {}
+        if isinstance(scene, Scene) and isinstance(view, FilmView):
+            about, program = {"wavelength": view.wavelength}, python_program(view.sampled(scene))
+        else:
+            program = python_program(scene)
         if self.shown.spectra:
             files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.shown.spectra))
             about = {"files": files, "reading": self.shown.reading}
-        if self.shown.spectra and np.ndim(scene.light.angle):  # those of the files
-            scene = with_value(scene, ANGLE, 0.0)
+            if isinstance(scene, Scene) and np.ndim(scene.light.angle):  # those of the files
+                scene = with_value(scene, ANGLE, 0.0)
         verb = "fit" if self.shown.spectra else "simulate"
         beside = [Path(spectrum.path).name for spectrum in self.shown.spectra] + self.shown.materials.used(
             scene
@@ -221,7 +236,8 @@ class Session:
             return f"data:image/png;base64,{b64encode(view.rendering(made, size)).decode()}"
         if part == "colour":
             return colours_to_json(made, view.seen_at(part), view.light_in_words)
-        measured = {name for spectrum in self.shown.spectra for name in spectrum.kind.parts}
+        of_film = self.shown.spectra if isinstance(view, FilmView) else ()
+        measured = {name for spectrum in of_film for name in spectrum.kind.parts}
         return [curve_to_json(curve) for curve in made if not measured or curve.signal in measured]
 
     def prepare(self) -> None:

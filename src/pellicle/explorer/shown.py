@@ -8,17 +8,20 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
+import equinox as eqx
 import numpy as np
 
 from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.explorer import reading_fields
-from pellicle.explorer.answers import curve_to_json, cut_ranges, data_curves, data_text
+from pellicle.explorer.answers import curve_to_json, cut_ranges, data_curves, data_text, samples_text
 from pellicle.explorer.controls import scene_with, with_value
-from pellicle.explorer.dropped_files import MaterialFiles, measured_spectra
+from pellicle.explorer.dropped_files import MaterialFiles, measured, spectra_of
 from pellicle.explorer.film_texts import rebuilt
 from pellicle.explorer.programs import LIGHT, asked_angles, measured_angles
-from pellicle.explorer.views import FilmView, SurfaceExplorerView, same_view
+from pellicle.explorer.surface_views import SurfaceExplorerView
+from pellicle.explorer.views import FilmView
+from pellicle.recipes.read import surface_samples
 from pellicle.scene.common_range import common_range, covered
 from pellicle.scene.film import Scene
 from pellicle.scene.surface import Surface
@@ -32,9 +35,9 @@ class RecipeFile(NamedTuple):
     """One of several files of a recipe: its scene, and the options and the function that read it."""
 
     path: str
-    scene: Callable[[], Scene]
+    scene: Callable[[], Scene | Surface]
     reading: Mapping[str, Any]
-    read: Callable[[], Sequence[Spectrum]]
+    read: Callable[[], Sequence[Any]]
 
 
 class Shown:
@@ -48,16 +51,16 @@ class Shown:
         scene: Scene | Surface,
         folder: Path | None,
         wavelength: Any,
-        spectra: Sequence[Spectrum],
+        spectra: Sequence[Any],
         reading: Mapping[str, Any],
         files: Sequence[RecipeFile],
         changed: Callable[[bool], None],
     ) -> None:
         self.folder, self.files, self._changed = folder, files, changed
         self._nm = wavelength  # of the scene without data
-        if wavelength is None and spectra:
+        if wavelength is None and spectra and isinstance(spectra[0], Spectrum):
             wavelength = np.unique(spectra[0].wavelength)
-        view = SurfaceExplorerView(scene) if isinstance(scene, Surface) else FilmView(scene, wavelength)
+        view: Any = SurfaceExplorerView(scene) if isinstance(scene, Surface) else FilmView(scene, wavelength)
         self.view: View = (view.measured(spectra) if spectra else None) or view
         self.spectra, self.reading = self._located(spectra), reading
         self.number = 0 if spectra else None  # of the file that is shown
@@ -68,7 +71,7 @@ class Shown:
         self.materials = MaterialFiles(folder)
         self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
 
-    def _located(self, spectra: Sequence[Spectrum]) -> list[Spectrum]:
+    def _located(self, spectra: Sequence[Any]) -> list[Any]:
         """Spectra with paths from the folder."""
         here = self.folder or Path.cwd()
         return [replace(each, path=os.path.relpath(each.path, here)) for each in spectra]
@@ -81,11 +84,11 @@ class Shown:
             raise UsageError(f"no file {number!r}: the recipe has {len(self.files)}")
         own = self.files[number]
         scene, spectra = own.scene(), self._located(own.read())
-        light = scene.light
+        light = getattr(scene, "light", None)
         if self.edited:
             scene = with_value(self.film().scene, LIGHT, light)
-        view = FilmView(scene, np.unique(spectra[0].wavelength))
-        answer = self.take(view.measured(spectra) or view, spectra, own.reading)
+        view = self._view_of(scene, spectra)
+        answer = self.take(view, spectra, own.reading)
         self.number, self._light, self._source = number, light, Path(own.path).resolve()
         return {**answer, "states_angle": True}
 
@@ -104,16 +107,22 @@ class Shown:
     def film(self) -> FilmView:
         """The view of a film. Raises UsageError for a surface."""
         if isinstance(self.view, SurfaceExplorerView):
-            raise UsageError("the explorer draws no data of a surface: pellicle fit fits BRDF samples")
+            raise UsageError("a surface has no layers here: change its media in the recipe")
         return self.view
 
     def data(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Read data, which replace those before, and take the light of the scene from them."""
-        view = self.film()
+        view: Any = self.view
         if "name" in body or "file" in body or self._source is None:
             self._source, self.number = body, None
         reading = reading_fields.options_of(body.get("reading") or {})
-        spectra = measured_spectra(self._source, self.folder, self._light.signal, reading)
+        if isinstance(surface := view.scene, Surface):
+            samples = measured(
+                self._source, self.folder, lambda path: [surface_samples(path, surface, **reading)]
+            )
+            return self.take(self._view_of(surface, samples), samples, reading)
+        signal = self._light.signal
+        spectra = measured(self._source, self.folder, lambda path: spectra_of(path, signal, reading))
         base = FilmView(self._unlit(view.scene), view.wavelength)
         if body.get("angles") is not None:
             base = base.at(asked_angles(body["angles"]))
@@ -121,8 +130,10 @@ class Shown:
 
     def remove(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Remove the data, and with them their light and angles."""
-        self.number = None
-        scene = self._unlit(self.film().scene)
+        self.number, scene = None, self.view.scene
+        if isinstance(scene, Surface):
+            return self.take(SurfaceExplorerView(scene), [])
+        scene = self._unlit(scene)
         return self.take(FilmView(scene, self._known(scene)), [])
 
     def reset(self, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -161,12 +172,18 @@ class Shown:
         """The view of a scene with the light of the data."""
         if not self.spectra:
             return FilmView(scene, self._known(scene))
-        spectra = all_covered(self.spectra, scene)
+        return self._view_of(scene, all_covered(self.spectra, scene))
+
+    @staticmethod
+    def _view_of(scene: Any, spectra: Sequence[Any]) -> Any:
+        """The view of a film or a surface with data."""
+        if isinstance(scene, Surface):
+            return SurfaceExplorerView(scene).measured(spectra)
         view = FilmView(scene, np.unique(spectra[0].wavelength))
         return view.measured(spectra) or view
 
     def take(
-        self, view: View, spectra: Sequence[Spectrum], reading: Mapping[str, Any] = MappingProxyType({})
+        self, view: View, spectra: Sequence[Any], reading: Mapping[str, Any] = MappingProxyType({})
     ) -> dict[str, Any]:
         """Show a view and data in place of those before; the answer says what is new to the page."""
         old, stated = self.view, bool(measured_angles([*self.spectra, *spectra]).size)
@@ -182,15 +199,24 @@ class Shown:
         """The data for the page: curves, notes, ranges that are left out, and options of reading."""
         if not self.spectra:
             return {"name": None, "curves": [], "notes": [], "cut": []}
-        curves = data_curves(self.spectra, isinstance(self.view, FilmView) and self.view.against_angle)
-        used = all_covered(self.spectra, self.view.scene)
-        return {
-            "name": self.spectra[0].path,
-            "curves": [curve_to_json(curve) for curve in curves],
-            "notes": data_text(used),
-            "cut": cut_ranges(used),
-            "reading": reading_fields.texts_of(self.reading),
-        }
+        if isinstance(self.view, SurfaceExplorerView):
+            curves, cut = self.view.data_curves(), []
+            notes = samples_text(self.spectra[0], len(curves[0].x))
+        else:
+            used = all_covered(self.spectra, self.view.scene)
+            curves, cut = data_curves(self.spectra, self.view.against_angle), cut_ranges(used)
+            notes = data_text(used)
+        drawn = [curve_to_json(curve) for curve in curves]
+        about = {"name": self.spectra[0].path, "curves": drawn, "notes": notes, "cut": cut}
+        return about | {"reading": reading_fields.texts_of(self.reading)}
+
+
+def same_view(one: FilmView | SurfaceExplorerView, other: FilmView | SurfaceExplorerView) -> bool:
+    """Return True for views of the same scene, drawn alike."""
+    if isinstance(one, SurfaceExplorerView) or isinstance(other, SurfaceExplorerView):
+        return one is other
+    alike = one.folded == other.folded and np.array_equal(one.wavelength, other.wavelength)
+    return alike and eqx.tree_equal(one.scene, other.scene) is True
 
 
 def values_of(view: View, body: Mapping[str, Any]) -> dict[str, float]:

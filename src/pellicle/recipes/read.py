@@ -322,6 +322,19 @@ def _of_file(tables: schema.RecipeTable, file: schema.FileTable | schema.SampleT
     return tables.model_copy(update=parts)
 
 
+def surface_samples(
+    file: str | os.PathLike[str], surface: Surface, noise: Any = None, **options: Any
+) -> BrdfSamples:
+    """Read samples of a surface: spectra at its wavelengths, or integrated over the bands of its sensor.
+
+    `options` are those of `read_brdf_samples`, and raise as they do.
+    """
+    sensor = surface.sensor
+    bands = None if sensor is None else (sensor.wavelength, sensor.weights)
+    samples = read_brdf_samples(file, wavelengths=surface.channel_wavelengths, bands=bands, **options)
+    return samples if noise is None else samples.with_noise(noise)
+
+
 @dataclass(frozen=True)
 class SurfaceRecipe:
     """A recipe of a surface: its path and its checked tables."""
@@ -374,16 +387,9 @@ class SurfaceRecipe:
 
         Spectra are taken at the surface's wavelengths, or integrated over the bands of its sensor.
         """
-        data, surface = self.tables.data, self.scene()
-        sensor = surface.sensor
-        samples = read_brdf_samples(
-            file,
-            columns=data.columns,
-            samples=data.samples,
-            max_theta=data.max_theta,
-            wavelengths=surface.channel_wavelengths,
-            bands=None if sensor is None else (sensor.wavelength, sensor.weights),
-        )
+        data = self.tables.data
+        options = {"columns": data.columns, "samples": data.samples, "max_theta": data.max_theta}
+        samples = surface_samples(file, self.scene(), **options)
         if data.noise is None:
             return samples
         with _of_recipe(self.path, part="data."):

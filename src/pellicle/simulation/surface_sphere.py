@@ -16,7 +16,7 @@ from pellicle.colour import FilmColourTable, integration_bands, sensor
 from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.dispersion.empirical import Table
 from pellicle.scene.free import Free
-from pellicle.scene.surface import INDICES, KEYS, Surface, index_numbers
+from pellicle.scene.surface import INDICES, KEYS, HasDirections, Surface, index_numbers
 from pellicle.simulation.colours import BANDS
 from pellicle.simulation.environment import EDGE, EYE, Environment, Rendering, sphere, studio
 
@@ -152,8 +152,17 @@ def in_plane(surface: Surface, incidence: float, leaving: np.ndarray) -> np.ndar
     """
     i = direction(incidence, 0.0)
     o = direction(np.abs(leaving), np.where(leaving >= 0, 180.0, 0.0))
+    return _values(surface, jnp.broadcast_to(i, o.shape), o)
+
+
+def along(surface: Surface, seen: HasDirections) -> np.ndarray:
+    """The BRDF (samples, channels) along pairs of directions. Free parameters take their start values."""
+    return _values(surface, direction(seen.theta_i, seen.phi_i), direction(seen.theta_o, seen.phi_o))
+
+
+def _values(surface: Surface, i: Any, o: Any) -> np.ndarray:
     numbers = {key: jnp.asarray(value) for key, value in surface.start_numbers().items()}
-    return np.asarray(_evaluate(surface.brdf, numbers, jnp.broadcast_to(i, o.shape), o))
+    return np.asarray(_evaluate(surface.brdf, numbers, i, o))
 
 
 # one program; compiled one by one its operations take seconds

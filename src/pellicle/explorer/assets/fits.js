@@ -17,7 +17,7 @@ class FitActions {
     const button = (text, onclick, more) => make("button", { type: "button", onclick, ...more }, text);
     this.fit = button("Fit", () => this.#run(), { class: "fit", disabled: true, title: "Fits the marked sliders to the data" });
     this.stop = button("Stop", () => ask("fit_stop"), { hidden: true });
-    this.which = button("Which film?", () => this.#identify(), { class: "fit", disabled: true, title: "Looks for the films on this substrate that describe the data" });
+    this.which = button("Which film?", () => this.#identify(), { class: "fit which", disabled: true, title: "Looks for the films on this substrate that describe the data" });
     this.said = make("div", { class: "fitted", role: "status" });
     this.buttons = [this.fit, this.stop, this.which];
   }

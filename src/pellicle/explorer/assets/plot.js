@@ -6,6 +6,7 @@ const ANGLES = ["--fit", "--blue", "--green", "--fourth"]; // of incidence, risi
 const DASHES = ["solid", "dash", "dashdot", "longdash"];
 const DASHES_IN_WORDS = ["solid", "dashed", "dash-dotted", "long-dashed"];
 const SHARE_OF_RESIDUALS = 0.45; // of the height of another panel
+const DECADES = 1e5; // of a logarithmic axis, at most
 const GAP = 0.06; // between panels, as a fraction of the height
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
 
@@ -101,7 +102,7 @@ class Plot {
       if (!model) return [];
       const y = curve.x.map((x, i) => {
         const own = curve.y[i];
-        const fit = interpolated(model, x);
+        const fit = model.x[i] === x ? model.y[i] : interpolated(model, x); // samples have one x several times
         if (own === null || fit === null) return null;
         return curve.ordinate?.startsWith("Δ") ? ((((own - fit) % 360) + 540) % 360) - 180 : own - fit;
       });
@@ -141,13 +142,15 @@ class Plot {
         mode: "markers", ...legend(`${curve.label} data`, "data"),
         marker: { color: several ? own(curve).color : colour("--data"), size: curve.x.length < 100 ? 7 : 4, symbol: several ? "circle-open" : "circle" },
       })),
-      ...this.before.map((curve) => line(curve, own(curve), {
+      ...(this.axis.points ? [] : this.before).map((curve) => line(curve, own(curve), {
         name: `${curve.label} before`, opacity: 0.35, hoverinfo: "skip", hovertemplate: null, showlegend: !several,
       })),
       ...this.fitted.map((curve) => line(curve, { color: colour("--rival"), dash: "dot" }, legend(`fit: ${curve.label}`, "fit"))),
-      ...this.curves.map((curve) => line(curve, own(curve), legend(curve.label, group(curve)))),
+      ...this.curves.map((curve) => (this.axis.points
+        ? trace(curve, { x: curve.x, y: curve.y }, { name: curve.label, mode: "markers", marker: { color: own(curve).color, size: 6, symbol: "x-thin", line: { width: 1.5, color: own(curve).color } } })
+        : line(curve, own(curve), legend(curve.label, group(curve))))),
       ...this.residuals.map((curve) => trace(curve, { x: curve.x, y: curve.y }, {
-        name: `${curve.label} residual`, showlegend: false, line: { width: 1, color: several ? own(curve).color : colour("--data") },
+        name: `${curve.label} residual`, showlegend: false, ...(this.axis.points ? { mode: "markers", marker: { size: 4, color: own(curve).color } } : {}), line: { width: 1, color: several ? own(curve).color : colour("--data") },
       })),
     ];
     const entries = traces.filter((each) => each.showlegend !== false).map((each) => each.name);
@@ -191,7 +194,7 @@ class Plot {
       const highest = 1 - weights.slice(0, number).reduce((sum, each) => sum + each * share + GAP, 0);
       const range = this.#range(name, moving);
       layout[number === 0 ? "yaxis" : `yaxis${number + 1}`] = {
-        ...line, title: { text: name, standoff: 6 }, range, domain: [Math.max(highest - share * weights[number], 0), highest], anchor: "x",
+        ...line, title: { text: name, standoff: 6 }, ...range, domain: [Math.max(highest - share * weights[number], 0), highest], anchor: "x",
       };
     });
     this.element.style.minHeight = `${layout.height + 2}px`;
@@ -207,22 +210,24 @@ class Plot {
 
   #range(name, moving) {
     let [low, high] = [Infinity, -Infinity];
+    const log = this.axis.log && !name.startsWith("residual");
     for (const curve of [...this.curves, ...this.before, ...this.fitted, ...this.data, ...this.residuals]) {
       if (this.#ordinate(curve) !== name) continue;
       for (const value of curve.y) {
-        if (value === null) continue;
+        if (value === null || (log && value <= 0)) continue;
         if (value < low) low = value;
         if (value > high) high = value;
       }
     }
-    if (!(low <= high)) return [0, 1];
+    if (!(low <= high)) return { range: [0, 1] };
+    if (log) [low, high] = [Math.log10(Math.max(low, high / DECADES)), Math.log10(high)];
     const room = ROOM * (high - low || Math.abs(high) || 1);
-    const fromZero = !name.startsWith("residual") && low >= 0 && (high <= 1.5 || low < high / 2);
+    const fromZero = !log && !name.startsWith("residual") && low >= 0 && (high <= 1.5 || low < high / 2);
     let range = [fromZero ? 0 : low - room, high + room];
     const old = this.ranges[name];
     if (moving && old) range = [Math.min(old[0], range[0]), Math.max(old[1], range[1])];
     this.ranges[name] = range;
-    return range;
+    return { range, type: log ? "log" : "linear" };
   }
 
   /** Extremes of each signal, the text alternative of the plot. */

@@ -67,21 +67,31 @@ def fitted(
         raise UsageError(f"residual must be one of {', '.join(RESIDUALS)}, not {name!r}")
     if not surface.free_numbers():
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
-    places = [f"{each.path}: " if each.path else "" for each in samples]
-    for place, each in zip(places, samples, strict=True):
-        if surface.channels != len(each.channels):
-            raise UsageError(
-                f"{place}{len(each.channels)} channels ({', '.join(each.channels)}) for"
-                f" {surface.channels} of the surface: give wavelengths one for each, or a sensor"
-            )
+    for each in samples:
+        check_channels(each, surface)
     count = sum(len(each) for each in samples)
     if count < FEWEST:
-        raise UsageError(f"{places[0]}{count} samples are too few to fit and to judge: give {FEWEST} or more")
+        raise UsageError(
+            f"{_place(samples[0])}{count} samples are too few to fit and to judge: give {FEWEST} or more"
+        )
     stems = [Path(each.path).stem.replace(".", "_") for each in samples]
     names = stems if len(set(stems)) == len(stems) else [str(i + 1) for i in range(len(stems))]
     with jax.enable_x64(True):
         names = [""] if isinstance(data, BrdfSamples) else names
         return _fit(samples, names, surface, name, tolerance, loss, progress)
+
+
+def check_channels(samples: BrdfSamples, surface: Surface) -> None:
+    """Raise UsageError where samples have other channels than the surface."""
+    if surface.channels != len(samples.channels):
+        raise UsageError(
+            f"{_place(samples)}{len(samples.channels)} channels ({', '.join(samples.channels)}) for"
+            f" {surface.channels} of the surface: give wavelengths one for each, or a sensor"
+        )
+
+
+def _place(samples: BrdfSamples) -> str:
+    return f"{samples.path}: " if samples.path else ""
 
 
 def _held_out(whole: Problem, effort: Effort, loss: str, progress: Progress) -> tuple[Minima, float]:
