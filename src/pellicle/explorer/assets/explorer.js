@@ -218,6 +218,7 @@ export async function explore(element, call, options = {}) {
     const list = scene.angles ? [angleList.element] : []; // a surface has none
     if (list.length && !groups.includes("light")) groups.splice(groups.includes("instrument") ? groups.indexOf("instrument") : groups.length, 0, "light");
     const typing = document.activeElement === angleList.input;
+    layerList.remember();
     if (list.length) angleList.show(scene);
     sliders.replaceChildren(layerList.element, ...groups.map((name) => make("fieldset", {}, make("legend", {}, name),
       ...controls.filter((each) => each.about.group === name).map((each) => each.element), ...(name === "light" ? list : []))));
