@@ -35,6 +35,10 @@ def test_an_oxide_is_identified_by_its_index():
     assert found.verdict.startswith("A film of index 1.45 to 1.47, as SiO2, 30")
     assert "Excluded: " in found.verdict
     assert {"alumina", "Y2O3"} <= {x.name for x in found.excluded}
+    untried = {x.material: x.why for x in found.not_tried}
+    assert {"graded index", "contamination on top", "two layers"} <= set(untried)
+    assert "birefringence" not in untried
+    assert untried["roughness"] == "a simpler structure leaves only noise and usual errors"
     html = found._repr_html_()
     assert html.count("<tr>") == 2
     assert "<b>identified</b>: A film of index" in html
@@ -116,6 +120,18 @@ def test_another_glass_is_named_and_never_certain():
     assert found.best.layers[0].thickness.value == pytest.approx(400, abs=5)
 
 
+def test_a_glass_with_other_films_that_the_data_favour_is_named():
+    """Ta2O5 on BK7 is Nb2O5 on SF10 with nearly the same evidence."""
+    spectrum = reflectance(("Ta2O5", 80.0), substrate="BK7")
+    tried = ["Ta2O5", "Nb2O5", "Si3N4", "TiO2"]
+    found = pl.identify(spectrum, "SF10/HOYA", among=tried, layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert "If the substrate is another glass, as BK7, another film describes the data" in found.verdict
+    assert pl.identify(spectrum, "BK7", among=tried, layers=1).status is Outcome.IDENTIFIED
+    alone = pl.identify(spectrum, "SF10/HOYA", among=tried, layers=1, allow=())
+    assert alone.status is Outcome.IDENTIFIED
+
+
 def test_a_file_without_an_angle_is_said_where_nothing_describes_it():
     pair = [reflectance(("SiO2", 300.0)), reflectance(("SiO2", 500.0))]
     found = pl.identify(pair, "Si", among=["SiO2"], layers=1, allow=())
@@ -163,6 +179,7 @@ def test_another_convention_of_delta_is_named():
 def test_two_layers_are_found_unasked():
     found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si")
     upper, lower = found.best.layers
+    assert "more than two layers" in {x.material for x in found.not_tried}
     assert ("TiO2" in upper.like, "SiO2" in lower.like) == (True, True)
     assert abs(upper.thickness.value - 60) < 3 * upper.thickness.stderr
     assert abs(lower.thickness.value - 300) < 3 * lower.thickness.stderr

@@ -12,7 +12,7 @@ import numpy as np
 from pellicle.fitting.result import Estimate
 from pellicle.identification.evidence import Weighed
 from pellicle.identification.growth import BARE, NOISE_LIKE, SIGNIFICANT, Growth, needed
-from pellicle.identification.hypothesis import Hypothesis, Outcome, SupposedLayer
+from pellicle.identification.hypothesis import Hypothesis, SupposedLayer
 from pellicle.identification.problem import Problem
 
 DECIDED = 5.0
@@ -21,6 +21,7 @@ _DEMANDED = 12.0
 """Δ ln Z to the best single film from which a second layer is needed, however thick."""
 NOISY = 2.0
 """Ratio of unexplained residuals to noise above which nothing is identified."""
+SEVERAL = "several films are left"
 STRAINED = 3.0
 """Size of an effect, in standard uncertainties, above which nothing is identified."""
 MISSTATED = 0.3
@@ -36,11 +37,15 @@ def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
 
     The evidence chooses: where the best does not describe the data and no rival as good does, none is left.
     Two layers may be needed while neither their thicknesses nor their indices are known: they are left where
-    no other is.
+    no other is, and beside others: 60 nm of PMMA on oxide were identified as 24 nm of SU-8, with less
+    evidence than a free index of unknown thickness.
     """
     single = max((x.ln_z for x in weighed if len(x.structure.layers) == 1), default=-math.inf)
     vague = [x for x in weighed if needed(x) or (x.ln_z > single + _DEMANDED and not x.structure.effects)]
-    for pool in ([x for x in weighed if needed(x)] or list(weighed), vague):
+    firm = [x for x in weighed if needed(x)]
+    if firm and len(firm[0].structure.layers) > 1:
+        firm = [x for x in vague if needed(x, layered=True)]
+    for pool in (firm or list(weighed), vague):
         near = [x for x in pool if pool[0].ln_z - x.ln_z < DECIDED and x.adequate]
         if near:
             return near
@@ -50,25 +55,28 @@ def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
 def shapeless(weighed: Sequence[Weighed]) -> list[Weighed]:
     """Structures that leave but noise and have a free index of another shape than any model's, if the best
     are such: 249 nm of ITO in Ψ and Δ was 249.7 ± 3.1 nm, with an index that is bent by 2 %."""
-    best = weighed[0].ln_z
-    near = [x for x in weighed if best - x.ln_z < DECIDED and needed(x)]
+    near = [x for x in weighed if weighed[0].ln_z - x.ln_z < DECIDED]
+    # a model that a bound holds has not the shape either, as Urbach's for 333 nm of Si3N4
+    near = [x for x in near if needed(x)] or near
     return [x for x in near if x.shapeless and x.remaining < NOISE_LIKE]
 
 
-def outcome(problem: Problem, kept: Sequence[Weighed]) -> Outcome:
-    """The outcome of an identification that leaves these structures."""
-    if not kept:
-        return Outcome.NONE
+def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
+    """Reason for which the best of the structures that are left is not certain, empty for none."""
     best = kept[0]
-    if max(best.remaining / NOISY, best.strain / STRAINED) > 1 or not all(
-        same(problem, best, x) for x in kept[1:]
-    ):
-        return Outcome.UNDECIDED
-    parts = list(zip(best.structure.numbers, best.x, best.stderr, strict=True))
-    off = any(n.name == "angle_shift" and abs(v) > MISSTATED for n, v, _ in parts)
-    lost = any(n.name == "thickness" and v > BARE and not v > SIGNIFICANT * e for n, v, e in parts)
+    if not all(same(problem, best, x) for x in kept[1:]):
+        return SEVERAL
+    if best.remaining > NOISY:
+        return f"its residuals are {best.remaining:.2g} times the noise"
+    if best.strain > STRAINED:
+        return f"an error of the instrument or the sample is {best.strain:.2g} times its usual size"
+    for n, v, e in zip(best.structure.numbers, best.x, best.stderr, strict=True):
+        if n.name == "angle_shift" and abs(v) > MISSTATED:
+            return "the angle of incidence is not the one that was stated"
+        if n.name == "thickness" and v > BARE and not v > SIGNIFICANT * e:
+            return "a thickness is not determined"
     unlike = all(_like_no_film(problem, x) for x in kept)
-    return Outcome.UNDECIDED if off or lost or unlike else Outcome.IDENTIFIED
+    return "its free index may stand for another structure" if unlike else ""
 
 
 def _like_no_film(problem: Problem, x: Weighed) -> bool:

@@ -62,17 +62,19 @@ _STARTS: dict[str, list[dict[str, float]]] = {
 """Starts of models, by their index; thicknesses are scanned for each."""
 
 
-def needed(x: Weighed) -> bool:
-    """True where the data need each further layer and each effect, and no model is held by a bound."""
+def needed(x: Weighed, layered: bool = False) -> bool:
+    """True where the data need each further layer, unless `layered` says so, and each effect, and no model is
+    held by a bound."""
     layers = len(x.structure.layers)
     for number, value, error in zip(x.structure.numbers, x.x, x.stderr, strict=True):
         reach, held = 1e-6 * (number.upper - number.lower), error < _LOOSE * (number.upper - number.lower)
-        extra = number.name in EFFECTS or number.name == "k0" or (layers > 1 and number.name == "thickness")
+        further = layers > 1 and not layered and number.name == "thickness"
+        extra = further or number.name in EFFECTS or number.name == "k0"
         if extra and abs(value) < SIGNIFICANT * error:
             return False
         low = number.name == "A" and value < number.lower + reach
-        # an oxide at the largest thickness of a native one is a film
-        if (held or number.upper == BARE) and (low or value > number.upper - reach):
+        # an oxide at the largest thickness of a native one, or of one below a film, is a film
+        if (held or number.upper in (BARE, OXIDE)) and (low or value > number.upper - reach):
             return False
     return True
 

@@ -148,7 +148,7 @@ def _free(x: Estimate) -> Free:
 
 @dataclass(frozen=True)
 class NotTried:
-    """A material that could not be tried, and the reason."""
+    """A material, structure or effect that was not tried, and the reason."""
 
     material: str
     why: str

@@ -6,25 +6,28 @@ import math
 from collections.abc import Sequence
 
 from pellicle.fitting.result import Estimate
-from pellicle.identification.conclusion import DECIDED
+from pellicle.identification.conclusion import DECIDED, SEVERAL
 from pellicle.identification.evidence import Weighed
 from pellicle.identification.growth import BARE
-from pellicle.identification.hypothesis import Hypothesis, NotTried, Outcome, SupposedLayer
+from pellicle.identification.hypothesis import Hypothesis, NotTried, SupposedLayer
 
 _SHOWN = 4
 """Names of hypotheses and materials in one sentence."""
 
 
 def verdict(
-    status: Outcome,
     kept: Sequence[Hypothesis],
     excluded: Sequence[Hypothesis],
+    doubt: str,
     nearest: Weighed,
     left_out: Sequence[NotTried],
     substrate: str,
 ) -> str:
-    """Return the verdict on a sample on `substrate`: what it is, or what the data leave open."""
-    if status is Outcome.NONE:
+    """Return the verdict on a sample on `substrate`: what it is, or what the data leave open.
+
+    `doubt` is the reason for which the first of the hypotheses that are left is not certain, empty for none.
+    """
+    if not kept:
         name, size = nearest.excess
         sentences = [
             "No hypothesis that was tried describes the data within usual errors.",
@@ -32,10 +35,10 @@ def verdict(
             f" {nearest.remaining:.2g} times the noise and needs an error of {name} of {size:.2g} times its"
             " usual size.",
         ]
-    elif status is Outcome.IDENTIFIED:
+    elif not doubt:
         sentences = [f"{_sentence(kept[0], substrate)}.", *_effects(kept[0], excluded)]
     else:
-        sentences = _undecided(kept, substrate)
+        sentences = _undecided(kept, substrate, doubt)
     if kept and excluded:
         best = kept[0].ln_z
         far = [x for x in excluded if best - x.ln_z >= DECIDED]
@@ -48,7 +51,7 @@ def verdict(
     return " ".join(sentences)
 
 
-def _undecided(kept: Sequence[Hypothesis], substrate: str) -> list[str]:
+def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str) -> list[str]:
     names = [x.name for x in kept]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     if kept[0].condition:
@@ -56,8 +59,8 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str) -> list[str]:
             "No hypothesis describes the data as they are stated.",
             f"If {kept[0].condition}, they may be of this: {_lower(_sentence(kept[0], substrate))}.",
         ]
-    if len(kept) == 1:
-        only = f"One hypothesis is left, but is not certain: {_lower(_sentence(kept[0], substrate))}."
+    if doubt != SEVERAL:
+        only = f"One answer is left, but is not certain, as {doubt}: {_lower(_sentence(kept[0], substrate))}."
         return [only, *_effects(kept[0], ())]
     sentences = [f"The data do not decide between {', '.join(names[:_SHOWN])}{more} on {substrate}."]
     main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]

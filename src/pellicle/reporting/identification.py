@@ -149,6 +149,6 @@ def identification_page(found: Identification) -> str:
         head=HEAD,
         rows=rows,
         note=_RESIDUALS,
-        not_tried=Table("Materials that were not tried", ("material", "why"), left_out),
+        not_tried=Table("Materials, structures and effects that were not tried", ("name", "why"), left_out),
         would_decide=Table("Measurements that would decide", ("signal", "angle", "Δ ln Z to expect"), would),
     )
