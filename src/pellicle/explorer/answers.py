@@ -1,7 +1,7 @@
 """Answers to the page: curves of models, data and fits, and colours as JSON, a ball under a film as a PNG."""
 
 from collections.abc import Collection, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from math import isfinite
 from typing import Any
 
@@ -75,9 +75,14 @@ def curve_to_json(curve: Curve) -> dict[str, Any]:
     return {
         **taken(curve, "label", "signal", "setting"),
         "ordinate": _ORDINATES.get(curve.signal),
-        "x": numbers(curve.x, 7),
+        "x": _abscissa(curve.x.tobytes()),
         "y": numbers(curve.y, 7),
     }
+
+
+@lru_cache(maxsize=64)  # curves of a view share one
+def _abscissa(content: bytes) -> list[float | None]:
+    return numbers(np.frombuffer(content), 7)
 
 
 def colours_to_json(xyz: np.ndarray, angles: np.ndarray, light: str) -> dict[str, Any]:

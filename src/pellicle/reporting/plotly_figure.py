@@ -9,6 +9,7 @@ Colours are names of the page's style, `var(--fit)`, which differ between light 
 Plotly take some HTML: names of files are escaped.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
@@ -94,7 +95,8 @@ def thinning(count: int) -> int:
 
 def numbers(values: Iterable[Any], digits: int = 6) -> list[float | None]:
     """Numbers of so many digits, None for those that are absent or not finite."""
-    return [None if x is None or not np.isfinite(x) else float(f"{x:.{digits}g}") for x in values]
+    form, listed = f".{digits}g", values.tolist() if isinstance(values, np.ndarray) else values
+    return [None if x is None or not math.isfinite(x) else float(format(x, form)) for x in listed]
 
 
 def _numbered(word: str, number: int) -> str:
