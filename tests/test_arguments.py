@@ -48,6 +48,8 @@ CASES = {
     "pl.Instrument(bandwidth='2')": ("UsageError", "`bandwidth`", "'2'"),
     "pl.material(1.5)": ("UsageError", "a material is a name", "pl.medium"),
     "pl.medium(None)": ("UsageError", "a medium is", "not NoneType"),
+    "pl.reflectance(500e-9, 100.0, 'SiO2', 'Si')": ("UsageError", "like one in m:", "write 500"),
+    "pl.reflectance(0.5, 100.0, 'SiO2', 'Si')": ("UsageError", "like one in µm:", "write 500"),
     "pl.reflectance(500.0, '100', 'SiO2', 'Si')": ("UsageError", "`thickness`", "'100'"),
 }
 

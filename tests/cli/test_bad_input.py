@@ -33,8 +33,14 @@ def check_refused(pellicle, tmp_path):
         (f"wavelength,R\n{FAR_ROWS}{ROWS}", "--layer HfO2", ("HfO2", "250 to 900 nm", "--range")),
         (f"wavelength,intensity\n{ROWS}", "--signal R", ("--scale slow",)),
         ("wavelength,psi,delta\n400,20,90\n500,21,90\n", "", ("angle of incidence", "--angle 70")),
+        (
+            "wavelength_nm,R\n" + "".join(f"0.{400 + 10 * i},0.{20 + i}\n" for i in range(10)),
+            "",
+            ("end at 0.49", "like µm", "--wavelength-unit um"),
+        ),
+        ("wavelength_nm,R\n" + ROWS.replace("0.", "0,"), "", ("line 2", "semicolons", "decimal commas")),
     ],
-    ids=["percent", "outside of a material's table", "intensity", "angle"],
+    ids=["percent", "outside of a material's table", "intensity", "angle", "micrometres", "decimal commas"],
 )
 def test_data(check_refused, write, text, flags, words):
     file = write(text)
@@ -54,6 +60,7 @@ def test_data(check_refused, write, text, flags, words):
         ("--noise -1", ("--noise",)),
         ("--layer 'cauchy(1.45,0.0035)'", ("µm²", "write 3500")),
         ("--free q", ("free 'q'",)),
+        ("--free thickness", ("its bounds free it", "--thickness 10:1000")),
         ("--plate-mm 1", ("--plate-mm", "--back")),
         ("--back air --plate-mm 0", ("--plate-mm", "above zero")),
         ("--wavelength-unit inch", ("--wavelength-unit", "'inch'", "um")),
@@ -76,6 +83,11 @@ PLATE = "{ material = 'SiO2', back = 'air', plate_mm = 0 }"
     [
         ("[scene\n", ("is not TOML", "line 1")),
         (FILM.format("'Si'", "'SiO3'", 10), ("SiO3", "SiO2")),
+        (
+            FILM.format("'Si'", 1.46, "{ lower = 1, upper = 9, prior = 'x' }"),
+            ("prior is a table of mean, sd", "'x'"),
+        ),
+        (FILM.format("'Si'", 1.46, "{ lower = 'a', upper = 9 }"), ("thickness.lower", "number", "'a'")),
         (FILM.format(PLATE, 1.46, "{ lower = 1, upper = 9 }"), ("film.toml: plate_mm must be above 0 mm",)),
     ],
 )

@@ -49,7 +49,7 @@ DATA = [
     (NONE, "wl,T (%)\n400,12\n500,151\n", "line 3", "1.51 is above 1.5 for a transmittance", "`range`"),
     ({"noise": 0.002}, "wavelength,R\n400,0.1\n500,-0.04\n600,0.2\n", "line 3", "more than noise"),
     (R, "wl,intensity\n400,-1\n500,0\n", "nowhere positive", "check"),
-    (NONE, "nm,R,sigma\n4,0.1,0.01\n5,0.1,0\n", "line 3", "sigma", "not above zero"),
+    (NONE, "nm,R,sigma\n400,0.1,0.01\n500,0.1,0\n", "line 3", "sigma", "not above zero"),
     *((NONE, f"nm,angle,R\n400,{x},0\n", "line 2, column 'angle'", "90 degrees") for x in (-1, 90, 120)),
     (NONE, "wl,angle (rad),R\n400,0.3,0.1\n500,0.3,0.1\n", "'rad'", "in degrees"),
     (NONE, "wavelength,psi_err\n400,1\n500,2\n", "no column is a signal", "`columns=["),

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pellicle.data.measurement import SHORTEST
 from pellicle.data.options import SpectrumOptions
 from pellicle.data.repeated_sweeps import are_sweeps, mean_spectrum, one_way, sweep_numbers
 from pellicle.data.spectrum import POLARISATIONS, Spectrum, inside_range, setting_numbers
@@ -91,8 +92,13 @@ class Rows:
 
         Raises DataError or UsageError.
         """
-        unit = axis_unit(table, chosen.axis.wavelength, unit)
+        given, unit = unit, axis_unit(table, chosen.axis.wavelength, unit)
         axis, values = read_axis(table, chosen.axis, chosen.columns, unit, overlapping)
+        if given is None and unit == "nm" and (longest := np.max(axis.wavelength, initial=0)) < SHORTEST:
+            raise DataError(
+                f"{table.path}: wavelengths are in nm by their name and end at {longest:g}, which is like µm:"
+                ' say with `wavelength_unit="um"` or `wavelength_unit="nm"` what they are'
+            )
         columns = {column.role: x for column, x in zip(chosen.columns, values, strict=True)}
         notes = (*table.notes, *chosen.notes, f"wavelength unit: {unit or 'nm, assumed'}")
         return cls(table, np.arange(len(axis.wavelength)), axis, columns, notes)

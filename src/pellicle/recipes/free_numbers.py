@@ -52,7 +52,12 @@ def _free_parameter(
     located = [locate_parameter(dispersion, leaves[i][0]) for i in numbers]
     known = {location.name: (location, i) for location, i in zip(located, numbers, strict=True)}
     if not known or (isinstance(dispersion, Constant | Shifted) and name not in known):
-        raise UsageError(f"cannot free {name!r}: the layer has no such number; n and k can always be freed")
+        own = "the layer has no such number; n and k can always be freed"
+        if name == "thickness":
+            own = (
+                "its bounds free it, as in `thickness=Free(10, 1000)`; here are numbers of its index, n and k"
+            )
+        raise UsageError(f"cannot free {name!r}: {own}")
     if name not in known:
         *first, last = known
         listed = f"{', '.join(first)} and {last}" if first else last

@@ -120,6 +120,9 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
     if isinstance(chosen["input"], list):  # a number was expected, or a list, whose errors tell more
         of_lists = (e for e in errors if any(str(part).startswith("list[") for part in e["loc"]))
         chosen = next(of_lists, chosen)
+    if isinstance(chosen["input"], dict):  # a number was expected, or a table of one
+        of_tables = (e for e in errors if "FreeTable" in e["loc"] and e["loc"][:-1] != chosen["loc"][:-1])
+        chosen = next(of_tables, chosen)
     where = [  # without the branches of unions that were tried
         part
         for part in map(str, chosen["loc"])
@@ -144,6 +147,9 @@ def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) 
         return f"{key} is a list of tables: write [[{key}]] with two brackets"
     if chosen["type"] == "list_type" and isinstance(chosen["input"], str):
         return f'{key} is a list: write {where[-1]} = ["{chosen["input"]}"]'
+    if chosen["type"] == "model_type":
+        known = list(tables[where[-1]].model_fields) if where[-1] in tables else []
+        return f"{key} is a table{' of ' * bool(known)}{', '.join(known)}, not {chosen['input']!r}"
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":

@@ -105,7 +105,9 @@ def check_numbers(wavelength: Any, thickness: Any, angle: Any) -> None:
     # not JAX's own array, of which a program would trace the maximum
     known = np.asarray([] if isinstance(wavelength, Tracer) else wavelength)
     if known.size and (longest := np.max(known)) < MICROMETRES:
-        raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in µm: write {1e3 * longest:g}")
+        unit, scale = ("µm", 1e3) if longest > 1e-3 else ("m", 1e9)
+        written = f"{scale * longest:g}"
+        raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in {unit}: write {written}")
     if (value := _wrong(angle, lambda degrees: ~(np.abs(degrees) <= 90))) is not None:
         raise UsageError(f"`angle` must be 0 to 90 degrees, got {value:g}")
 

@@ -64,7 +64,7 @@ def layout_of(file: TextFile) -> Table:
         raise DataError(
             f"line {lines[first].number} has {width} values but the header on line "
             f"{lines[header or 0].number} names {len(names)} columns; make them agree"
-            f"{_COMMAS if delimiter == ',' and width == 2 * len(names) else ''}"
+            f"{_COMMAS if delimiter == ',' and width <= 2 * len(names) else ''}"
         )
     skipped = start if header is None else header
     if skipped:
