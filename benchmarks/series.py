@@ -6,7 +6,7 @@ Each draw has another film, noise and flaws. `single` are the fits of each spect
 1.96 standard errors.
 
 `--traces`: of lasers, 300 to 1000 times, two to eight fringes, with noise of 0.5 to 3 % of the range of the
-light, gains and offsets that are not told, and the thickness at first, of one laser.
+light, gains and offsets that are not told, and the thickness at first, of one laser but in the last row.
 """
 
 import argparse
@@ -128,6 +128,7 @@ TRACES = {
     "turns evenly": 1,
     "turns abruptly near an extremum": 1,
     "absorbs": 1,
+    "one laser, start not told": 1,
 }
 OF_TRACES = (
     "wrong %",
@@ -168,7 +169,7 @@ def traced(name, random):
     size = random.uniform(0.005, 0.03) * np.ptp(values, axis=0)
     values += size * random.standard_normal(values.shape)
     axes = {"time": ("time", 600 * at, {"units": "s"}), "wavelength": ("wavelength", nm, {"units": "nm"})}
-    first = float(grown[0]) if nm.size == 1 else None
+    first = float(grown[0]) if nm.size == 1 and "not told" not in name else None
     film = pl.Layer(index, pl.Free(0, 1.25 * grown.max() + 200, first=first))
     scene = pl.Scene(film, substrate, instrument=pl.Instrument(scale="free", offset="free"))
     began = process_time()
@@ -196,13 +197,14 @@ def traced(name, random):
     return row
 
 
-def traces(draws, seed):
+def traces(draws, seed, only):
     print("| trace | " + " | ".join(OF_TRACES) + " |\n|---|" + "---|" * len(OF_TRACES))
+    names = {name: number for number, name in enumerate(TRACES) if only in (None, name)}
     every = [
-        [traced(name, np.random.default_rng([seed, number, i])) for number, name in enumerate(TRACES)]
+        [traced(name, np.random.default_rng([seed, number, i])) for name, number in names.items()]
         for i in range(draws)
     ]
-    for name, rows in zip(TRACES, np.swapaxes(every, 0, 1), strict=True):
+    for name, rows in zip(names, np.swapaxes(every, 0, 1), strict=True):
         mean = np.nanmean(rows, axis=0)
         every = [*mean[:6], np.nanmin(rows, axis=0)[5], *mean[6:]]
         print(f"| {name} | " + " | ".join(f"{x:.2g}" if x < 90 else f"{x:.0f}" for x in every) + " |")
@@ -217,9 +219,10 @@ def main():
     parser.add_argument("--lamp-curve", choices=["joint"], help="one gain against wavelength for all times")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--traces", action="store_true", help="of lasers, in place of spectra")
+    parser.add_argument("--trace", choices=TRACES, help="only this one")
     given = parser.parse_args()
     if given.traces:
-        return traces(given.draws, given.seed)
+        return traces(given.draws, given.seed, given.trace)
     nm = np.linspace(600, 700, 60) if given.narrow else np.linspace(450, 900, 120)
     in_time = given.scale == "slowly"
     instrument = pl.Instrument(scale={"varies": "slowly"} if in_time else given.scale or 1.0)

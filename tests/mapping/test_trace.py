@@ -107,6 +107,13 @@ def test_one_laser_without_a_start_decides_no_order():
     assert any("not decided" in text for text in found.warnings)
 
 
+def test_no_order_is_decided_because_the_next_path_is_unlikely():
+    """A draw in which the path that pays least next is far less likely than the same course a fringe away."""
+    at = TIME / 600
+    grown = 2.49 * FRINGE * (1 - np.exp(-at / 0.81)) / (1 - np.exp(-1 / 0.81))
+    assert pl.series(trace(grown, noise=0.023, seed=1), scene()).decided == 0
+
+
 @pytest.mark.parametrize("depth", [2.0, 2.25])  # it turns between two extrema, and at one
 def test_a_film_that_is_etched_and_grows_again_is_followed_through_its_turn(depth):
     thickness = FRINGE * (4.25 - depth * np.sin(np.pi * TIME / 600))

@@ -10,6 +10,7 @@ trace.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from logging import getLogger
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -147,7 +148,7 @@ def _decided(fit: Fitter, light: Light, found: Branches) -> tuple[Start, np.ndar
     own = light.part(used)
     centre, size = found.centre[found.inside], len(found.candidates.thickness)
     path, left, rival = found.path, found.path.rival.copy(), np.full(size, np.inf)
-    best, turns = fit(own, found.start_of(path), found), dict[float, float]()
+    best = fit(own, found.start_of(path), found)
     for _ in range(_OTHERS):
         window = int(np.argmin(left))
         if left[window] >= _FAR:
@@ -169,9 +170,27 @@ def _decided(fit: Fitter, light: Light, found: Branches) -> tuple[Start, np.ndar
         rival[differ] = np.minimum(rival[differ], abs(above))
         if rival.max() < RIVAL:
             break
-    mirrors = Mirrors.of(fit, best) if found.course.turn < np.inf and own.values.shape[1] == 1 else None
-    after = 0
-    while mirrors is not None and (event := mirrors.next(own.time, best, after)) is not None:
+    turns = dict[float, float]()
+    if own.values.shape[1] == 1:
+        if found.course.turn < np.inf:
+            best, rival, turns = _turned(fit, own, found, best, rival)
+        # the windows list the path that pays least, and its likelihood may be far from that of other orders
+        starts = Mirrors.of(fit, best).moved(fit.course(own.time, best))
+        moved = (fit(own, start, found, best) for start in starts)
+        best, rival = _weighed(fit, found, own.time, moved, best, rival)
+    plausible = [time for time, less in turns.items() if less <= SURE]
+    every = np.full(len(found.centre), np.inf)
+    every[found.inside] = np.minimum(rival, left)
+    return fit.course(own.time, best), every, plausible
+
+
+def _turned(
+    fit: Fitter, own: Light, found: Branches, best: Fit, rival: np.ndarray
+) -> tuple[Fit, np.ndarray, dict[float, float]]:
+    """The best fit with turns at extrema, the Δχ² of others in each window (windows,), and how much worse
+    those are that turn, or do not, at these times."""
+    centre, mirrors, turns, after = found.centre[found.inside], Mirrors.of(fit, best), dict[float, float](), 0
+    while (event := mirrors.next(own.time, best, after)) is not None:
         after = event.at
         made = min((fit(own, start, found, best) for start in event.starts), key=event.price)
         apart = fit.apart(made, best)
@@ -184,23 +203,24 @@ def _decided(fit: Fitter, light: Light, found: Branches) -> tuple[Start, np.ndar
             turns = {time: less - above for time, less in turns.items()}
         turns[float(own.time[after])] = abs(above)
         rival[differ] = np.minimum(rival[differ], abs(above))
-    made = _going_on(fit, own, found, best) if mirrors is not None else None
-    if made is not None:
-        above, differ = made.deviance - best.deviance, np.interp(centre, own.time, fit.apart(made, best)) > 0
-        best = made if above < 0 else best
-        rival[differ] = np.minimum(rival[differ], abs(above))
-    plausible = [time for time, less in turns.items() if less <= SURE]
-    every = np.full(len(found.centre), np.inf)
-    every[found.inside] = np.minimum(rival, left)
-    return Start(own.time, fit.thickness(best), best.about["kinks"] > 0), every, plausible
-
-
-def _going_on(fit: Fitter, own: Light, found: Branches, best: Fit) -> Fit | None:
-    """The fit of a course that goes on where the best one comes to rest, None where it does not."""
-    parameter, path = fit.model.parameters[fit.depth], fit.thickness(best)
-    course = Start(own.time, path, best.about["kinks"] > 0)
+    parameter, course = fit.model.parameters[fit.depth], fit.course(own.time, best)
     beyond = going_on(course, parameter.lower, parameter.upper)
-    return None if beyond is None else fit(own, beyond[1], found, best)
+    others = [] if beyond is None else [fit(own, beyond[1], found, best)]
+    return *_weighed(fit, found, own.time, others, best, rival), turns
+
+
+def _weighed(
+    fit: Fitter, found: Branches, time: np.ndarray, others: Iterable[Fit], best: Fit, rival: np.ndarray
+) -> tuple[Fit, np.ndarray]:
+    """The best of several fits, and the Δχ² of others in each window (windows,)."""
+    for made in others:
+        apart = np.interp(found.centre[found.inside], time, fit.apart(made, best)) > 0
+        above = made.deviance - best.deviance
+        best = made if above < 0 else best
+        rival = np.where(apart, np.minimum(rival, abs(above)), rival)
+        if rival.max() < RIVAL:
+            break
+    return best, rival
 
 
 def _gains(light: Light, fit: Fit, wavelength: np.ndarray, smoothed: Smoothed) -> dict[str, tuple[Any, ...]]:

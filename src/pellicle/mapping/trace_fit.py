@@ -78,6 +78,10 @@ class Fitter(NamedTuple):
         parameter = self.model.parameters[self.depth]
         return parameter.lower + (parameter.upper - parameter.lower) * fit.smoothed.mean[:, self.depth]
 
+    def course(self, time: np.ndarray, fit: Fit) -> Start:
+        """A fit at the times (times,) as the start of others."""
+        return Start(time, self.thickness(fit), fit.about["kinks"] > 0)
+
     def thickness_error(self, fit: Fit) -> np.ndarray:
         """Standard error (times,) of the thickness by the noise (nm)."""
         parameter = self.model.parameters[self.depth]

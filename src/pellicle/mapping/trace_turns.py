@@ -6,6 +6,7 @@ film that turns there abruptly, differ in their rates only, so each extremum of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +83,15 @@ class Mirrors(NamedTuple):
                     every = [bent, kinks & ~bent] if turns else [bent]
                     events.append(Mirrored(at, run, [Start(time, other, x) for x in every]))
         return min(events, key=lambda event: event.at, default=None)
+
+    def moved(self, start: Start) -> Iterator[Start]:
+        """A course as a whole a fringe thicker, thinner, or mirrored at an extremum, as the bounds allow."""
+        parameter = self.fitter.model.parameters[self.fitter.depth]
+        shifted = [start.thickness + way * x for x in np.diff(self.extrema[::2])[:1] for way in (1, -1)]
+        mirrored = [2 * level - start.thickness for level in self.extrema]
+        for some, most in (shifted, 2), (mirrored, 1):
+            inside = [x for x in some if parameter.lower <= x.min() and x.max() <= parameter.upper]
+            yield from (start._replace(thickness=x) for x in inside[:most])
 
 
 def going_on(start: Start, lower: float, upper: float) -> tuple[int, Start] | None:

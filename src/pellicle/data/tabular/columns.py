@@ -156,10 +156,6 @@ UNSTATED = "unit not stated"
 """Unit in the name of a column whose unit must be asked for."""
 
 
-_LISTED = 8
-"""Most columns that a message names."""
-
-
 @dataclass(frozen=True)
 class Column:
     """One column: position, name, role and unit.
@@ -297,4 +293,4 @@ def unknown_unit(column: Column) -> str:
 def listed(columns: Sequence[Column]) -> str:
     """Return the names of columns, of many the first and the last, for a message."""
     names = [repr(column.name) for column in columns]
-    return ", ".join(names if len(names) <= _LISTED else [*names[:2], "...", names[-1]])
+    return ", ".join(names if len(names) <= 8 else [*names[:2], "...", names[-1]])

@@ -142,10 +142,7 @@ def _numbers_in(line: Line, delimiter: str, decimal: str = ",") -> tuple[int, in
 
 
 def _dialect(lines: Sequence[Line]) -> tuple[str, str]:
-    """Delimiter with which most lines are all numbers, else have two of them, and decimal mark.
-
-    In a tie the order is tab, `;`, `,`, blank.
-    """
+    """Delimiter with which most lines are all numbers (ties: tab, `;`, `,`, blank), and decimal mark."""
     sample = lines[:: max(1, len(lines) // _SAMPLE)]
     if any(SELECTED in line.bare for line in sample):
         return SELECTED, ","
