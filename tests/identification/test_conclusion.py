@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pellicle.identification.conclusion import shapeless, survivors
+from pellicle.identification.conclusion import doubt, shapeless, survivors
 from pellicle.identification.evidence import Weighed
-from pellicle.identification.growth import needed
-from pellicle.identification.problem import Attempt
+from pellicle.identification.growth import BARE, needed
+from pellicle.identification.problem import Attempt, Problem
 from pellicle.identification.structure import OXIDE, Material, Structure
 
 
@@ -38,3 +38,11 @@ def test_a_model_that_a_bound_holds_is_left_where_nothing_else_is():
     assert shapeless([held, other]) == [held]
     needless = other._replace(ln_z=98.0)
     assert shapeless([held, needless]) == [needless]
+
+
+def test_a_film_that_may_be_thick_is_not_determined():
+    """34 nm of ITO in R were identified as a free index of 13 ± 35 nm."""
+    problem = Problem((), 3000.0)
+    assert doubt(problem, [weighed([("alumina", 13.0)], 0.0, error=35.0)]) == "a thickness is not determined"
+    assert doubt(problem, [weighed([("alumina", 13.0)], 0.0, error=1.0)]) == ""
+    assert doubt(problem, [weighed([("SiO2", 2.0)], 0.0, error=20.0, most=BARE)]) == ""

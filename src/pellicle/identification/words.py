@@ -62,7 +62,7 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str) -> list[s
     if doubt != SEVERAL:
         only = f"One answer is left, but is not certain, as {doubt}: {_lower(_sentence(kept[0], substrate))}."
         return [only, *_effects(kept[0], ())]
-    sentences = [f"The data do not decide between {', '.join(names[:_SHOWN])}{more} on {substrate}."]
+    sentences = [f"On {substrate} the data do not decide between these: {', '.join(names[:_SHOWN])}{more}."]
     main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]
     n = min(x.n[0] for x in main), max(x.n[1] for x in main)
     like = dict.fromkeys(name for x in main for name in x.like[:2])
