@@ -51,7 +51,9 @@ def truth_of(case: Case) -> str:
 
 
 def thick(hypothesis: Any) -> list[Any]:
-    """Layers of a hypothesis that are no faces."""
+    """Layers of a hypothesis that are no faces; a bare substrate has none, however thick its oxide may be."""
+    if hypothesis.name == "bare substrate":
+        return []
     return [layer for layer in hypothesis.layers if layer.thickness.value > LEAST]
 
 

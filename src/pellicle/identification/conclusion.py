@@ -73,7 +73,7 @@ def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
     for n, v, e in zip(best.structure.numbers, best.x, best.stderr, strict=True):
         if n.name == "angle_shift" and abs(v) > MISSTATED:
             return "the angle of incidence is not the one that was stated"
-        if n.name == "thickness" and n.upper > BARE < v + e and not v > SIGNIFICANT * e:
+        if n.name == "thickness" and n.upper > BARE and not v > SIGNIFICANT * e:
             return "a thickness is not determined"
     unlike = all(_like_no_film(problem, x) for x in kept)
     return "its free index may stand for another structure" if unlike else ""
