@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from pellicle.optics.hoisting import compute_once
+from pellicle.optics.hoisting import compute_once, slopes_once
 from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real, to_complex, to_pair
 from pellicle.optics.response import Response, transmittance
 
@@ -78,7 +78,7 @@ def _amplitude(reflected: Number, denominator: Number) -> Any:
 @_amplitude.defjvp
 def _amplitude_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
     r = _amplitude(*primal)
-    return r, _amplitude(tangent[0] - to_pair(r) * tangent[1], primal[1])
+    return r, slopes_once(_amplitude(tangent[0] - to_pair(r) * tangent[1], primal[1]))
 
 
 class CrossProducts(NamedTuple):

@@ -49,12 +49,18 @@ def compute_once(value: Any) -> Any:
 
 @compute_once.defjvp
 def _compute_slope_once(primal: Any, tangent: Any) -> tuple[Any, Any]:
-    return compute_once(primal[0]), compute_once(tangent[0])
+    return compute_once(primal[0]), slopes_once(tangent[0])
 
 
 @jax.jit
 def _identity(value: Any) -> Any:
     return value
+
+
+def slopes_once(slopes: Any) -> Any:
+    """As `compute_once`, of slopes: from a linearised program JAX removes what only returns its arguments."""
+    with set_xla_metadata(inlineable="false"):
+        return jax.jit(jax.lax.optimization_barrier)(slopes)
 
 
 def stored(numbers: Tree) -> Tree:
@@ -78,7 +84,7 @@ def _stored(arrays: list[Any]) -> list[Any]:
 @partial(_stored.defjvp, symbolic_zeros=True)
 def _stored_slope(primal: Any, tangent: Any) -> tuple[Any, Any]:
     tangents = {i: x for i, x in enumerate(tangent[0]) if not isinstance(x, SymbolicZero)}
-    kept = dict(zip(tangents, _stored(list(tangents.values())), strict=True))
+    kept = dict(zip(tangents, slopes_once(list(tangents.values())), strict=True))
     return _stored(primal[0]), [kept.get(i, x) for i, x in enumerate(tangent[0])]
 
 
@@ -114,13 +120,18 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
         return value, jax.tree.map(jnp.zeros_like, value)
 
     def value_and_slopes(*leaves: Any) -> Any:
-        def along(i: int) -> Any:
-            of_one = lambda x: function(structure.unflatten([*leaves[:i], x, *leaves[i + 1 :]]))  # noqa: E731
-            return jax.jvp(of_one, (leaves[i],), (jnp.ones_like(leaves[i]),))
+        def of_varying(*numbers: Any) -> Any:
+            every = dict(enumerate(leaves)) | dict(zip(varying, numbers, strict=True))
+            return function(structure.unflatten(every.values()))
 
+        own = [leaves[i] for i in varying]
+        rows = [jnp.stack([jnp.full_like(x, float(row is x)) for row in own]) for x in own]
         with set_xla_metadata(inlineable="true"):
-            values, slopes = zip(*(along(i) for i in varying), strict=True)
-        return values[0], slopes
+            # traced once, and the slopes in all numbers by one program
+            value, push = jax.linearize(of_varying, *own)
+            value, push = jax.lax.optimization_barrier((value, push))
+            slopes = slopes_once(jax.vmap(push)(*rows))
+        return value, [jax.tree.map(lambda x, i=i: x[i], slopes) for i in range(len(own))]
 
     # compiled apart: else the slopes are computed again for each parameter
     with set_xla_metadata(inlineable="false"):
