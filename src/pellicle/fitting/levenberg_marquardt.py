@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from pellicle.fitting.positive_definite import solve_if_positive
+from pellicle.fitting.positive_definite import solve_positive
 
 Bounds: TypeAlias = tuple[Any, Any]
 """Lower and upper bounds, arrays like the parameters."""
@@ -68,33 +68,35 @@ class QuadraticModel(NamedTuple):
         """Step of the `free` parameters where the others move by `fixed`; False where the matrix of
         the free ones is not positive definite."""
         system = jnp.where(free[:, None] & free, matrix, 0) + jnp.diag(jnp.where(free, damping, 1))
-        return solve_if_positive(system, jnp.where(free, -(self.gradient + matrix @ fixed), fixed))
+        b = jnp.where(free, -(self.gradient + matrix @ fixed), fixed)
+        return solve_positive(system, b, 50 * jnp.finfo(matrix.dtype).eps)
 
     def inside(self, step):
         return jnp.clip(self.y + step, self.lower, self.upper) - self.y
 
-    def promise(self, matrix, free):
-        """Fall of the cost by an undamped step, and False where the matrix is not positive definite.
+    def promise(self, step):
+        """Fall of the cost by an undamped step.
 
         Where the data see next to nothing the step is huge, and only what the box leaves of it counts: by the
         lengths of the columns its sum bounds the fall.
         """
-        squares = jnp.diagonal(self.hessian)
-        rounding = 10 * self.y.size * jnp.finfo(self.y.dtype).eps * squares
-        step, positive = self.step(matrix, rounding, free, 0 * self.y)
-        bound = jnp.sum(jnp.abs(self.inside(step)) * jnp.sqrt(squares)) ** 2
-        return jnp.minimum(-self.gradient @ step, bound), positive
+        bound = jnp.sum(jnp.abs(self.inside(step)) * jnp.sqrt(jnp.diagonal(self.hessian))) ** 2
+        return jnp.minimum(-self.gradient @ step, bound)
 
     def propose(self, damping, corrected):
         """The next trial point, the fall of the cost predicted for it, and that by an undamped step."""
         held_low = (self.y <= self.lower) & (self.gradient >= 0)
         held_high = (self.y >= self.upper) & (self.gradient <= 0)
-        free = ~(held_low | held_high) & (jnp.diagonal(self.hessian) > 0)
+        squares = jnp.diagonal(self.hessian)
+        free = ~(held_low | held_high) & (squares > 0)
         none, full, damping = 0 * self.y, self.hessian + self.curvature, damping * self.top
-        second, positive = self.step(full, damping, free, none)
-        plain, _ = self.step(self.hessian, damping, free, none)
-        positive = positive & corrected
-        matrix, step = jnp.where(positive, full, self.hessian), jnp.where(positive, second, plain)
+        rounding = 10 * self.y.size * jnp.finfo(self.y.dtype).eps * squares
+        # all systems in one piece of the program: damped and undamped, corrected and by Gauss-Newton
+        steps, positive = jax.vmap(self.step, (0, 0, None, None))(
+            jnp.stack([full, self.hessian] * 2), jnp.stack([damping, damping, rounding, rounding]), free, none
+        )
+        corrected = positive[0] & corrected
+        matrix, step = jnp.where(corrected, full, self.hessian), jnp.where(corrected, steps[0], steps[1])
         if self.y.size > 1:
             # parameters that would leave the box go to its wall, and the others as they then should
             within = self.inside(step)
@@ -102,9 +104,8 @@ class QuadraticModel(NamedTuple):
             step, _ = self.step(matrix, damping, free & ~cut, jnp.where(cut, within, 0))
         step = self.inside(step)
         predicted = jnp.stack([-(2 * self.gradient + m @ step) @ step for m in (self.hessian, full)])
-        promise, _ = self.promise(self.hessian, free)
-        second, positive = self.promise(full, free)
-        promise = jnp.where(positive, jnp.maximum(second, _UNCERTAIN * promise), promise)
+        second, promise = jax.vmap(self.promise)(steps[2:])
+        promise = jnp.where(positive[2], jnp.maximum(second, _UNCERTAIN * promise), promise)
         return jnp.clip(self.y + step, self.lower, self.upper), predicted, jnp.maximum(promise, 0)
 
 

@@ -217,7 +217,7 @@ def _nonnegative(normal: Any, right: Any) -> Any:
 
     def solved(chosen):
         part = jnp.where(chosen[:, None] & chosen, matrix, 0) + jnp.diag(jnp.where(chosen, 1e-12, 1.0))
-        w = solve_positive(part, jnp.where(chosen, vector, 0))
+        w, _ = solve_positive(part, jnp.where(chosen, vector, 0))
         return w, jnp.where(jnp.all(w >= 0), w @ matrix @ w - 2 * w @ vector, jnp.inf)
 
     every = jnp.array(list(itertools.product((False, True), repeat=len(vector))))
