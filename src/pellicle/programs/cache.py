@@ -193,13 +193,10 @@ def make(
             copy.unlink()
     try:
         body = pickle.dumps((bool(calls), serialize_executable.serialize(compiled)))
-        content = _digest(key, body) + body
-        program = _loaded(content, key)  # this process runs what later ones will
-        write(path, content, LIMIT)
+        write(path, _digest(key, body) + body, LIMIT)
     except Exception as error:
         log.info("the compiled program is not kept: %s", error)
-        return compiled
-    return program
+    return compiled
 
 
 def _digest(key: bytes, body: bytes) -> bytes:
