@@ -235,10 +235,8 @@ def _conditions(spectra: Sequence[Spectrum], request: Request, growth: Growth) -
             relative = [_times_mirror(x, mirror, request) for x in spectra]
             known = [x for x in relative if x is not None]
             if len(known) == len(spectra):
-                yield (
-                    f"the reflectance was measured relative to {getattr(mirror, 'name', 'the substrate')}",
-                    (known, request),
-                )
+                named = getattr(mirror, "name", "the substrate")
+                yield f"the reflectance was measured relative to {named}", (known, request)
     if "calibration" in request.conditions:
         for words, other in conventions(spectra, [np.inf] * len(spectra)):
             of: Any = other
@@ -320,8 +318,7 @@ def _better_glass(
 ) -> str:
     """Sentence on another glass below which other films have more evidence than those left, else empty.
 
-    Ta2O5 on BK7 was identified as Nb2O5 on SF10 where that was stated (Δ ln Z 2.4). Of 30 films on the glass
-    that was stated, none had other films on another glass with more than 0.1.
+    Ta2O5 on BK7 was identified as Nb2O5 on SF10 where that was stated, with Δ ln Z 2.4 in favour of BK7.
     """
     for supposed, other in _other_glasses(spectra, request):
         again, _ = _grown(*other, growth.deadline, 1)
