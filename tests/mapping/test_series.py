@@ -1,6 +1,9 @@
 """Series of simulated films that grow, jump and hide, by a simulator of its own, and the command."""
 
 import json
+import subprocess
+import sys
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -14,6 +17,8 @@ from pellicle.reporting.series import write_series
 NM, TIME = np.linspace(600, 700, 24), np.arange(80) * 10.0
 GROWN = 200 + 1800 * (1 - np.exp(-TIME / 500))
 SCENE = pl.Scene(pl.Layer(1.46, pl.Free(0, 3000)), 3.9)
+KILLS = 3
+"""Ten take three minutes, and changed nothing either."""
 
 
 def reflectance(thickness, n=1.46):
@@ -152,6 +157,32 @@ def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeyp
     assert record["schema"] == "pellicle.series/1"
     assert record["times"]["count"] == 20
     xarray.testing.assert_identical(xarray.load_dataset("grown/series.nc"), first)
+
+
+@pytest.mark.slow
+def test_kills_at_random_moments_change_nothing(tmp_path, monkeypatch):
+    """While it starts, fits each time alone, joins all times, and writes."""
+    monkeypatch.setenv("PELLICLE_CACHE", str(tmp_path / "programs"))
+    cube(GROWN).to_netcdf(tmp_path / "grown.nc")
+    layer = "[[scene.layer]]\nmaterial = 1.46\nthickness = { lower = 0, upper = 3000 }\n"
+    (tmp_path / "film.toml").write_text(f"[scene]\nsubstrate = 3.9\n{layer}")
+
+    def start(out):
+        words = ["series", "grown.nc", "--recipe", "film.toml", "--out", out]
+        return subprocess.Popen([sys.executable, "-m", "pellicle", *words], cwd=tmp_path)
+
+    assert start("whole").wait() == 0
+    for seconds in np.random.default_rng(0).uniform(2.0, 12.0, KILLS):
+        process = start("killed")
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(seconds)
+        process.kill()
+        process.wait()
+    assert start("killed").wait() == 0
+    made = [xarray.load_dataset(tmp_path / out / "series.nc") for out in ("whole", "killed")]
+    xarray.testing.assert_identical(*made)
+    for name in ("series.csv", "series.png"):
+        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "killed" / name).read_bytes()
 
 
 @pytest.mark.slow
