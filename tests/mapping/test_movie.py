@@ -259,6 +259,7 @@ def test_a_compressed_movie_is_refused_with_the_command_for_frames(refuses, tmp_
 def test_frames_without_times_or_wavelength_are_refused(refuses, tmp_path):
     scene = pl.Scene(pl.Layer(INDEX, pl.Free(0, 1500)), 1.0)
     frames = written(tmp_path / "frames", seen(wedge(60.0)))
+    refuses(DataError, "no such file or folder", is_movie, tmp_path / "frame")
     refuses(DataError, "frame_rate", pl.series, frames, scene)
     refuses(UsageError, "wavelengths=550", pl.series, frames, scene, frame_rate=2.0)
     refuses(UsageError, "above zero", pl.series, frames, scene, frame_rate=0.0)

@@ -99,11 +99,13 @@ def refuse_movie(path: str | os.PathLike[str]) -> None:
 def is_movie(source: Any) -> bool:
     """True for frames: a folder that has images and no table of spectra, a list of images, or one TIFF.
 
-    Raises DataError for a compressed movie.
+    Raises DataError for a compressed movie, and for a path at which there is nothing.
     """
     if isinstance(source, str | os.PathLike):
         refuse_movie(source)
         path = Path(source)
+        if not path.exists():
+            raise DataError(f"{path}: no such file or folder; check its name")
         if path.is_dir():
             files = [file for file in path.iterdir() if not file.name.startswith(".")]
             return 2 * sum(_is_frame(file) for file in files) > len(files)
