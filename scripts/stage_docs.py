@@ -1,7 +1,8 @@
 """Write the sources of the documentation site into build/docs, where `make docs` builds it.
 
-They are the pages of docs/ and, under tutorials/, a page for each notebook of executed/, with its figures.
-In docs/ links lead to notebooks, so that they work in the repository; in build/docs they lead to tutorials.
+They are the pages of docs/, under tutorials/ a page for each notebook of executed/, with its figures, and a
+demonstration of the explorer. In docs/ links lead to notebooks, so that they work in the repository; in
+build/docs they lead to tutorials.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from nbformat import read
 
 ROOT = Path(__file__).resolve().parents[1]
 STAGED = ROOT / "build" / "docs"
+EXPLORER = "opens a page in your browser"
+"""Words of howto/explore.md to which the link to the demonstration is added."""
 NOTEBOOK_LINK = re.compile(r"\.\./notebooks/(\w+)\.ipynb")
 
 
@@ -40,6 +43,16 @@ def stage(docs: Path, executed: Path, target: Path) -> None:
             figure.write_bytes(content)
 
 
+def add_demo(target: Path) -> None:
+    """Write the demonstration of the explorer into the staged folder, and link it from its page."""
+    from explorer_demo import write_demo  # beside this script
+
+    write_demo(target / "explorer_demo.html")
+    page = target / "howto" / "explore.md"
+    link = f"{EXPLORER} ([a demonstration](../explorer_demo.html) with stored answers)"
+    page.write_text(page.read_text("utf-8").replace(EXPLORER, link, 1), "utf-8")
+
+
 def stderr_of(path: Path) -> str:
     """Return what the cells of a notebook wrote to stderr."""
     cells = (cell for cell in read(path, as_version=4).cells if cell.cell_type == "code")
@@ -49,3 +62,4 @@ def stderr_of(path: Path) -> str:
 
 if __name__ == "__main__":
     stage(ROOT / "docs", ROOT / "executed", STAGED)
+    add_demo(STAGED)

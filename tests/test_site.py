@@ -1,12 +1,16 @@
 """The documentation site: its navigation, and the notebooks that become its pages."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import jupytext
 import nbformat
+import numpy as np
 import pytest
 import yaml
+
+import pellicle as pl
 
 ROOT = Path(__file__).parents[1]
 CONFIG = yaml.safe_load((ROOT / "mkdocs.yml").read_text("utf-8"))
@@ -64,6 +68,20 @@ def test_a_notebook_becomes_a_page_with_its_figures(staged):
 def test_a_notebook_that_wrote_to_stderr_is_refused(staged):
     with pytest.raises(SystemExit, match=r"01_films\.ipynb wrote to stderr: a warning"):
         staged(nbformat.v4.new_output("stream", name="stderr", text="a warning"))
+
+
+@pytest.mark.slow
+def test_the_demonstration_of_the_explorer_has_the_curves_of_its_sliders(load_script, tmp_path):
+    script = load_script("scripts/explorer_demo.py")
+    script.write_demo(tmp_path / "demo.html")
+    page = (tmp_path / "demo.html").read_text("utf-8")
+    demo = json.loads(page.partition("const demo = ")[2].partition(";\n")[0].replace("<\\/", "</"))
+    assert [(each["name"], each["step"]) for each in demo["scene"]["controls"]] == [*script.STEPS.items()]
+    assert len(demo["views"]) == 101 * 6
+    curve = pl.reflectance(script.WAVELENGTHS, 420.0, "SiO2", "Si", angle=45.0)
+    np.testing.assert_allclose(demo["views"]["42,3"]["y"], curve, atol=1e-4)
+    assert all(sphere.startswith("data:image/png;base64,") for sphere in demo["spheres"])
+    assert demo["plans"][0] != demo["plans"][3]
 
 
 PAIRS = sorted((ROOT / "notebooks").glob("*.py"))
