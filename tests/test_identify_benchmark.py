@@ -61,7 +61,14 @@ def trivial(case, status, offset=0.0):
         n = layer.index(nm).real
         depth = SimpleNamespace(value=layer.thickness + offset, stderr=1.0)
         layers.append(SimpleNamespace(material=layer.material, n=(n.min(), n.max()), thickness=depth))
-    return SimpleNamespace(status=status, hypotheses=[SimpleNamespace(layers=layers, remaining=1.0)])
+    return answered(status, layers)
+
+
+def answered(status, layers, name="a film"):
+    """An identification with one hypothesis."""
+    return SimpleNamespace(
+        status=status, hypotheses=[SimpleNamespace(name=name, layers=layers, remaining=1.0)]
+    )
 
 
 def test_scores_of_a_trivial_identifier(bench):
@@ -76,7 +83,13 @@ def test_scores_of_a_trivial_identifier(bench):
     assert score(by_group["not there"], trivial(by_group["there"], "identified")) == ("wrong", False)
     assert score(by_group["wrong substrate"], trivial(film, "identified")) == ("wrong", False)
     assert score(by_group["wrong substrate"], trivial(film, "undecided"))[0] == "right"
-    assert score(by_group["no film"], trivial(by_group["no film"], "identified")) == ("right", True)
+    bare = by_group["no film"]
+    assert score(bare, trivial(bare, "identified")) == ("right", True)
+    oxide = [
+        SimpleNamespace(material="SiO2", n=(1.46, 1.46), thickness=SimpleNamespace(value=12.0, stderr=4.0))
+    ]
+    assert score(bare, answered("identified", oxide, "bare substrate")) == ("right", True)
+    assert score(bare, answered("identified", oxide))[0] == "wrong"
 
 
 def test_layers_of_one_index_are_one_film(bench):
@@ -84,8 +97,7 @@ def test_layers_of_one_index_are_one_film(bench):
     case = cases["two layers | PMMA on SiO2 1 | psi-delta on Si"]
     (n, depth), *rest = bench.scoring.films(case)
     one = SimpleNamespace(material="SiO2", n=(n, n), thickness=SimpleNamespace(value=depth, stderr=1.0))
-    found = SimpleNamespace(status="identified", hypotheses=[SimpleNamespace(layers=[one], remaining=1.0)])
-    assert (rest, score(case, found)) == ([], ("right", True))
+    assert (rest, score(case, answered("identified", [one]))) == ([], ("right", True))
     assert depth == pytest.approx(sum(x.thickness for x in case.specimen.layers))
     assert score(case, trivial(case, "undecided"))[0] == "listed"
     assert len(bench.scoring.films(cases["two layers | SiO2 on TiO2 1 | R on Si"])) == 2
