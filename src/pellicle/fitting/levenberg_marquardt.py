@@ -69,7 +69,7 @@ class QuadraticModel(NamedTuple):
         the free ones is not positive definite."""
         system = jnp.where(free[:, None] & free, matrix, 0) + jnp.diag(jnp.where(free, damping, 1))
         b = jnp.where(free, -(self.gradient + matrix @ fixed), fixed)
-        return solve_positive(system, b, 50 * jnp.finfo(matrix.dtype).eps)
+        return solve_positive(system, b, 50 * float(jnp.finfo(matrix.dtype).eps))
 
     def inside(self, step):
         return jnp.clip(self.y + step, self.lower, self.upper) - self.y
