@@ -74,7 +74,7 @@ def write_demo(path: Path) -> None:
         np.arange(control["lower"], control["upper"] + 1, control["step"]).tolist()
         for control in scene["controls"]
     )
-    views = {}
+    views, curve = {}, {}
     for (i, thickness), (j, angle) in itertools.product(enumerate(depths), enumerate(angles)):
         [curve] = answer("curves", thickness=thickness, angle=angle)
         colour = answer("colour", thickness=thickness, angle=angle)

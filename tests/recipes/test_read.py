@@ -107,6 +107,8 @@ def test_a_recipe_has_a_limit_of_layers_in_words(tmp_path, refuses):
     ("old", "new", "said"),
     [
         ('substrate = "Si"', "substrate = Si", r'line 4: .*quotation marks: write substrate = "Si"'),
+        ('= "Si"', '= "Si"\nlayer = "SiO2"', r"line 6: \[\[scene.layer\]\] defines again what a line above"),
+        ('= "Si"', '= "Si"\n[scene]', r"line 5: \[scene\] defines again"),
         ("[[scene.layer]]", "[scene.layer]", r"write \[\[scene.layer\]\] with two brackets"),
         ("lower = 10, upper", "min = 10, max", "thickness.min': write lower"),
         ('["oxide.csv"]', '"oxide.csv"', r'write files = \["oxide.csv"\]'),

@@ -57,8 +57,8 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
             f"{path}: is not UTF-8 text, and a recipe is a TOML file; data files are arguments of their own"
         ) from None
     except tomllib.TOMLDecodeError as error:
-        unquoted = _unquoted(content.decode("utf-8-sig"), error)
-        raise DataError(f"{path}: {unquoted or f'is not TOML, as a recipe must be: {error}'}") from None
+        remedy = _remedy(content.decode("utf-8-sig"), error)
+        raise DataError(f"{path}: {remedy or f'is not TOML, as a recipe must be: {error}'}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
     except ValueError as error:
@@ -69,11 +69,15 @@ _PLACE = re.compile(r"at line (\d+), column")
 _UNQUOTED = re.compile(r"\s*(?P<key>[\w.-]+)\s*=\s*(?P<value>[A-Za-z][\w./+-]*)\s*(#.*)?")
 
 
-def _unquoted(text: str, error: tomllib.TOMLDecodeError) -> str:
-    """The remedy where a line of a recipe has a text without quotation marks; empty for another error."""
+def _remedy(text: str, error: tomllib.TOMLDecodeError) -> str:
+    """The remedy where a line of a recipe has a text without quotation marks, or defines a table again; empty
+    for another error."""
     if (place := _PLACE.search(str(error))) is None:
         return ""
-    line = _UNQUOTED.fullmatch(text.splitlines()[int(place[1]) - 1])
+    written = text.splitlines()[int(place[1]) - 1]
+    if str(error).startswith(("Cannot overwrite", "Cannot declare", "Cannot mutate")):
+        return f"line {place[1]}: {written.strip()} defines again what a line above defines: keep one of them"
+    line = _UNQUOTED.fullmatch(written)
     if line is None:
         return ""
     return f'line {place[1]}: a text needs quotation marks: write {line["key"]} = "{line["value"]}"'
