@@ -75,7 +75,7 @@ def curve_to_json(curve: Curve) -> dict[str, Any]:
     return {
         **taken(curve, "label", "signal", "setting"),
         "ordinate": _ORDINATES.get(curve.signal),
-        "x": _abscissa(curve.x.tobytes()),
+        "x": _abscissa(np.asarray(curve.x, float).tobytes()),
         "y": numbers(curve.y, 7),
     }
 

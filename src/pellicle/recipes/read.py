@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -20,11 +19,12 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.cameras import Camera, Sight, band_sensor, sight
 from pellicle.data.options import SPACES, FitOptions, Options, ReadingOptions
 from pellicle.data.read_brdf import read_brdf_samples
-from pellicle.errors import DataError, UsageError, did_you_mean
+from pellicle.errors import DataError, UsageError
 from pellicle.materials.formats import complete_ease as complete_ease_text
 from pellicle.materials.formats import regress_pro as regress_pro_text
 from pellicle.recipes import complete_ease, parts, regress_pro, schema
 from pellicle.recipes.media import medium, number
+from pellicle.recipes.messages import first_error, remedy
 from pellicle.recipes.samples import of_sample, scene_table
 from pellicle.scene.film import Light, Scene
 from pellicle.scene.free import check_free_count, free_leaves
@@ -57,30 +57,12 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
             f"{path}: is not UTF-8 text, and a recipe is a TOML file; data files are arguments of their own"
         ) from None
     except tomllib.TOMLDecodeError as error:
-        remedy = _remedy(content.decode("utf-8-sig"), error)
-        raise DataError(f"{path}: {remedy or f'is not TOML, as a recipe must be: {error}'}") from None
+        known = remedy(content.decode("utf-8-sig"), error)
+        raise DataError(f"{path}: {known or f'is not TOML, as a recipe must be: {error}'}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None
     except ValueError as error:
         raise DataError(f"{path}: {error}") from None
-
-
-_PLACE = re.compile(r"at line (\d+), column")
-_UNQUOTED = re.compile(r"\s*(?P<key>[\w.-]+)\s*=\s*(?P<value>[A-Za-z][\w./+-]*)\s*(#.*)?")
-
-
-def _remedy(text: str, error: tomllib.TOMLDecodeError) -> str:
-    """The remedy where a line of a recipe has a text without quotation marks, or defines a table again; empty
-    for another error."""
-    if (place := _PLACE.search(str(error))) is None:
-        return ""
-    written = text.splitlines()[int(place[1]) - 1]
-    if str(error).startswith(("Cannot overwrite", "Cannot declare", "Cannot mutate")):
-        return f"line {place[1]}: {written.strip()} defines again what a line above defines: keep one of them"
-    line = _UNQUOTED.fullmatch(written)
-    if line is None:
-        return ""
-    return f'line {place[1]}: a text needs quotation marks: write {line["key"]} = "{line["value"]}"'
 
 
 def _of_other_program(content: bytes, path: Path) -> dict[str, Any] | None:
@@ -106,76 +88,7 @@ def _validated(loaded: dict[str, Any], table: type[BaseModel]) -> Any:
     try:
         return table.model_validate(loaded)
     except ValidationError as error:
-        raise UsageError(_first_error(error, _tables_by_key(table))) from None
-
-
-_SYNONYMS = {"min": "lower", "max": "upper", "low": "lower", "high": "upper", "from": "lower", "to": "upper"}
-_SYNONYMS |= {"init": "value", "initial": "value", "guess": "value", "start": "value", "d": "thickness"}
-"""Keys that other programs use, and the key of a recipe."""
-_HOMES = {"data": "[data]", "instrument": "[instrument]", "layer": "[[scene.layer]]"}
-"""Tables whose keys are often put elsewhere, as they are written."""
-
-
-def _first_error(error: ValidationError, tables: Mapping[str, type[BaseModel]]) -> str:
-    """One sentence: an unknown key or an infinity goes before the errors of each branch of a union."""
-    errors = error.errors(include_url=False)
-    clearest = (e for kind in ("extra_forbidden", "finite_number") for e in errors if e["type"] == kind)
-    chosen = next(clearest, errors[0])
-    if isinstance(chosen["input"], list):  # a number was expected, or a list, whose errors tell more
-        of_lists = (e for e in errors if any(str(part).startswith("list[") for part in e["loc"]))
-        chosen = next(of_lists, chosen)
-    if isinstance(chosen["input"], dict):  # a number was expected, or a table of one
-        of_tables = (e for e in errors if "FreeTable" in e["loc"] and e["loc"][:-1] != chosen["loc"][:-1])
-        chosen = next(of_tables, chosen)
-    where = [  # without the branches of unions that were tried
-        part
-        for part in map(str, chosen["loc"])
-        if not (part[:1].isupper() or part in ("str", "float") or part.startswith(("list[", "constrained-")))
-    ]
-    if chosen["type"] == "extra_forbidden" and where[-1:] != [str(chosen["loc"][-1])]:
-        where.append(str(chosen["loc"][-1]))  # a key of the user, as `Data`, is no branch
-    key = ".".join(where)
-    if chosen["type"] == "extra_forbidden":
-        owner = next((part for part in reversed(where[:-1]) if not part.isdigit()), "")
-        known = list(tables.get(owner, tables[""]).model_fields)
-        if (meant := _SYNONYMS.get(where[-1])) in known:
-            return f"unknown key {key!r}: write {meant}; known here: {', '.join(known)}"
-        if where[-1] in tables[""].model_fields:
-            return f"unknown key {key!r}: write [{where[-1]}], a table of its own"
-        places = [(name, tables[name]) for name in _HOMES if name in tables]
-        homes = [_HOMES[name] for name, table in places if where[-1] in table.model_fields]
-        if homes:
-            return f"unknown key {key!r}: it stands under {' or '.join(homes)}"
-        return f"unknown key {key!r}{did_you_mean(where[-1], known)}; known here: {', '.join(known)}"
-    if chosen["type"] == "list_type" and isinstance(chosen["input"], dict):
-        return f"{key} is a list of tables: write [[{key}]] with two brackets"
-    if chosen["type"] == "list_type" and isinstance(chosen["input"], str):
-        return f'{key} is a list: write {where[-1]} = ["{chosen["input"]}"]'
-    if chosen["type"] == "model_type":
-        known = list(tables[where[-1]].model_fields) if where[-1] in tables else []
-        return f"{key} is a table{' of ' * bool(known)}{', '.join(known)}, not {chosen['input']!r}"
-    if chosen["type"] == "missing":
-        return f"{key} is missing"
-    if chosen["type"] == "value_error":
-        return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
-    return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
-
-
-def _tables_by_key(table: type[BaseModel], key: str = "") -> dict[str, type[BaseModel]]:
-    """Tables that refuse unknown keys, by their own keys: this one and all below it."""
-    tables = {key: table}
-    for name, field in table.model_fields.items():
-        for kind in _classes(field.annotation):
-            if issubclass(kind, BaseModel) and kind.model_config.get("extra") == "forbid":
-                tables |= _tables_by_key(kind, name)
-    return tables
-
-
-def _classes(annotation: Any) -> Iterator[type]:
-    for part in get_args(annotation):
-        yield from _classes(part)
-    if isinstance(annotation, type):
-        yield annotation
+        raise UsageError(first_error(error, table)) from None
 
 
 @contextmanager

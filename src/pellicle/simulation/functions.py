@@ -104,10 +104,9 @@ def check_numbers(wavelength: Any, thickness: Any, angle: Any) -> None:
         raise UsageError(f"`wavelength` must be above zero, in nm, got {value:g}")
     # not JAX's own array, of which a program would trace the maximum
     known = np.asarray([] if isinstance(wavelength, Tracer) else wavelength)
-    if known.size and (longest := np.max(known)) < MICROMETRES:
-        unit, scale = ("µm", 1e3) if longest > 1e-3 else ("m", 1e9)
-        written = f"{scale * longest:g}"
-        raise UsageError(f"`wavelength` is in nm, and {longest:g} is like one in {unit}: write {written}")
+    if known.size and (most := np.max(known)) < MICROMETRES:
+        unit, scale = ("µm", 1e3) if most > 1e-3 else ("m", 1e9)
+        raise UsageError(f"`wavelength` is in nm, and {most:g} is like one in {unit}: write {scale * most:g}")
     if (value := _wrong(angle, lambda degrees: ~(np.abs(degrees) <= 90))) is not None:
         raise UsageError(f"`angle` must be 0 to 90 degrees, got {value:g}")
 
