@@ -19,7 +19,7 @@ EXACT := tests/hard tests/fitting/test_nist.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 BROWSER_TESTS := tests/reporting/test_page_in_browser.py $(addprefix tests/explorer/test_,in_browser.py \
-  angles_in_browser.py widget.py)
+  angles_in_browser.py surface_in_browser.py widget.py)
 
 NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 EXECUTED := executed/done

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import pellicle as pl
-from pellicle.explorer.page import style, widget_module
+from pellicle.explorer.page import document
 from pellicle.explorer.session import Session
 
 STEPS = {"thickness": 10.0, "angle": 15.0}
@@ -21,45 +21,25 @@ STORED = (
     "This page has stored answers for its two sliders. pellicle explore, on your machine, computes others, "
     "reads files, fits them, and writes recipes."
 )
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<link rel="icon" href="data:,">
-<title>pellicle explorer: demonstration</title>
-<style>
-STYLE
-</style>
-</head>
-<body class="pellicle-explorer pellicle-page">
-<header><h1>SiO2 on silicon</h1><p class="soft">NOTE</p></header>
-<main id="explorer"></main>
-<script type="module">
-MODULE
-const demo = DEMO;
-const call = async (request, body) => {
+CALL = """const demo = DEMO;
+
+async function call(request, body) {
   if (request === "scene" && !body.angles) return demo.scene;
-  if (request !== "view") throw new Error("NOTE");
+  if (request !== "view") throw new Error("STORED");
   const at = Object.entries(demo.steps).map(([name, step]) => Math.round(body.values[name] / step));
   const { y, ...view } = demo.views[at.join()];
   const curves = [{ ...demo.curve, y }];
   const parts = { curves, sphere: demo.spheres[at[0]], plan: demo.plans[at[1]], ...view };
   const wanted = body.want.map((part) => [part, parts[part]]);
   return { serial: body.serial, compiling: [], warnings: [], ...Object.fromEntries(wanted) };
-};
-await explore(document.getElementById("explorer"), call, { plotly: PLOTLY });
-</script>
-</body>
-</html>
+}
 """
 
 
 def write_demo(path: Path) -> None:
     """Write the page, 2.4 MB: SiO2 on silicon, every 10 nm to 1 µm and every 15 degrees to 75."""
     film = pl.Scene(pl.Layer("SiO2", pl.Free(0, 1000, start=300)), "Si")
-    session = Session(film, wavelength=WAVELENGTHS)
+    session = Session(film, wavelength=WAVELENGTHS, title="SiO2 on silicon, with stored answers")
 
     def answer(want: str, **values: float) -> Any:
         size = {"size": 96} if want == "sphere" else {}
@@ -87,10 +67,9 @@ def write_demo(path: Path) -> None:
         "spheres": [answer("sphere", thickness=thickness) for thickness in depths],
         "plans": [answer("plan", thickness=300.0, angle=angle) for angle in angles],
     }
-    page = PAGE.replace("NOTE", STORED).replace("STYLE", style()).replace("MODULE", widget_module())
     # in a script, "</" would end it
-    page = page.replace("DEMO", json.dumps(demo, separators=(",", ":")).replace("</", "<\\/"))
-    path.write_text(page, "utf-8")
+    stored = json.dumps(demo, separators=(",", ":")).replace("</", "<\\/")
+    path.write_text(document("demo", CALL.replace("STORED", STORED).replace("DEMO", stored)), "utf-8")
 
 
 if __name__ == "__main__":

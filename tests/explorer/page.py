@@ -1,4 +1,4 @@
-"""The page of `pellicle explore` in a browser: its server, and what both modules of tests do with it."""
+"""The page of `pellicle explore` in a browser: its server, and what the modules of tests do with it."""
 
 import base64
 import signal
@@ -66,3 +66,9 @@ def drop(page: Any, name: str, content: bytes) -> None:
       }
     }"""
     page.evaluate(script, [name, base64.b64encode(content).decode()])
+
+
+def curve(page: Any, name: str = "R", axis: str = "y") -> Any:
+    """Ordinates or abscissae of a curve of the plot."""
+    script = "([name, axis]) => document.querySelector('.plot').data.find((t) => t.name === name)?.[axis]"
+    return page.evaluate(script, [name, axis])

@@ -15,16 +15,21 @@ _PARTS = [f"{name}.js" for name in _NAMES.split()]
 """Parts of one ES module, which exports `explore(element, call, options)`: widgets have no imports."""
 
 
-def document(nonce: str) -> str:
+def document(nonce: str, call: str | None = None) -> str:
     """Return the page of the explorer, one file that loads nothing.
 
-    **Arguments:** `nonce`, a random text for this response, which `policy` names. The page reads the token,
-    which it sends with each request, from the parameter `token` of its address.
+    **Arguments:** `nonce`, a random text for this response, which `policy` names; `call`, JavaScript of a
+    function `call(request, body)` that returns a promise of the answer. By default it asks the server: the
+    page reads the token, which it sends with each request, from the parameter `token` of its address.
     """
     loader = PackageLoader("pellicle.explorer", "assets")
     template = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return template.get_template("explorer.html").render(
-        nonce=nonce, style=Markup(style()), script=Markup(_module()), plotly=Markup(packed_plotly())
+        nonce=nonce,
+        style=Markup(style()),
+        script=Markup(_module()),
+        call=Markup(call or _text("server.js")),
+        plotly=Markup(packed_plotly()),
     )
 
 
