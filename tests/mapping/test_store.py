@@ -7,7 +7,9 @@ import itertools
 import json
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from time import sleep
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from pellicle.mapping import run
 from pellicle.mapping.locks import held
 from pellicle.mapping.map_result import Map
 from pellicle.mapping.run import run_map
+from pellicle.mapping.store import write_dataset
 from pellicle.reporting.map_text import cube_report
 
 pytestmark = pytest.mark.usefixtures("small_blocks")
@@ -289,3 +292,17 @@ def test_a_place_is_held_without_fcntl(monkeypatch, tmp_path, refuses):
         refuses(UsageError, "another run is writing there", held(tmp_path / "map.zarr").__enter__)
         opened.add("lock")
     assert not list(tmp_path.iterdir())
+
+
+def test_threads_write_stores_without_a_warning(tmp_path, monkeypatch):
+    """Threads share the filters of warnings; those of the tests turn each warning into an error."""
+    consolidate, ends = zarr.consolidate_metadata, iter([0.2, 0.4])
+
+    def slow(*arguments, **named):
+        sleep(next(ends))  # the second thread is inside when the first leaves
+        return consolidate(*arguments, **named)
+
+    monkeypatch.setattr(zarr, "consolidate_metadata", slow)
+    dataset = xarray.Dataset({"a": ("x", np.arange(3.0))})
+    with ThreadPoolExecutor() as threads:
+        list(threads.map(lambda name: write_dataset(tmp_path / name, dataset), ["a.zarr", "b.zarr"]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
@@ -22,9 +21,8 @@ _ABOUT = {"units": "1", "long_name": "data - fit"}
 
 def of_trace(cube: Cube, light: np.ndarray, left: np.ndarray) -> dict[str, tuple[Any, ...]]:
     """Variables of the `light` of a trace and of what its fit has `left`, both (times, wavelengths)."""
-    with warnings.catch_warnings():  # times without data
-        warnings.simplefilter("ignore", RuntimeWarning)
-        rms = np.sqrt(np.nanmean(left**2, axis=1))
+    with np.errstate(invalid="ignore"):  # times without data
+        rms = np.sqrt(np.nansum(left**2, axis=1) / np.isfinite(left).sum(1))
     return {
         WAVELENGTH: (WAVELENGTH, cube.wavelength, {"units": "nm"}),
         "light": ((TIME, WAVELENGTH), light, {"units": "1", "long_name": "light as measured"}),

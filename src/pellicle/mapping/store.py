@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +52,9 @@ BYTES = 64e6
 less than 1 GB."""
 PIXELS = 2**14
 """Pixels of a block, at most: a second of fits, which is what a killed process loses."""
+
+_FILTERS = Lock()
+"""Held while the filters of warnings differ: threads share them, and one would restore those of another."""
 
 Where = tuple[slice, ...]
 """A block of pixels: one slice for each axis of pixels."""
@@ -348,7 +352,7 @@ def _make(path: Path, store: MapStore, cube: Cube, attributes: Mapping[str, Any]
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Without zarr's warning that consolidated metadata are an extension of version 3."""
-    with warnings.catch_warnings():
+    """Without zarr's warning that consolidated metadata extend version 3, one thread at a time."""
+    with _FILTERS, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")
         yield
