@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from tests.browser import wait_for
 from tests.explorer.page import drop, explorer, number, opening, settle, slider
 
 pytest.importorskip("uvicorn", reason="uvicorn is absent: make browser-tests")
@@ -167,6 +168,47 @@ def drop_spectrum(page, name, spectrum):
     }"""
     page.wait_for_function(both, timeout=60_000)
     settle(page)
+
+
+def lines(page):
+    """Lines on the screen in pixels, by trace: NaN before each piece of an interrupted one."""
+    script = """() => [...document.querySelectorAll('.plot .scatterlayer .trace')].map((trace) =>
+      [...trace.querySelectorAll('.js-line')].map((path) => path.getAttribute('d')).join(''))"""
+    pieces = [path.replace("M", "LNaN,NaNL").split("L")[1:] for path in page.evaluate(script)]
+    return [np.array([point.split(",") for point in points], float).reshape(-1, 2) for points in pieces]
+
+
+def test_while_a_slider_is_dragged_the_lines_are_those_that_plotly_draws(opened):
+    page = opened()
+    drop_spectrum(page, "wafer.csv", measured((65.0, 70.0, 75.0), np.arange(400.0, 801.0, 10.0)))
+    page.evaluate("""() => {
+      const { react } = window.Plotly;
+      Object.assign(window, { whole: 0, drawn: 0 });
+      window.Plotly.react = (...all) => { window.whole += 1; return react(...all); };
+      document.querySelector("main").addEventListener("drawn", ({ detail }) => {
+        window.drawn += 1;
+        window.thickness = detail.values.thickness;
+      });
+    }""")
+    box = slider(page).bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + 0.36 * box["width"], middle)
+    page.mouse.down()
+    for share in np.linspace(0.4, 0.8, 20):
+        page.mouse.move(box["x"] + share * box["width"], middle)
+        page.wait_for_timeout(60)
+    value = float(number(page).input_value())
+    wait_for(page, lambda: page.evaluate("thickness") == value)
+    assert 2 * page.evaluate("whole") <= page.evaluate("drawn") > 5
+    moved = lines(page)
+    page.evaluate("((el) => Plotly.react(el, el.data, el.layout))(document.querySelector('.plot'))")
+    whole = lines(page)
+    page.mouse.up()
+    assert [len(points) for points in moved] == [len(points) for points in whole]
+    for ours, plotly in zip(moved, whole, strict=True):
+        assert np.allclose(ours, plotly, rtol=0, atol=0.01, equal_nan=True)
+    pieces = [int(np.isnan(points).any(axis=1).sum()) for points in moved if len(points)]
+    assert sum(pieces) > len(pieces)  # Δ passes 360 degrees
 
 
 def measured(angles, wavelength):

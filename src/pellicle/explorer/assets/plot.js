@@ -9,6 +9,7 @@ const SHARE_OF_RESIDUALS = 0.45; // of the height of another panel
 const DECADES = 1e5; // of a logarithmic axis, at most
 const GAP = 0.06; // between panels, as a fraction of the height
 const ROOM = 0.04; // above and below the curves, as a fraction of the axis
+const GROWTH = 0.15; // of the axis, beyond a curve that leaves it while a slider moves
 
 /** Unpacks and runs Plotly, which is a gzipped script in base64, and returns it. */
 async function library(packed, nonce) {
@@ -111,6 +112,27 @@ class Plot {
     });
   }
 
+  /** Moves the lines whose ordinates alone are new, and returns whether that was all there was to draw.
+   * Plotly takes 20 to 50 ms for it. Its hover labels are old until the next whole drawing. */
+  #slide(traces, frame) {
+    const { element } = this;
+    if (frame !== this.frame) return false;
+    const paths = new Map();
+    for (const [i, trace] of traces.entries()) {
+      if (trace.y.every((y, at) => y === element.data[i].y[at]) && trace.y.length === element.data[i].y.length) continue;
+      const drawn = element.querySelectorAll(`.scatterlayer .trace${trace.uid} .js-line`);
+      if (trace.mode !== "lines" || !drawn.length) return false;
+      const { xaxis, [trace.yaxis.replace("y", "yaxis")]: yaxis } = element._fullLayout;
+      const points = trace.x.map((x, at) => [xaxis.d2p(x), yaxis.d2p(trace.y[at])]);
+      const there = (point) => point?.every(Number.isFinite);
+      const steps = points.map((point, at) => (there(point) ? `${there(points[at - 1]) ? "L" : "M"}${point.map((x) => x.toFixed(2))}` : ""));
+      drawn.forEach((path, part) => paths.set(path, part ? "" : steps.join("")));
+    }
+    for (const [path, steps] of paths) path.setAttribute("d", steps);
+    traces.forEach(({ x, y }, i) => Object.assign(element.data[i], { x, y }));
+    return true;
+  }
+
   /** Draws; while a slider moves, axes only grow. */
   async draw(moving) {
     this.residuals = this.#residuals();
@@ -150,11 +172,16 @@ class Plot {
         ? trace(curve, { x: curve.x, y: curve.y }, { name: curve.label, mode: "markers", marker: { color: own(curve).color, size: 6, symbol: "x-thin", line: { width: 1.5, color: own(curve).color } } })
         : line(curve, own(curve), legend(curve.label, group(curve))))),
       ...this.residuals.map((curve) => trace(curve, { x: curve.x, y: curve.y }, {
-        name: `${curve.label} residual`, showlegend: false, ...(this.axis.points ? { mode: "markers", marker: { size: 4, color: own(curve).color } } : {}), line: { width: 1, color: several ? own(curve).color : colour("--data") },
+        name: `${curve.label} residual`, showlegend: false, ...(this.axis.points ? { mode: "markers", marker: { size: 4, color: own(curve).color } } : {}), line: { width: 1, simplify: false, color: several ? own(curve).color : colour("--data") },
       })),
     ];
+    traces.forEach((each, i) => { each.uid = String(i); });
     const entries = traces.filter((each) => each.showlegend !== false).map((each) => each.name);
-    await window.Plotly.react(this.element, traces, this.#layout(ordinates, entries, colour, moving), {
+    const layout = this.#layout(ordinates, entries, colour, moving);
+    const frame = JSON.stringify([layout, traces.map(({ x, y, ...rest }) => rest)]);
+    if (moving && this.#slide(traces, frame)) return;
+    this.frame = frame;
+    await window.Plotly.react(this.element, traces, layout, {
       displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"], doubleClick: "autosize",
       toImageButtonOptions: { format: "svg", filename: "spectrum" },
     });
@@ -225,7 +252,10 @@ class Plot {
     const fromZero = !log && !name.startsWith("residual") && low >= 0 && (high <= 1.5 || low < high / 2);
     let range = [fromZero ? 0 : low - room, high + room];
     const old = this.ranges[name];
-    if (moving && old) range = [Math.min(old[0], range[0]), Math.max(old[1], range[1])];
+    if (moving && old) {
+      const more = GROWTH * (old[1] - old[0]); // an axis that grew with each curve would be drawn anew each time
+      range = [low < old[0] ? (fromZero ? 0 : range[0] - more) : old[0], high > old[1] ? range[1] + more : old[1]];
+    }
     this.ranges[name] = range;
     return { range, type: log ? "log" : "linear" };
   }
