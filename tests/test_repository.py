@@ -3,6 +3,7 @@
 import ast
 import pkgutil
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -133,11 +134,33 @@ def test_workflows_run_targets_and_scripts_that_exist(path):
         step for job in yaml.safe_load(path.read_text("utf-8"))["jobs"].values() for step in job["steps"]
     ]
     for command in (step["run"] for step in steps if "run" in step):
-        program, *arguments = command.split()
+        program, *arguments = shlex.split(command)
+        if program in ("python", "pellicle"):
+            assert all(any(ROOT.glob(x)) for x in arguments if x.startswith(("tests/", "measurements/"))), (
+                command
+            )
+            continue
         exists = (ROOT / program).is_file()
         assert exists or (program == "make" and re.search(rf"^{arguments[0]}:", MAKEFILE, re.MULTILINE)), (
             command
         )
+
+
+def test_a_workflow_tests_windows_and_macos():
+    """Commands from tests of paths, processes, locks and consoles run on both, and one with a pattern."""
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))["jobs"].values()
+    [job] = [job for job in jobs if "matrix" in job.get("strategy", {})]
+    assert job["strategy"]["matrix"]["system"] == ["windows-latest", "macos-latest"]
+    commands = " ".join(step["run"] for step in job["steps"] if "run" in step)
+    assert all(name in commands for name in ("tests/cli", "tests/mapping", "tests/explorer", '*.csv"'))
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml")), ids=lambda p: p.stem
+)
+def test_forms_of_issues_ask_for_the_output_of_doctor(path):
+    fields = [field["attributes"] for field in yaml.safe_load(path.read_text("utf-8"))["body"]]
+    assert any("`pellicle doctor`" in field.get("description", "") for field in fields)
 
 
 def test_every_declared_python_is_installed_by_the_workflow_and_tried_by_make():
