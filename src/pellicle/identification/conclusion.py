@@ -11,8 +11,8 @@ import numpy as np
 
 from pellicle.fitting.result import Estimate
 from pellicle.identification.evidence import Weighed
-from pellicle.identification.growth import BARE, NOISE_LIKE, SIGNIFICANT, Growth, needed
-from pellicle.identification.hypothesis import Hypothesis, SupposedLayer
+from pellicle.identification.growth import BARE, NOISE_LIKE, SIGNIFICANT, STRAINED, Growth, needed
+from pellicle.identification.hypothesis import TABLE_UNCERTAINTY, Hypothesis, SupposedLayer
 from pellicle.identification.problem import Problem
 
 DECIDED = 5.0
@@ -22,14 +22,19 @@ _DEMANDED = 12.0
 NOISY = 2.0
 """Ratio of unexplained residuals to noise above which nothing is identified."""
 SEVERAL = "several films are left"
-STRAINED = 3.0
-"""Size of an effect, in standard uncertainties, above which nothing is identified."""
 MISSTATED = 0.3
 """Shift of the angle of incidence (degrees) above which it was stated wrongly: six times a usual error."""
 _LIKE = 0.02
-"""Relative difference of two indices that name one film: that of pages of one material."""
-_SAME_THICKNESS, _THIN = 3.0, 10.0
-"""Standard errors between thicknesses of one film, and nm between those of its thinner neighbour."""
+"""Relative difference of two indices of one name: that of pages of one material."""
+_SHARE = 0.95
+"""Share of the probability of all that are left from which one film, by whatever names, is the answer."""
+_ERRORS, _THIN = 3.0, 10.0
+"""Standard errors between thicknesses and indices of one film; nm between those of its thinner neighbour."""
+_SAME_INDEX = _ERRORS * math.sqrt(2) * TABLE_UNCERTAINTY
+"""Relative difference of two mean indices of one film: each page of the catalogue has its uncertainty.
+
+Two layers told as one film of several names need more care, so of two layers, and of one R or T, all that are
+left must be within `_LIKE`: 54 nm of polystyrene on 104 nm of Si3N4 in T were a film of 1.93 to 2.00."""
 
 
 def survivors(weighed: Sequence[Weighed]) -> list[Weighed]:
@@ -61,10 +66,18 @@ def shapeless(weighed: Sequence[Weighed]) -> list[Weighed]:
     return [x for x in near if x.shapeless and x.remaining < NOISE_LIKE]
 
 
+def plausible(weighed: Sequence[Weighed]) -> list[Weighed]:
+    """Structures that leave but noise with usual errors, where those with more evidence need unusual ones:
+    29 nm of polystyrene on 390 nm of HfO2 in Ψ and Δ had Δ ln Z 11 less than uneven alumina."""
+    near = [x for x in weighed if weighed[0].ln_z - x.ln_z < _DEMANDED and needed(x)]
+    return [x for x in near if x.adequate and x.remaining < NOISE_LIKE]
+
+
 def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
     """Reason for which the best of the structures that are left is not certain, empty for none."""
-    best = kept[0]
-    if not all(same(problem, best, x) for x in kept[1:]):
+    best, alike = kept[0], one_film(problem, kept)
+    layered = len(alike) < len(kept) and len(_seen(problem, best)) > 1
+    if layered or sum(_shares(alike, best)) < _SHARE * sum(_shares(kept, best)):
         return SEVERAL
     if best.remaining > NOISY:
         return f"its residuals are {best.remaining:.2g} times the noise"
@@ -75,7 +88,8 @@ def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
             return "the angle of incidence is not the one that was stated"
         if n.name == "thickness" and n.upper > BARE and not v > SIGNIFICANT * e:
             return "a thickness is not determined"
-    unlike = all(_like_no_film(problem, x) for x in kept)
+    # a table that needs an unusual error does not vouch for a free index
+    unlike = all(_like_no_film(problem, x) for x in alike if x.strain <= STRAINED)
     return "its free index may stand for another structure" if unlike else ""
 
 
@@ -86,13 +100,12 @@ def _like_no_film(problem: Problem, x: Weighed) -> bool:
     Of 23 samples two layers or another substrate were told as such a film three times, with residuals of
     noise; ψ and Δ have two numbers at each wavelength.
     """
-    lone = len(problem.views) == 1 and problem.views[0].channels == 1
     for i, layer in enumerate(x.structure.layers):
         numbers = zip(x.structure.numbers, x.x, strict=True)
         flat = any(
             n.layer == i and n.name == "B" and v < n.lower + 1e-3 * (n.upper - n.lower) for n, v in numbers
         )
-        unlike = lone and not _alike_films(problem, index_of(problem, x, i))
+        unlike = _lone(problem) and not _alike_films(problem, index_of(problem, x, i))
         if layer.modelled and _depths(x)[i] > BARE and (flat or unlike or x.remaining > NOISE_LIKE):
             return True
     return False
@@ -107,25 +120,50 @@ def _alike_films(problem: Problem, index: np.ndarray) -> tuple[str, ...]:
     return tuple(x for x in sorted(distances, key=lambda w: distances[w]) if distances[x] < _LIKE)
 
 
+def one_film(problem: Problem, kept: Sequence[Weighed]) -> list[Weighed]:
+    """Structures that are the best of these in other words."""
+    return [x for x in kept if x is kept[0] or same(problem, kept[0], x)]
+
+
+def _shares(weighed: Sequence[Weighed], best: Weighed) -> list[float]:
+    return [math.exp(x.ln_z - best.ln_z) for x in weighed]
+
+
 def same(problem: Problem, a: Weighed, b: Weighed) -> bool:
-    """True where two structures are one sample in other words: thicknesses alike within errors, and indices
-    of all layers but very thin ones."""
-    (da, ea), (db, eb) = thickest(a), thickest(b)
-    ea, eb = (min(e, 0.1 * d) if math.isfinite(e) else 0.1 * d for e, d in ((ea, da), (eb, db)))
-    thin = [_others(x) for x in (a, b)]
-    if abs(da - db) > _SAME_THICKNESS * math.hypot(ea, eb) or abs(thin[0] - thin[1]) > _THIN:
+    """True where two structures are one sample in other words: thicknesses and indices of all layers but very
+    thin ones alike within errors."""
+    if abs(_others(a) - _others(b)) > _THIN and len(a.structure.layers) != len(b.structure.layers):
         return False
-    pairs = zip(_seen(problem, a), _seen(problem, b), strict=False)
-    return len(_seen(problem, a)) == len(_seen(problem, b)) and all(_alike(*pair) for pair in pairs)
+    one, other = _seen(problem, a), _seen(problem, b)
+    most = _LIKE if len(one) > 1 or _lone(problem) else _SAME_INDEX
+    return len(one) == len(other) and all(_alike(*pair, most) for pair in zip(one, other, strict=True))
 
 
-def _seen(problem: Problem, x: Weighed) -> list[np.ndarray]:
-    """Index of each layer that is not very thin."""
-    return [index_of(problem, x, i) for i, depth in enumerate(_depths(x)) if depth > BARE]
+def _lone(problem: Problem) -> bool:
+    """True for one R or T, where ψ and Δ have two numbers at each wavelength."""
+    return len(problem.views) == 1 and problem.views[0].channels == 1
 
 
-def _alike(a: np.ndarray, b: np.ndarray) -> bool:
-    return bool(np.max(np.abs(a / b - 1)) < 2 * _LIKE and abs(a.mean() / b.mean() - 1) < _LIKE)
+def _seen(problem: Problem, x: Weighed) -> list[tuple[np.ndarray, float, float]]:
+    """Index, thickness and its error, at most a tenth, of each layer that is seen."""
+    depths = [
+        (v, e) for n, v, e in zip(x.structure.numbers, x.x, x.stderr, strict=True) if n.name == "thickness"
+    ]
+    found = [(i, *depths[i]) for i in _not_thin([v for v, _ in depths])]
+    return [
+        (index_of(problem, x, i), v, min(e, 0.1 * v) if math.isfinite(e) else 0.1 * v) for i, v, e in found
+    ]
+
+
+def _not_thin(depths: Sequence[float]) -> list[int]:
+    """Positions of layers that are not very thin, or of the thickest."""
+    return [i for i, v in enumerate(depths) if v > BARE] or [int(np.argmax(depths))]
+
+
+def _alike(a: tuple[np.ndarray, float, float], b: tuple[np.ndarray, float, float], most: float) -> bool:
+    (n, d, e), (m, other, error) = a, b
+    near = np.max(np.abs(n / m - 1)) < 2 * most and abs(n.mean() / m.mean() - 1) < most
+    return bool((near or max(d, other) <= BARE) and abs(d - other) <= _ERRORS * math.hypot(e, error))
 
 
 def index_of(problem: Problem, x: Weighed, layer: int) -> Any:
@@ -160,6 +198,19 @@ def hypotheses(growth: Growth, weighed: Sequence[Weighed], condition: str = "") 
     return [
         replace(x, probability=float(p)) for x, p in zip(found, shares / max(shares.sum(), 1.0), strict=True)
     ]
+
+
+def answer(alike: Sequence[Hypothesis]) -> Hypothesis:
+    """The first of several hypotheses that are one film, with errors of its thicknesses that include the
+    choice among them, each as probable (J. Hoeting et al., 1999, Statist. Sci. 14, 382)."""
+    best, layers = alike[0], list(alike[0].layers)
+    places = [_not_thin([layer.thickness.value for layer in x.layers]) for x in alike]
+    for own in zip(*places, strict=True):
+        every = [x.layers[i].thickness for x, i in zip(alike, own, strict=True)]
+        square = np.mean([x.stderr**2 + (x.value - every[0].value) ** 2 for x in every])
+        first, *rest = layers[own[0]].numbers
+        layers[own[0]] = replace(layers[own[0]], numbers=(replace(first, stderr=float(square**0.5)), *rest))
+    return replace(best, layers=tuple(layers))
 
 
 def _hypothesis(growth: Growth, x: Weighed, condition: str) -> Hypothesis:

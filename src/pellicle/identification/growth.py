@@ -18,6 +18,8 @@ from pellicle.identification.structure import OXIDE, Material, Structure
 
 NOISE_LIKE = 1.3
 """Ratio of unexplained residuals to noise up to which growth ends."""
+STRAINED = 3.0
+"""Size of an effect, in standard uncertainties, above which nothing is identified: other models are tried."""
 BARE = 15.0
 """Largest thickness (nm) of the native oxide on a bare substrate."""
 SIGNIFICANT = 3.5
@@ -97,12 +99,13 @@ class Growth:
         """True for a substrate that has a native oxide."""
         return float(np.mean(self.problem.views[0].media[1].real)) > NATIVE
 
-    def done(self, most: int = 99) -> bool:
-        """Weigh all; true where time is up, or the best needs at most `most` numbers and leaves but noise."""
+    def done(self, most: int = 99, strain: float = np.inf) -> bool:
+        """Weigh all; true where time is up, or the best needs at most `most` numbers, leaves but noise, and
+        needs no effect above `strain` of its standard uncertainties."""
         self.weighed = weigh(self.problem, self.attempts, self.columns)
         best = next((x for x in self.weighed if needed(x)), self.weighed[0])
-        enough = best.adequate and best.remaining < NOISE_LIKE and len(best.x) <= most
-        return enough or time.monotonic() > self.deadline
+        enough = best.adequate and best.remaining < NOISE_LIKE and best.strain <= strain
+        return (enough and len(best.x) <= most) or time.monotonic() > self.deadline
 
     def add(self, layers: Sequence[Material], starts: Iterable[np.ndarray], *effects: str) -> None:
         """Polish a structure from starts (numbers,) and keep it, unless time is up."""
@@ -143,7 +146,7 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
         growth.add([Material("SiO2", BARE)], [np.array([2.0])])
     _single_films(growth, names)
     growth.add([growth.film("cauchy")], _model_starts(growth, "cauchy", 4))
-    if not growth.done():
+    if not growth.done(strain=STRAINED):
         for model in ("sellmeier", "cauchy-urbach", CONDUCTOR, "drude", "lorentz", "tauc-lorentz"):
             growth.add([growth.film(model)], _model_starts(growth, model, 3))
     if not growth.done(_FLEXIBLE):
@@ -213,10 +216,20 @@ def _with_each(growth: Growth, base: Weighed, tried: dict[str, tuple[float, ...]
 
 
 def _pair_effects(growth: Growth) -> None:
-    """Effects on the best two layers, and both of these with a free index: 29 nm of polystyrene on 454 nm of
-    uneven hafnia had no hypothesis in Ψ and Δ."""
-    found = [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]
-    for pair in found[:1]:
-        _with_each(growth, pair, {"roughness": (6.0,), "thickness_spread": (5.0,)})
-    for pair in [x for x in found if {y.name for y in x.structure.layers if y.modelled} == {"cauchy"}][:1]:
+    """Both of the best two layers with a free index, then effects on the best, on the best that describe
+    the data, and on these: 29 nm of polystyrene on 454 nm of uneven hafnia had no hypothesis in Ψ and Δ."""
+    free = [x for x in _pairs(growth) if {y.name for y in x.structure.layers if y.modelled} == {"cauchy"}]
+    for pair in free[:1]:
         pairs.free_both(growth, pair)
+        growth.done()
+    found = _pairs(growth)
+    adequate = [x for x in found if x.adequate]
+    both = [x for x in found if all(y.name == "cauchy" for y in x.structure.layers)]
+    bases = {x.structure: x for x in (*found[:1], *adequate[:1], *both[:1])}
+    for pair in bases.values():
+        _with_each(growth, pair, {"roughness": (6.0,), "thickness_spread": (2.0, 6.0)})
+
+
+def _pairs(growth: Growth) -> list[Weighed]:
+    """Two layers without effects, the best first."""
+    return [x for x in growth.weighed if len(x.structure.layers) == 2 and not x.structure.effects]

@@ -41,6 +41,7 @@ _MOST_TABLES = 0.7
 """Share of the tables that cover a part of the data which is compared alone: films of a spectrometer's whole
 range, from 190 nm, are those of 15 of 35 materials."""
 _SHAPE = "the index of the film has a shape that no model has"
+_UNUSUAL = "structures that need unusual errors are excluded"
 GLASSES = ("BK7", "fused silica", "SF10/HOYA")
 _GLASSY, _ANOTHER = 1.9, 0.02
 """Index below which a substrate may be another glass, and relative difference of the index of another."""
@@ -114,8 +115,10 @@ def _identified(
         found = [x for x in conclusion.survivors(again.weighed) if x.remaining < conclusion.NOISY]
         if found:
             return _record(again, found, condition, condition, rest, other[1], began)
-    kept = conclusion.shapeless(growth.weighed)
-    condition = _SHAPE if kept else ""
+    kept, condition = conclusion.shapeless(growth.weighed), _SHAPE
+    if not kept:
+        kept, condition = conclusion.plausible(growth.weighed), _UNUSUAL
+    condition = condition if kept else ""
     return _record(growth, kept, condition, condition, left_out, request, began)
 
 
@@ -143,6 +146,11 @@ def _record(
     status = Outcome.NONE if not kept else Outcome.UNDECIDED if doubt else Outcome.IDENTIFIED
     rest = [x for x in growth.weighed if not any(x is y for y in kept)]
     hypotheses = conclusion.hypotheses(growth, kept, condition)
+    alike = []
+    if kept and not doubt:
+        same = conclusion.one_film(problem, kept)
+        alike = [x for x, own in zip(hypotheses, kept, strict=True) if any(own is y for y in same)]
+        hypotheses[0] = alike[0] = conclusion.answer(alike)
     excluded = conclusion.hypotheses(growth, rest, condition)
     nearest = next((x for x in growth.weighed if needed(x)), growth.weighed[0])
     noise = problem.short_range_noise(problem.data - nearest.attempt.values)
@@ -153,7 +161,7 @@ def _record(
         hypotheses=tuple(hypotheses),
         excluded=tuple(replace(x, probability=0.0) for x in excluded),
         not_tried=(*left_out, *_untried(growth, request, condition)),
-        verdict=words.verdict(hypotheses, excluded, doubt, nearest, left_out, substrate),
+        verdict=words.verdict(hypotheses, alike, excluded, doubt, nearest, left_out, substrate),
         data=tuple(view.spectrum for view in problem.views),
         noise=tuple(channels),
         seconds=time.perf_counter() - began,

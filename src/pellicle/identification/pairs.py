@@ -18,8 +18,8 @@ from pellicle.identification.structure import Structure
 if TYPE_CHECKING:
     from pellicle.identification.growth import Growth
 
-PARTNERS = ("MgF2", "SiO2", "SU-8", "alumina", "MgO", "Y2O3", "Si3N4", "Ta2O5", "TiO2")
-"""Materials of two layers: indices from 1.38 to 2.5, at most a tenth apart."""
+PARTNERS = ("MgF2", "SiO2", "SU-8", "alumina", "MgO", "Y2O3", "Si3N4", "Ta2O5", "TiO2", "TiO2/Devore-e")
+"""Materials of two layers: indices from 1.38 to 2.9, up to 2.5 at most a tenth apart."""
 _APART = 0.03
 """Relative difference of the mean index of two layers: less is one film."""
 _CALLED = 8.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pellicle.fitting.result import Estimate
 from pellicle.identification.conclusion import DECIDED, SEVERAL
@@ -17,6 +18,7 @@ _SHOWN = 4
 
 def verdict(
     kept: Sequence[Hypothesis],
+    alike: Sequence[Hypothesis],
     excluded: Sequence[Hypothesis],
     doubt: str,
     nearest: Weighed,
@@ -25,7 +27,8 @@ def verdict(
 ) -> str:
     """Return the verdict on a sample on `substrate`: what it is, or what the data leave open.
 
-    `doubt` is the reason for which the first of the hypotheses that are left is not certain, empty for none.
+    `doubt` is the reason for which the first of the hypotheses that are left is not certain, empty for none;
+    `alike` are then those of them that are the same film.
     """
     if not kept:
         name, size = nearest.excess
@@ -36,7 +39,9 @@ def verdict(
             " usual size.",
         ]
     elif not doubt:
-        sentences = [f"{_sentence(kept[0], substrate)}.", *_effects(kept[0], excluded)]
+        sentences = [f"{_sentence(_named(alike), substrate)}.", *_effects(kept[0], excluded)]
+        rest = [f"{x.name} ({x.probability:.1%})" for x in kept if all(x is not y for y in alike)]
+        sentences += [f"Less probable: {', '.join(rest[:_SHOWN])}."] if rest else []
     else:
         sentences = _undecided(kept, substrate, doubt)
     if kept and excluded:
@@ -74,6 +79,20 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str) -> list[s
             f" {low:.4g} to {high:.4g} nm."
         )
     return sentences
+
+
+def _named(alike: Sequence[Hypothesis]) -> Hypothesis:
+    """The first of several hypotheses that are one film, with the index and the names of all of one layer."""
+    best = alike[0]
+    every = [x.layers[0] for x in alike if len(x.layers) == 1 == len(best.layers)]
+    if len(every) < 2:
+        return best
+    n, k = (
+        (min(x for x, _ in part), max(x for _, x in part))
+        for part in zip(*((x.n, x.k) for x in every), strict=True)
+    )
+    like = tuple(dict.fromkeys(name for x in every for name in x.like))
+    return replace(best, layers=(replace(best.layers[0], n=n, k=k, like=like),))
 
 
 def _lower(sentence: str) -> str:
