@@ -3,8 +3,9 @@
 Run `python benchmarks/mitsuba_films.py`. The first table has the ΔE2000 of what Mitsuba evaluates near the
 mirror direction at 0 to 80 degrees, from the film's spectrum integrated in steps of 1 nm (CIE 1931, D65); in
 RGB the exact colour is clipped to positive sRGB, as the tables are. The second table has the processor time
-of a rendering relative to the built-in `roughconductor`, the least of five rounds in which the materials take
-turns. Variants of Mitsuba that need LLVM are left out where Dr.Jit does not find it.
+of a rendering relative to the built-in `roughconductor`, and for a film on glass to `roughdielectric`, the
+least of five rounds in which the materials take turns. Variants of Mitsuba that need LLVM are left out where
+Dr.Jit does not find it; Dr.Jit 1.5 ends the process with LLVM 15 (DRJIT_LIBLLVM_PATH chooses another).
 """
 
 from __future__ import annotations
@@ -117,7 +118,11 @@ def times(variant: str, files: dict[str, Path]) -> dict[str, float]:
         "roughconductor": rendering({"type": "roughconductor", "distribution": "ggx", "alpha": ALPHA}),
         "lookup": rendering({"type": "pellicle_film", "filename": str(files["film.npz"]), "alpha": ALPHA}),
         "measured": rendering({"type": "measured", "filename": str(files[table])}),
+        "roughdielectric": rendering({"type": "roughdielectric", "distribution": "ggx", "alpha": ALPHA}),
+        "on glass": rendering({"type": "pellicle_film", "filename": str(files["glass.npz"]), "alpha": ALPHA}),
     }
+    if mi.is_polarized:
+        scenes.pop("measured")
     samples = SAMPLES if variant.startswith("llvm") else 4
     taken: dict[str, list[float]] = {name: [] for name in scenes}
     for number in range(ROUNDS + 1):
@@ -151,18 +156,22 @@ def main() -> None:
             files = {path.name: path for path in pl.export(scene, to="mitsuba", path=own / "film.xml").files}
             cells = [f"{np.mean(each):.2g} / {np.max(each):.2g}" for each in errors(scene, files)]
             print(f"| {name} | {' | '.join(cells)} |", flush=True)
-        print("\n| variant | roughconductor (s) | lookup | measured |\n|---|---|---|---|")
-        for variant in ("llvm_ad_rgb", "llvm_ad_spectral", "scalar_rgb"):
+        made = pl.export(pl.Scene(pl.Layer(2.0, 150.0), 1.5), to="mitsuba", path=own / "glass.xml")
+        files |= {path.name: path for path in made.files}
+        print("\n| variant | lookup | measured | film on glass, to roughdielectric |\n|---|---|---|---|")
+        for variant in ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_spectral_polarized", "scalar_rgb"):
             try:
                 taken = times(variant, files)
             except ImportError as missing:
                 print(f"| {variant} | {missing} |")
                 continue
-            base = taken.pop("roughconductor")
-            print(
-                f"| {variant} | {base:.2f} | {' | '.join(f'{s / base:.2f}' for s in taken.values())} |",
-                flush=True,
+            metal, glass = taken["roughconductor"], taken["roughdielectric"]
+            ratios = (
+                taken["lookup"] / metal,
+                taken.get("measured", np.nan) / metal,
+                taken["on glass"] / glass,
             )
+            print(f"| {variant} | {' | '.join(f'{x:.2f}' for x in ratios)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -121,7 +121,7 @@ if MITSUBA:
         arrays = dict(table)
     thicknesses, cosines, _ = arrays["rgb"].shape
     nm = np.linspace(*arrays["thickness"], thicknesses)[:, None]
-    gltf = gltf_formula.colour(numbers, nm, np.linspace(0, 1, cosines))
+    gltf = gltf_formula.colour(numbers, nm, np.linspace(0, 1, cosines) ** 2)
     np.savez(FOLDER / "gltf.npz", **(arrays | {"rgb": np.asarray(gltf, np.float32)}))
     renderings = {"43 nm, tables": sphere({"type": "measured", "filename": str(FOLDER / "steel.bsdf")})}
     for name, table in (("5 to 50 nm, lookup", "steel.npz"), ("5 to 50 nm, glTF's formula", "gltf.npz")):

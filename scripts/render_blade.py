@@ -58,7 +58,7 @@ def tables(folder: Path) -> dict[str, Path]:
     look = appearance(pl.Scene(pl.Layer(OXIDE, THICKEST), STEEL))
     exact = lookup(look).arrays()
     count, cosines, _ = exact["rgb"].shape
-    nm, cosine = np.linspace(*exact["thickness"], count), np.linspace(0.0, 1.0, cosines)
+    nm, cosine = np.linspace(*exact["thickness"], count), np.linspace(0.0, 1.0, cosines) ** 2
     gltf = gltf_formula.colour(gltf_formula.physical(look), nm[:, None], cosine)
     arrays: dict[str, dict[str, Any]] = {
         "exact": exact,

@@ -11,11 +11,14 @@ import pytest
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
 from pellicle.errors import UsageError
-from pellicle.rendering.mitsuba import ALPHA, write_surface
+from pellicle.rendering import mitsuba_plugin
+from pellicle.rendering.appearance import appearance
+from pellicle.rendering.mitsuba import ALPHA, lookup, write_surface
 from tests.airy import airy
 from tests.directions import unit
 
 mi = pytest.importorskip("mitsuba")
+tmm = pytest.importorskip("tmm")
 
 THICKNESS, LAYER, BASE = 43.0, 2.9, 2.7 + 2.8j
 STEEL = pl.Scene(pl.Layer(LAYER, THICKNESS), BASE)
@@ -172,6 +175,135 @@ def test_an_uneven_film_takes_its_thickness_from_an_image(tmp_path):
     np.testing.assert_allclose(value / lobe(*np.array([[0, 0, 1.0]] * 2), ALPHA)[0][1], colour, atol=1e-3)
     with pytest.raises(UsageError, match=r"a \.bsdf has one thickness; export a map of thicknesses as \.xml"):
         pl.export(STEEL, to="mitsuba", path=tmp_path / "uneven.bsdf", thickness_map=nm)
+
+
+FILMS = {
+    "metal": pl.Scene(pl.Layer(2.7 + 2.8j, 5.0), 2.7 + 2.8j),
+    "glass": pl.Scene(pl.Layer(1.5, 5.0), 1.5),
+    "film": pl.Scene(pl.Layer(2.0, 150.0), 1.5),
+    "steel": STEEL,
+}
+"""Two bare faces, and two films."""
+
+
+@pytest.fixture(scope="module")
+def tabulated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lookups")
+    for name, scene in FILMS.items():
+        np.savez(folder / f"{name}.npz", **lookup(appearance(scene)).arrays())
+
+    def bsdf(name, alpha, variant):
+        mi.set_variant(variant)
+        mitsuba_plugin.register()
+        return mi.load_dict(
+            {"type": "pellicle_film", "filename": str(folder / f"{name}.npz"), "alpha": alpha}
+        )
+
+    return bsdf
+
+
+def interaction(wi, nm=550.0):
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(*np.ravel(wi).tolist())
+    if mi.is_spectral:
+        si.wavelengths = [nm] * 4
+    return si
+
+
+def sphere_directions(count, below):
+    """Pairs of directions, half of them near each other's mirror image, on both sides if `below`."""
+    random = np.random.default_rng(0)
+    wi, wo = random.normal(size=(2, count, 3))
+    wo[::2] = wi[::2] * [-1, -1, 1] + 0.2 * random.normal(size=(len(wo[::2]), 3))
+    for vectors in (wi, wo):
+        vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+        if not below:
+            vectors[:, 2] = np.abs(vectors[:, 2])
+    return zip(wi, wo, strict=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+@pytest.mark.parametrize(("name", "own"), [("metal", "roughconductor"), ("glass", "roughdielectric")])
+def test_bare_faces_are_those_of_mitsuba(tabulated, name, own, mode):
+    film, context = tabulated(name, 0.2, "scalar_rgb"), mi.BSDFContext(getattr(mi.TransportMode, mode))
+    numbers = {"eta": 2.7, "k": 2.8} if name == "metal" else {"int_ior": 1.5, "ext_ior": 1.0}
+    built_in = mi.load_dict({"type": own, "distribution": "ggx", "alpha": 0.2} | numbers)
+    each = [
+        [(np.ravel(x.eval(context, at, to)), x.pdf(context, at, to)) for x in (film, built_in)]
+        for at, to in (
+            (interaction(wi), mi.Vector3f(*wo.tolist())) for wi, wo in sphere_directions(300, name == "glass")
+        )
+    ]
+    values = np.array([[value for value, _ in pair] for pair in each])
+    pdfs = np.array([[pdf for _, pdf in pair] for pair in each])
+    assert np.max(np.abs(values[:, 0] - values[:, 1])) < 1e-3 * np.max(values)
+    assert np.max(np.abs(pdfs[:, 0] - pdfs[:, 1])) < 1e-3 * np.max(pdfs)
+
+
+@pytest.mark.slow
+def test_rough_metal_turns_polarisation_as_that_of_mitsuba_does(tabulated):
+    film, context = tabulated("metal", 0.2, "scalar_spectral_polarized"), mi.BSDFContext()
+    spectra = {key: {"type": "spectrum", "value": x} for key, x in (("eta", 2.7), ("k", 2.8))}
+    built_in = mi.load_dict({"type": "roughconductor", "distribution": "ggx", "alpha": 0.2} | spectra)
+    for wi, wo in sphere_directions(50, below=False):
+        at, to = interaction(wi), mi.Vector3f(*wo.tolist())
+        found, own = (np.array(x.eval(context, at, to))[..., 0] for x in (film, built_in))
+        np.testing.assert_allclose(found, own, atol=1e-3 * max(np.max(np.abs(own)), 1.0))
+
+
+def amplitudes(nm, degrees, indices, thickness, transmitted):
+    """Mueller elements m11, m12, m33, m34 of tmm's waves, in Mitsuba's order of s and p, and its time."""
+    waves = [
+        tmm.coh_tmm(each, indices, [np.inf, thickness, np.inf], np.deg2rad(degrees), nm) for each in "sp"
+    ]
+    powers = [max(wave["T" if transmitted else "R"], 0.0) for wave in waves]
+    s, p = (
+        np.sqrt(power) * np.exp(1j * np.angle(wave["t" if transmitted else "r"]))
+        for wave, power in zip(waves, powers, strict=True)
+    )
+    # tmm's p field points the other way on reflection
+    both = s * np.conj(p)
+    return 0.5 * (powers[0] + powers[1]), 0.5 * (powers[0] - powers[1]), both.real, -both.imag
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [25.0, 55.0, 70.0, 130.0, 155.0])
+@pytest.mark.parametrize("transmitted", [False, True])
+def test_polarised_light_is_that_of_the_waves(tabulated, degrees, transmitted):
+    film = tabulated("film", 0.0, "scalar_spectral_polarized")
+    below = degrees > 90
+    within = min(degrees, 180 - degrees)
+    if transmitted and below and 1.5 * np.sin(np.deg2rad(within)) > 1:
+        pytest.skip("all light is reflected")
+    wi = unit(degrees, 0)
+    for nm in (431.0, 552.5, 688.0):
+        at = interaction(wi, nm)
+        sampled, weight = film.sample(mi.BSDFContext(), at, 1 - 1e-6 if transmitted else 0.0, [0.5, 0.5])
+        matrix = np.array(weight)[..., 0] * sampled.pdf * (sampled.eta**2 if transmitted else 1.0)
+        indices = [1.5, 2.0, 1.0] if below else [1.0, 2.0, 1.5]
+        a, b, c, s = amplitudes(nm, within, indices, 150.0, transmitted)
+        rows = [[a, b, 0, 0], [b, a, 0, 0], [0, 0, c, s], [0, 0, -s, c]]
+        expected = mi.Spectrum([[mi.UnpolarizedSpectrum(float(x)) for x in row] for row in rows])
+        seen, source = mi.Vector3f(*wi.tolist()), sampled.wo
+        axis = mi.Vector3f(0, 1 if np.ravel(wi)[0] * np.ravel(wi)[2] > 0 else -1, 0)
+        basis = mi.mueller.stokes_basis
+        expected = mi.mueller.rotate_mueller_basis(
+            expected, -source, axis, basis(-source), seen, axis, basis(seen)
+        )
+        np.testing.assert_allclose(matrix, np.array(expected)[..., 0], atol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degrees", [10.0, 50.0, 75.0, 105.0, 140.0, 170.0])
+def test_a_transparent_film_passes_what_it_does_not_reflect(tabulated, degrees):
+    film = tabulated("film", 0.0, "scalar_spectral")
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    total = 0.0
+    for sample in (0.0, 1 - 1e-6):
+        sampled, weight = film.sample(context, interaction(unit(degrees, 0)), sample, [0.5, 0.5])
+        total += 0.0 if sample and sampled.wo.z * np.cos(np.deg2rad(degrees)) > 0 else weight[0] * sampled.pdf
+    np.testing.assert_allclose(total, 1.0, atol=1e-3)
 
 
 def spread_directions(count):

@@ -35,7 +35,8 @@ class Appearance:
     (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
     perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
     without a layer at normal incidence. `scene` is the film in reflection, whose layer is named `FILM`.
-    `roughness` is the GGX α of its facets. `notes` are sentences on what else its colours
+    `roughness` is the GGX α of its facets. `coherent` is True for even layers with smooth faces, whose light
+    has one phase. `notes` are sentences on what else its colours
     contain, `lacking` on what no format's formula has.
     """
 
@@ -46,6 +47,7 @@ class Appearance:
     bare: Float[np.ndarray, "3"]
     scene: Scene
     roughness: float = 0.0
+    coherent: bool = True
     notes: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
 
@@ -98,7 +100,7 @@ def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
 
 
 def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
-    """The sentences `notes` and `lacking` of an `Appearance`."""
+    """The sentences `notes` and `lacking` of an `Appearance`, and whether it is `coherent`."""
     instrument, own = scene.instrument, scene.substrate
     coherent = sum(isinstance(x, Layer | Interface) for x in scene.layers)
     plates = own.back is not None or any(isinstance(x, Plate) for x in scene.layers)
@@ -117,4 +119,6 @@ def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
         "it is not in air, as formats assume": immersed,
     }
     each = {"notes": notes, "lacking": lacking}
-    return {key: tuple(text for text, holds in texts.items() if holds) for key, texts in each.items()}
+    smooth = all(isinstance(x, Layer) and x.repeats == 1 and x.roughness is None for x in scene.layers)
+    said = {key: tuple(text for text, holds in texts.items() if holds) for key, texts in each.items()}
+    return {"coherent": smooth and not (rough or uneven), **said}

@@ -1,4 +1,4 @@
-"""BSDF `pellicle_film` for Mitsuba 3: facets whose Fresnel term is the reflectance of a film, by lookup.
+"""BSDF `pellicle_film` for Mitsuba 3: facets whose Fresnel terms are those of a film, by lookup.
 
 It needs Mitsuba, Dr.Jit and NumPy alone, so that the file can be copied beside a scene. Set a variant, call
 `register()`, then load the scene:
@@ -14,10 +14,15 @@ Parameters of the plugin:
 - `filename`: the table, `.npz`.
 - `thickness` in nm: a number, or a texture whose values from 0 to 1 run from `thickness_min` to
   `thickness_max`; the table's own thickness by default.
-- `alpha`: roughness of GGX; 0 for a mirror.
+- `alpha`: roughness of GGX, a number or a texture; the number 0 for a mirror.
 
-In RGB variants the table has linear sRGB under D65, in spectral ones the reflectance at each wavelength. Like
-the built-in `roughconductor` it reflects on the front side only; wrap it in `twosided` for open surfaces.
+`thickness` and `alpha` are differentiable. In RGB variants the table has linear sRGB under D65, in spectral
+ones the film at each wavelength, in monochromatic ones that at 550 nm; polarised variants get the Mueller
+matrices of its waves.
+
+A film on a transparent base transmits from both sides as the built-in `roughdielectric` does, with the same
+medium on both sides (a bubble) straight on. Others reflect on the front side only, as `roughconductor` does;
+wrap them in `twosided` for open surfaces.
 """
 
 from typing import Any
@@ -30,6 +35,8 @@ dr: Any = drjit
 mi: Any = mitsuba  # its types change with the variant
 
 NAME = "pellicle_film"
+GREEN = 550.0
+"""Wavelength (nm) of monochromatic variants."""
 
 
 def table_texture(table: np.ndarray) -> Any:
@@ -57,62 +64,156 @@ def _init(film: Any, props: Any) -> None:
     with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
         film.span = [float(x) for x in table["thickness"]]
         own = float(table["default_thickness"])
-        values = table["spectra" if mi.is_spectral else "rgb"]
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
-    film.shape = values.shape  # thicknesses, cosines, channels or wavelengths
-    film.texture = table_texture(values[..., None] if mi.is_spectral else values)
-    film.alpha = float(props.get("alpha", 0.1))
+        film.eta = float(table["eta"]) if "eta" in table else 0.0  # 0: it only reflects
+        film.tables = [_table(table, side) for side in ("", "_transmitted", "_below")[: 3 if film.eta else 1]]
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
-    film.thickness = props.get("thickness", own)
-    lobe = mi.BSDFFlags.GlossyReflection if film.alpha > 0 else mi.BSDFFlags.DeltaReflection
-    varies = 0 if isinstance(film.thickness, float) else mi.BSDFFlags.SpatiallyVarying
-    film.m_components = [lobe | mi.BSDFFlags.FrontSide | varies]
-    film.m_flags = film.m_components[0]
-    film.flag = lobe
+    film.thickness, film.alpha = (
+        mi.Float(x) if isinstance(x, float) else x
+        for x in (props.get("thickness", own), props.get("alpha", 0.1))
+    )
+    film.smooth = isinstance(film.alpha, type(mi.Float(0))) and bool(np.all(np.array(film.alpha) == 0))
+    film.straight = abs(film.eta - 1) < 1e-3
+    varies = any(isinstance(x, mi.Texture) for x in (film.thickness, film.alpha))
+    flags, own = mi.BSDFFlags, mi.BSDFFlags.SpatiallyVarying if varies else 0
+    sides = flags.FrontSide | flags.BackSide if film.eta else flags.FrontSide
+    film.reflects = flags.DeltaReflection if film.smooth else flags.GlossyReflection
+    through = flags.DeltaTransmission if film.smooth else flags.GlossyTransmission
+    film.transmits = flags.Null if film.straight else through
+    film.m_components = [film.reflects | sides | own]
+    if film.eta:
+        film.m_components.append(film.transmits | sides | own | (0 if film.straight else flags.NonSymmetric))
+    film.m_flags = film.m_components[0] | film.m_components[-1]
 
 
-def _reflectance(film: Any, si: Any, cosine: Any, active: Any) -> Any:
-    """Reflectance of the film at a cosine of the angle of incidence."""
+def _table(table: Any, side: str) -> Any:
+    """The texture of one side, and its shape: thicknesses, cosines, wavelengths, elements; or RGB."""
+    if mi.is_rgb:
+        values = table[f"rgb{side}"]
+    else:
+        values = table[f"spectra{side}"][..., None]
+        if mi.is_polarized:
+            if f"mueller{side}" not in table:
+                raise RuntimeError("this film has no waves of one phase, which polarised variants need")
+            values = np.concatenate([values, table[f"mueller{side}"]], axis=-1)
+    return table_texture(values), values.shape
+
+
+def _number(value: Any, si: Any, active: Any) -> Any:
+    return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
+
+
+def _elements(film: Any, side: int, si: Any, root: Any, active: Any) -> list[Any]:
+    """Elements of the film's Mueller matrix at a root of the cosine outside, a spectrum each.
+
+    Where light is not polarised it is m11 alone.
+    """
     nm = film.thickness
-    if not isinstance(nm, float):
+    if isinstance(nm, mi.Texture):
         nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
-    across = node(cosine, film.shape[1])
-    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), film.shape[0])
-    if not mi.is_spectral:
-        rgb = film.texture.eval(mi.Point2f(across, down), active)
-        return mi.Color3f(rgb[0], rgb[1], rgb[2])
+    texture, shape = film.tables[side]
+    across = node(root if side < 2 else 0.5 * (1 + root), shape[1])
+    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), shape[0])
+    if mi.is_rgb:
+        rgb = texture.eval(mi.Point2f(across, down), active)
+        return [mi.Color3f(rgb[0], rgb[1], rgb[2])]
     first, last = film.wavelength
-    value = dr.zeros(mi.UnpolarizedSpectrum)
-    for channel in range(len(value)):
-        share = (si.wavelengths[channel] - first) / (last - first)
-        at = mi.Point3f(node(share, film.shape[2]), across, down)
-        value[channel] = film.texture.eval(at, active)[0]
-    return value
+    values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(shape[3])]
+    for channel in range(len(values[0])):
+        share = ((si.wavelengths[channel] if mi.is_spectral else GREEN) - first) / (last - first)
+        found = texture.eval(mi.Point3f(node(share, shape[2]), across, down), active)
+        for value, element in zip(values, found, strict=True):
+            value[channel] = element
+    return values
 
 
-def _facets(film: Any) -> Any:
-    return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, film.alpha)
+def _light(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], list[Any]]:
+    """Elements of reflection and of transmission at a facet: `cosine` is negative for light from below."""
+    root = dr.sqrt(dr.abs(cosine))
+    if not film.eta:
+        reflected = _elements(film, 0, si, root, active)
+        return reflected, [dr.zeros(mi.UnpolarizedSpectrum)] * len(reflected)
+    below = cosine < 0
+    square = dr.select(below, 1 - film.eta**2 * (1 - cosine**2), 1)  # of the cosine outside
+    total = dr.safe_acos(-cosine * film.eta / max(film.eta**2 - 1, 1e-6) ** 0.5)
+    root = dr.select(below, dr.select(square > 0, dr.sqrt(dr.safe_sqrt(square)), -2 / dr.pi * total), root)
+    upper = _elements(film, 0, si, root, active & (cosine >= 0))
+    lower = _elements(film, 2, si, root, active & below)
+    passed = _elements(film, 1, si, dr.maximum(root, 0), active & (square > 0))
+    reflected = [dr.select(below, b, a) for a, b in zip(upper, lower, strict=True)]
+    return reflected, [dr.select(square > 0, t, 0) for t in passed]
+
+
+def _value(ctx: Any, wi: Any, wo: Any, normal: Any, elements: list[Any], weight: Any) -> Any:
+    """Elements times a weight: a spectrum, or a Mueller matrix between the bases of both directions."""
+    if len(elements) == 1:
+        return elements[0] * weight
+    a, b, c, s = (x * weight for x in elements)
+    zero = dr.zeros(mi.UnpolarizedSpectrum)
+    matrix = mi.Spectrum([[a, b, zero, zero], [b, a, zero, zero], [zero, zero, c, -s], [zero, zero, s, c]])
+    # Mitsuba counts time the other way, so m34 changes its sign
+    # light arrives along -source and leaves along seen
+    source, seen = (wo, wi) if ctx.mode == mi.TransportMode.Radiance else (wi, wo)
+    axes = [dr.cross(normal, x) for x in (-source, seen)]
+    axes = [dr.select(dr.squared_norm(x) < 1e-12, mi.Vector3f(1, 0, 0), dr.normalize(x)) for x in axes]
+    basis = mi.mueller.stokes_basis
+    return mi.mueller.rotate_mueller_basis(
+        *(matrix, -source, axes[0], basis(-source), seen, axes[1], basis(seen))
+    )
+
+
+def _facets(film: Any, si: Any, active: Any) -> Any:
+    return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, _number(film.alpha, si, active))
+
+
+def _chance(reflected: list[Any], passed: list[Any]) -> Any:
+    """Share of samples that are reflected."""
+    r, t = dr.mean(reflected[0]), dr.mean(passed[0])
+    return dr.select(t > 0, r / dr.maximum(r + t, 1e-9), 1)
 
 
 def _sample(film: Any, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
     bs = mi.BSDFSample3f()
     cosine = mi.Frame3f.cos_theta(si.wi)
-    active = active & (cosine > 0)
-    bs.eta = 1.0
-    bs.sampled_component = mi.UInt32(0)
-    bs.sampled_type = mi.UInt32(+film.flag)
-    if film.alpha == 0:
-        bs.wo = mi.reflect(si.wi)
-        bs.pdf = mi.Float(1.0)
-        return bs, _reflectance(film, si, cosine, active) & active
-    facets = _facets(film)
-    m, pdf = facets.sample(si.wi, sample2)
-    bs.wo = mi.reflect(si.wi, m)
-    active = active & (pdf > 0) & (mi.Frame3f.cos_theta(bs.wo) > 0)
-    bs.pdf = pdf / (4 * dr.dot(bs.wo, m))
-    weight = facets.smith_g1(bs.wo, m)
-    return bs, (_reflectance(film, si, dr.dot(si.wi, m), active) * weight) & active
+    active = active & ((cosine != 0) if film.eta else (cosine > 0))
+    facets: Any = None
+    normal, pdf, weight = mi.Normal3f(0, 0, 1), mi.Float(1), mi.Float(1)
+    flat: Any = _light(film, si, cosine, active) if film.smooth or film.straight else None
+    if not film.smooth:
+        facets = _facets(film, si, active)
+        normal, pdf = facets.sample(dr.mulsign(mi.Vector3f(si.wi), cosine), sample2)
+        active = active & (pdf > 0)
+    at = dr.dot(si.wi, normal)
+    reflected, passed = flat if film.smooth else _light(film, si, at, active)
+    if film.straight:
+        passed = flat[1]  # straight on, whatever the facet
+    chance = _chance(*(flat or (reflected, passed)))
+    mirrored = sample1 <= chance
+    bs.wo = mi.reflect(si.wi, normal)
+    bs.eta, through = mi.Float(1), -si.wi
+    turn, scale = 1 / (4 * dr.dot(bs.wo, normal)), mi.Float(1)
+    if film.eta and not film.straight:
+        _, cosine_t, eta_it, eta_ti = mi.fresnel(at, film.eta)
+        through = mi.refract(si.wi, normal, cosine_t, eta_ti)
+        bs.eta = dr.select(mirrored, 1, eta_it)
+        towards = dr.dot(through, normal)
+        turn = dr.select(mirrored, turn, eta_it**2 * towards / (at + eta_it * towards) ** 2)
+        if ctx.mode == mi.TransportMode.Radiance:
+            scale = dr.select(mirrored, 1, eta_ti**2)
+    bs.wo = dr.select(mirrored, bs.wo, through)
+    bs.sampled_component = dr.select(mirrored, mi.UInt32(0), mi.UInt32(1))
+    bs.sampled_type = dr.select(mirrored, mi.UInt32(+film.reflects), mi.UInt32(+film.transmits))
+    if facets is not None:
+        rough = mirrored | (not film.straight)
+        pdf = dr.select(rough, pdf * dr.abs(turn), 1)
+        weight = dr.select(rough, facets.smith_g1(bs.wo, normal), 1)
+    bs.pdf = pdf * dr.select(mirrored, chance, 1 - chance)
+    # a mirrored direction below the surface, and a transmitted one above it, carry no light
+    active = active & ((mi.Frame3f.cos_theta(bs.wo) * cosine > 0) == mirrored) & (bs.pdf > 0)
+    elements = [dr.select(mirrored, r, t) for r, t in zip(reflected, passed, strict=True)]
+    weight = weight * scale / dr.select(mirrored, chance, 1 - chance)
+    return bs, _value(ctx, si.wi, bs.wo, normal, elements, weight) & active
 
 
 def _eval(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
@@ -120,39 +221,46 @@ def _eval(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
 
 
 def _pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-    if film.alpha == 0:
-        return mi.Float(0.0)
-    cosine, active = _above(film, si, wo, active)
-    m = dr.normalize(si.wi + wo)
-    facets = _facets(film)
-    return dr.select(active, facets.eval(m) * facets.smith_g1(si.wi, m) / (4 * cosine), 0)
+    return _eval_pdf(film, ctx, si, wo, active)[1]
 
 
 def _eval_pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-    if film.alpha == 0:
-        return dr.zeros(mi.UnpolarizedSpectrum), mi.Float(0.0)
-    cosine, active = _above(film, si, wo, active)
-    m = dr.normalize(si.wi + wo)
-    facets = _facets(film)
-    density = facets.eval(m) / (4 * cosine)
-    shadowed, masked = facets.smith_g1(wo, m), facets.smith_g1(si.wi, m)
-    colour = _reflectance(film, si, dr.dot(si.wi, m), active)
-    value = colour * (density * shadowed * masked)
-    return value & active, dr.select(active, density * masked, 0)
-
-
-def _above(film: Any, si: Any, wo: Any, active: Any) -> Any:
-    cosine = mi.Frame3f.cos_theta(si.wi)
-    return cosine, active & (cosine > 0) & (mi.Frame3f.cos_theta(wo) > 0)
+    if film.smooth:
+        return dr.zeros(mi.Spectrum), mi.Float(0)
+    wi, cosine, leaving = si.wi, mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+    above, through = cosine * leaving > 0, bool(film.eta) and not film.straight
+    active = active & (cosine * leaving != 0) & (True if through else above)
+    eta = dr.select(cosine > 0, film.eta, 1 / film.eta) if through else mi.Float(1)
+    normal = dr.normalize(wi + wo * dr.select(above, 1, eta))
+    normal = dr.mulsign(normal, mi.Frame3f.cos_theta(normal))
+    at, towards = dr.dot(wi, normal), dr.dot(wo, normal)
+    active = active & (at * cosine > 0) & (towards * leaving > 0)
+    active = active & (True if film.eta else (cosine > 0))
+    facets = _facets(film, si, active)
+    light = _light(film, si, at, active)
+    chance = _chance(*(_light(film, si, cosine, active) if film.straight else light))
+    turn, seen = dr.abs(1 / (4 * towards)), dr.abs(1 / (4 * cosine))
+    if through:
+        jacobian = dr.abs(eta**2 * towards / (at + eta * towards) ** 2)
+        scale = eta**-2 if ctx.mode == mi.TransportMode.Radiance else 1
+        seen = dr.select(above, seen, jacobian * dr.abs(at / cosine) * scale)
+        turn = dr.select(above, turn, jacobian)
+    density, masked = facets.eval(normal), facets.smith_g1(wi, normal)
+    weight = density * masked * facets.smith_g1(wo, normal) * seen
+    elements = [dr.select(above, r, t) for r, t in zip(*light, strict=True)]
+    pdf = density * masked * dr.abs(at / cosine) * turn * dr.select(above, chance, 1 - chance)
+    return _value(ctx, wi, wo, normal, elements, weight) & active, dr.select(active, pdf, 0)
 
 
 def _traverse(film: Any, callback: Any) -> None:
-    if not isinstance(film.thickness, float):
-        callback.put("thickness", film.thickness, mi.ParamFlags.Differentiable)
+    for name in ("thickness", "alpha"):
+        value = getattr(film, name)
+        if isinstance(value, mi.Texture) or dr.is_jit_v(mi.Float):
+            callback.put(name, value, mi.ParamFlags.Differentiable)
 
 
 def _to_string(film: Any) -> str:
-    return f"{NAME}[alpha = {film.alpha:g}]"
+    return f"{NAME}[alpha = {film.alpha}, eta = {film.eta:g}]"
 
 
 def _film() -> Any:

@@ -18,7 +18,7 @@ from pellicle.colour.observers import Sensor, srgb_sensor
 from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.optics import coherent, response
-from pellicle.optics.interface import allow_tunnelling
+from pellicle.optics.interface import Inside, allow_tunnelling
 from pellicle.optics.pair import Number, to_complex
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert, start_values
@@ -56,19 +56,25 @@ class Spectra(NamedTuple):
 
 
 def stack(
-    scene: Scene, layer: str | None = None, *, observer: str = "1931", illuminant: str = "D65"
+    scene: Scene,
+    layer: str | None = None,
+    *,
+    observer: str = "1931",
+    illuminant: str = "D65",
+    eye: Sensor | None = None,
 ) -> Stack:
     """Return the media of a scene at the wavelengths of `BANDS`; free parameters take their start values.
 
     A back face of the substrate is left out: the substrate is the inside of the sphere.
 
-    **Arguments:** `layer`, `observer` and `illuminant` as for `interference_colours`.
+    **Arguments:** `layer`, `observer` and `illuminant` as for `interference_colours`; `eye` is a sensor in
+    place of the last two.
 
     **Raises:** UsageError for a plate or a mixed interface among the layers, and where a material has no data
     between 380 and 730 nm.
     """
     varied, bands = varied_layer(scene, layer), integration_bands(BANDS, observer, illuminant)
-    eye = Sensor(bands.wavelength, bands.weights)
+    eye = Sensor(bands.wavelength, bands.weights) if eye is None else eye
     fixed: Any = insert(scene, start_values(scene))
     if not all(x.repeats == 1 for x in fixed.layers if isinstance(x, Layer)):
         raise UsageError("a sphere has no groups of layers: list every layer")
@@ -85,7 +91,20 @@ def stack(
 
 def spectra(films: Stack, thickness: float | np.ndarray, cosine: np.ndarray) -> Spectra:
     """Compute spectra at thicknesses (nm) of the varied layer and cosines of incidence, which broadcast."""
-    points = np.broadcast_arrays(np.asarray(thickness, float), np.asarray(cosine, float))
+    return Spectra(*_batched(_spectra, films, thickness, cosine))
+
+
+def mueller_elements(films: Stack, thickness: float | np.ndarray, transverse: np.ndarray) -> np.ndarray:
+    """Mueller matrices of reflection and transmission (2, 4, ..., wavelengths): elements m11, m12, m33, m34.
+
+    `transverse` is n sin θ; Q > 0 is s. An isotropic film has m22 = m11, m21 = m12, m44 = m33, m43 = −m34.
+    """
+    return _batched(_mueller, films, thickness, transverse)
+
+
+def _batched(program: Any, films: Stack, thickness: float | np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """The program's arrays (kinds, elements, ..., wavelengths), computed in batches of films."""
+    points = np.broadcast_arrays(np.asarray(thickness, float), np.asarray(direction, float))
     rows = np.stack([each.ravel() for each in points])
     count = rows.shape[1]
     size = min(_BATCH, 1 << (count - 1).bit_length())  # powers of two: few programs
@@ -93,21 +112,42 @@ def spectra(films: Stack, thickness: float | np.ndarray, cosine: np.ndarray) -> 
     media = (films.ambient, films.layers, films.substrate, films.eye.wavelength)
     with jax.enable_x64(True):
         fixed = (media, films.thickness, films.varied)
-        whole = np.concatenate([_spectra(*fixed, *batch) for batch in rows.swapaxes(0, 1)], axis=2)
-    return Spectra(*whole[:, :, :count].reshape(3, 2, *points[0].shape, -1))
+        parts = [np.asarray(program(*fixed, *batch)) for batch in rows.swapaxes(0, 1)]
+    whole = np.concatenate(parts, axis=2)
+    return whole[:, :, :count].reshape(*whole.shape[:2], *points[0].shape, -1)
 
 
 @jax.jit
-def _spectra(media: Any, fixed: tuple[Any, ...], varied: Any, thickness: Any, cosine: Any) -> Any:
+def _spectra(media: Any, fixed: Any, varied: Any, thickness: Any, cosine: Any) -> Any:
     """Spectra (3, 2, films, wavelengths)."""
+    each = _responses(media, fixed, varied, thickness, jnp.arccos(cosine)[:, None])
+    quantities = (response.reflectance, response.transmittance, response.reflectance_below)
+    return jnp.stack([jnp.stack([quantity(one) for one in each]) for quantity in quantities])
+
+
+@jax.jit
+def _mueller(media: Any, fixed: Any, varied: Any, thickness: Any, transverse: Any) -> Any:
+    """Elements (2, 4, films, wavelengths) of reflection and transmission."""
+    s, p = _responses(media, fixed, varied, thickness, Inside(transverse[:, None]))
+    passed = [jnp.sqrt(jnp.maximum(x.flux * x.scale_square, 0.0)) for x in (s, p)]
+    kinds = []
+    for on_s, on_p in ((s.reflected, p.reflected), passed):
+        a, b = (to_complex(x) / to_complex(one.denominator) for x, one in ((on_s, s), (on_p, p)))
+        both, powers = a * jnp.conj(b), (jnp.abs(a) ** 2, jnp.abs(b) ** 2)
+        mean, half = 0.5 * (powers[0] + powers[1]), 0.5 * (powers[0] - powers[1])
+        kinds.append(jnp.stack([mean, half, both.real, both.imag]))
+    return jnp.stack(kinds)
+
+
+def _responses(
+    media: Any, fixed: tuple[Any, ...], varied: Any, thickness: Any, angle: Any
+) -> tuple[response.Response, ...]:
+    """Responses to s and p of films (films, wavelengths)."""
     ambient, layers, substrate, wavelength = media
     turns = 2 * jnp.pi / wavelength
     phases = [turns * jnp.where(varied == i, thickness, nm)[:, None] for i, nm in enumerate(fixed)]
-    angle = jnp.arccos(cosine)[:, None]
     inner = [allow_tunnelling(index) for index in layers]
-    each = coherent.responses(ambient, inner, allow_tunnelling(substrate), phases, angle)
-    quantities = (response.reflectance, response.transmittance, response.reflectance_below)
-    return jnp.stack([jnp.stack([quantity(one) for one in each]) for quantity in quantities])
+    return coherent.responses(ambient, inner, allow_tunnelling(substrate), phases, angle)
 
 
 def linear_srgb(films: Stack, spectrum: np.ndarray) -> np.ndarray:
