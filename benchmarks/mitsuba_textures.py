@@ -1,9 +1,14 @@
 """Recover the thickness of a film at every texel from three pictures, by Mitsuba's own gradients.
 
-Run `python benchmarks/mitsuba_textures.py` where Dr.Jit finds LLVM 16 or newer. A plate of steel has 10 to 58 nm
-of oxide (index 2.9 on 2.7 + 2.8i, α 0.1) under a white sky; three cameras see it at 20, 40 and 60 degrees, and
-their pictures get 1 % noise of white. Each texel starts at the even thickness that fits its pixels best, and
-Adam follows the gradient of the squared difference by the renderer. Beside it, `pl.map` of the first picture.
+Run `python benchmarks/mitsuba_textures.py` where Dr.Jit finds LLVM 16 or newer. A plate of steel has 10 to
+58 nm of oxide (index 2.9 on 2.7 + 2.8i, α 0.1) under a white sky; three cameras see it at 20, 40 and 60
+degrees, and their pictures get 1 % noise of white. Each texel starts at the even thickness that fits its
+pixels best, and Adam follows the gradient of the squared difference by the renderer. Beside it, `pl.map` of
+the first picture.
+
+    even thickness that fits best: within 5 nm 100.0 %, median 0.51 nm, 95 % below 1.02 nm
+    60 steps of Adam: within 5 nm 100.0 %, median 0.06 nm, 95 % below 0.20 nm
+    pl.map of the first picture: within 5 nm 99.4 %, median 0.12 nm, 95 % below 0.55 nm
 """
 
 from __future__ import annotations

@@ -66,7 +66,10 @@ def _init(film: Any, props: Any) -> None:
         own = float(table["default_thickness"])
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
         film.eta = float(table["eta"]) if "eta" in table else 0.0  # 0: it only reflects
-        film.tables = [_table(table, side) for side in ("", "_transmitted", "_below")[: 3 if film.eta else 1]]
+        values = _values(table, "")
+        if film.eta:
+            values = _both_sides(values, _values(table, "_transmitted"), _values(table, "_below"))
+    film.shape, film.table = values.shape, table_texture(values)
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
     film.thickness, film.alpha = (
@@ -87,42 +90,47 @@ def _init(film: Any, props: Any) -> None:
     film.m_flags = film.m_components[0] | film.m_components[-1]
 
 
-def _table(table: Any, side: str) -> Any:
-    """The texture of one side, and its shape: thicknesses, cosines, wavelengths, elements; or RGB."""
+def _values(table: Any, side: str) -> np.ndarray:
+    """Table of a side (thicknesses, cosines, wavelengths, elements), in RGB (thicknesses, cosines, 3)."""
     if mi.is_rgb:
-        values = table[f"rgb{side}"]
-    else:
-        values = table[f"spectra{side}"][..., None]
-        if mi.is_polarized:
-            if f"mueller{side}" not in table:
-                raise RuntimeError("this film has no waves of one phase, which polarised variants need")
-            values = np.concatenate([values, table[f"mueller{side}"]], axis=-1)
-    return table_texture(values), values.shape
+        return table[f"rgb{side}"]
+    values = table[f"spectra{side}"][..., None]
+    if not mi.is_polarized:
+        return values
+    if f"mueller{side}" not in table:
+        raise RuntimeError("this film has no waves of one phase, which polarised variants need")
+    return np.concatenate([values, table[f"mueller{side}"]], axis=-1)
+
+
+def _both_sides(reflected: np.ndarray, passed: np.ndarray, below: np.ndarray) -> np.ndarray:
+    """One table for one lookup: rows of light from above, then from below; transmission beside reflection."""
+    total = np.zeros_like(passed[:, 1:])  # all of which is reflected
+    lower = np.concatenate([below, np.concatenate([total, passed], axis=1)], axis=-1)
+    return np.concatenate([np.concatenate([reflected, passed], axis=-1), lower], axis=1)
 
 
 def _number(value: Any, si: Any, active: Any) -> Any:
     return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
 
 
-def _elements(film: Any, side: int, si: Any, root: Any, active: Any) -> list[Any]:
-    """Elements of the film's Mueller matrix at a root of the cosine outside, a spectrum each.
+def _elements(film: Any, si: Any, row: Any, active: Any) -> list[Any]:
+    """Elements of the film's Mueller matrices at a row of its table, a spectrum each.
 
-    Where light is not polarised it is m11 alone.
+    They are those of reflection, then of transmission; where light is not polarised m11 alone.
     """
     nm = film.thickness
     if isinstance(nm, mi.Texture):
         nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
-    texture, shape = film.tables[side]
-    across = node(root if side < 2 else 0.5 * (1 + root), shape[1])
-    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), shape[0])
+    across = (row + 0.5) / film.shape[1]
+    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), film.shape[0])
     if mi.is_rgb:
-        rgb = texture.eval(mi.Point2f(across, down), active)
-        return [mi.Color3f(rgb[0], rgb[1], rgb[2])]
+        rgb = film.table.eval(mi.Point2f(across, down), active)
+        return [mi.Color3f(*rgb[at : at + 3]) for at in range(0, film.shape[2], 3)]
     first, last = film.wavelength
-    values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(shape[3])]
+    values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(film.shape[3])]
     for channel in range(len(values[0])):
         share = ((si.wavelengths[channel] if mi.is_spectral else GREEN) - first) / (last - first)
-        found = texture.eval(mi.Point3f(node(share, shape[2]), across, down), active)
+        found = film.table.eval(mi.Point3f(node(share, film.shape[2]), across, down), active)
         for value, element in zip(values, found, strict=True):
             value[channel] = element
     return values
@@ -132,17 +140,16 @@ def _light(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], lis
     """Elements of reflection and of transmission at a facet: `cosine` is negative for light from below."""
     root = dr.sqrt(dr.abs(cosine))
     if not film.eta:
-        reflected = _elements(film, 0, si, root, active)
+        reflected = _elements(film, si, root * (film.shape[1] - 1), active)
         return reflected, [dr.zeros(mi.UnpolarizedSpectrum)] * len(reflected)
-    below = cosine < 0
-    square = dr.select(below, 1 - film.eta**2 * (1 - cosine**2), 1)  # of the cosine outside
+    last = film.shape[1] // 3  # the row of the normal from above, and of the critical angle among those below
+    square = 1 - film.eta**2 * (1 - cosine**2)  # of the cosine outside, for light from below
     total = dr.safe_acos(-cosine * film.eta / max(film.eta**2 - 1, 1e-6) ** 0.5)
-    root = dr.select(below, dr.select(square > 0, dr.sqrt(dr.safe_sqrt(square)), -2 / dr.pi * total), root)
-    upper = _elements(film, 0, si, root, active & (cosine >= 0))
-    lower = _elements(film, 2, si, root, active & below)
-    passed = _elements(film, 1, si, dr.maximum(root, 0), active & (square > 0))
-    reflected = [dr.select(below, b, a) for a, b in zip(upper, lower, strict=True)]
-    return reflected, [dr.select(square > 0, t, 0) for t in passed]
+    outside = dr.select(square > 0, dr.sqrt(dr.safe_sqrt(square)), -2 / dr.pi * total)
+    row = dr.select(cosine < 0, 2 * last + 1 + last * outside, last * root)
+    elements = _elements(film, si, row, active)
+    half = len(elements) // 2
+    return elements[:half], elements[half:]
 
 
 def _value(ctx: Any, wi: Any, wo: Any, normal: Any, elements: list[Any], weight: Any) -> Any:
