@@ -16,7 +16,7 @@ from pellicle.forward_model.plan import Row
 from pellicle.optics.gradient import Gradient, gauss_points, stack_response
 from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene, groups, is_graded, with_wavelength
-from pellicle.scene.free import free_leaves, insert, is_free, start_values
+from pellicle.scene.free import free_leaves, insert, is_free, remembered, start_values
 from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Layer
 
@@ -44,6 +44,12 @@ def gradient(scene: Scene) -> Row:
         return Row("gradient", False, "no layer is graded")
     if scene.light.wavelength is None:
         raise ValueError("the number of slices depends on the wavelengths: give the light its wavelengths")
+    return _measured(scene)
+
+
+@remembered
+def _measured(scene: Scene) -> Row:
+    """The row of a scene with a graded layer. The plan of one scene is asked for a dozen times."""
     few, many = _scenes(scene, _WAVELENGTHS, 0), _scenes(scene, _MORE_WAVELENGTHS, _INSIDE)
 
     @cache
