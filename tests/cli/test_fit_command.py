@@ -13,7 +13,8 @@ import pytest
 from pellicle.api import fits
 from pellicle.cli.flags import SceneFlags
 from pellicle.data.options import FileOptions
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
+from pellicle.scene.instrument import Drift
 
 RESULT_KEYS = {"schema", "data", "status", "verdict", "parameters", "rivals", "chi2_reduced", "rms"}
 RESULT_KEYS |= {"correlation", "budget", "plan", "warnings", "versions", "seconds"}
@@ -121,22 +122,33 @@ def test_a_recipe_gives_what_the_flags_give(pellicle, spectrum_file, scene, scen
     assert by_recipe == by_flags == named
 
 
-@pytest.mark.slow  # six fits; a scene of its own each
-def test_flags_reach_the_scene(pellicle, spectrum_file):
-    """Angle, polarisation, range, ambient: each changes what is simulated, or it would be a decoration."""
-    base = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "280:320", "--json")
+def test_flags_reach_the_scene(pellicle, spectrum_file, monkeypatch):
+    """Each changes what is fitted, or it would be a decoration; other tests fit such scenes."""
+    fitted = []
+
+    def fit(data, scene, **_):
+        fitted.append((data, scene))
+        raise DataError("fitted")
+
+    monkeypatch.setattr(fits, "fit", fit)
+    base = ("--layer", "1.46", "--substrate", "3.9+0.02j", "--thickness", "280:320")
     file = spectrum_file()
-    plain = pellicle("fit", file, *base).objects[0]["parameters"]["thickness"]["value"]
-    for flags in (("--angle", "30", "--polarisation", "s"), ("--ambient", "1.1"), ("--range", "410:750")):
-        (found,) = pellicle("fit", file, *base, *flags).objects
-        assert found["parameters"]["thickness"]["value"] != plain, flags
-    (plate,) = pellicle("fit", file, *base, "--back", "air", "--plate-mm", "0.5").objects
-    assert "The back face" in plate["verdict"]
-    freed = pellicle("fit", file, *base, "--free", "n=1.4:1.5", "--scale", "free", "--offset", "free")
-    p = freed.objects[0]["parameters"]
-    assert (p["n"]["lower"], p["n"]["upper"], p["n"]["free"]) == (1.4, 1.5, True)
-    assert p["instrument.scale"]["free"]
-    assert p["instrument.offset"]["free"]
+    oblique = "--angle", "30", "--polarisation", "s", "--ambient", "1.1", "--range", "410:750"
+    plate = "--back", "air", "--plate-mm", "0.5"
+    freed = "--free", "n=1.4:1.5", "--scale", "free", "--offset", "free"
+    for flags in ((), oblique, plate, freed):
+        pellicle("fit", file, *base, *flags, code=3)
+    (data, plain), (cut, tilted), (_, on_plate), (_, free) = fitted
+    assert (data.wavelength.min(), data.wavelength.max()) == (400, 796)
+    assert (cut.wavelength.min(), cut.wavelength.max()) == (412, 748)
+    assert (plain.light.angle, plain.light.polarisation, plain.ambient(500.0)) == (0, "unpolarised", 1)
+    assert (tilted.light.angle, tilted.light.polarisation, tilted.ambient.n) == (30, "s", 1.1)
+    back = on_plate.substrate.back
+    assert (plain.substrate.back, back(500.0), on_plate.substrate.plate_mm) == (None, 1, 0.5)
+    n, thickness = free.layers[0].material.n, free.layers[0].thickness
+    assert (n.lower, n.upper, thickness.lower, thickness.upper) == (1.4, 1.5, 280, 320)
+    assert (plain.instrument.scale, plain.instrument.offset) == (1, 0)
+    assert (type(free.instrument.scale), type(free.instrument.offset)) == (Drift, Drift)
 
 
 def test_outliers_hardly_count_with_a_robust_loss(pellicle, spectrum_file, scene, scene_recipe):
