@@ -250,3 +250,22 @@ def test_files_of_a_recipe_are_shown_in_turn_with_their_own_angles(tmp_path, wri
     session.answer("reset", {})
     assert state() == (files, 0, 0.0, 0.2)
     assert session.answer("scene", {})["layers"][1]["material"] == "SiO2"
+
+
+def test_counts_of_a_recipe_stay_counts_when_a_field_is_changed(tmp_path, write):
+    """The reference has no field: without it, the page could not read the file again."""
+    for name, level in (("film.csv", 9000.0), ("reference.csv", 20000.0)):
+        write(csv("wavelength_nm,counts", NM, np.full(128, level)), name)
+    recipe = (
+        '[data]\nfiles = ["film.csv"]\nsignal = "R"\nreference = "reference.csv"\nreference_material = "Si"\n'
+        '[scene]\nsubstrate = "Si"\n[[scene.layer]]\nmaterial = "SiO2"\nthickness = 100\n'
+    )
+    session = _session(str(write(recipe, "counts.toml")), SceneFlags(), LightFlags())
+    [before] = session.shown.spectra
+    middle = float(NM[64])
+    answer = session.answer("data", {"reading": {"signal": "R", "range": f"{NM[0]:g}:{middle:g}"}})
+    assert "error" not in answer
+    [after] = session.shown.spectra
+    assert after.wavelength.max() == pytest.approx(middle, abs=1e-4)
+    assert np.array_equal(after.values, before.values[: len(after)])
+    assert 'reference = "reference.csv"' in session.answer("recipe", {})["toml"]

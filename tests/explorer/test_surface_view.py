@@ -10,6 +10,8 @@ import pytest
 import pellicle as pl
 from pellicle.brdf.directions import direction
 from pellicle.brdf.models import model
+from pellicle.cli.explore import LightFlags, _session
+from pellicle.cli.flags import SceneFlags
 from pellicle.data.brdf_samples import write_brdf_samples
 from pellicle.explorer.session import Session
 
@@ -163,6 +165,29 @@ def test_noise_is_read_by_the_field_of_the_page(measured):
     assert answer["reading"] == {"noise": "2 %"}
     assert session.shown.spectra[0].relative == (0.02,) * 3
     assert [field["name"] for field in session.answer("scene", {})["fields"]] == ["columns", "noise"]
+
+
+def test_what_a_recipe_keeps_of_a_file_stays_when_a_field_is_changed(tmp_path):
+    (tmp_path / "steel.csv").write_text(csv(SAMPLES))
+    pl.write_recipe(
+        pl.Surface("microfacet-film", FILM), tmp_path / "steel.toml", files=[tmp_path / "steel.csv"]
+    )
+    path = tmp_path / "steel.toml"
+    path.write_text(path.read_text().replace("[data]", "[data]\nsamples = 300\nmax_theta = 70"))
+    session = _session(str(path), SceneFlags(), LightFlags())
+    kept = len(session.shown.spectra[0])
+    assert kept <= 300
+    assert "error" not in session.answer("data", {"reading": {"noise": "2 %"}})
+    samples = session.shown.spectra[0]
+    assert (len(samples), samples.relative) == (kept, (0.02,) * 3)
+    assert max(samples.theta_o.max(), samples.theta_i.max()) <= 70
+    toml = session.answer("recipe", {})["toml"]
+    assert all(line in toml for line in ("samples = 300", "max_theta = 70", 'noise = "2 %"'))
+    dropped = session.answer("data", {"name": "other.csv", "text": csv(SAMPLES)})
+    assert dropped["notes"][0] == "other.csv: BRDF, 1000 samples of R, G, B"
+    session.answer("reset", {})
+    session.answer("data", {"reading": {}})
+    assert (session.shown.spectra[0].path, len(session.shown.spectra[0])) == (samples.path, kept)
 
 
 def test_without_data_a_fit_is_refused(session):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -103,8 +103,14 @@ def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
     if isinstance(recipe, SurfaceRecipe):
         surface, reading = recipe.scene(), recipe.tables.data.model_dump(exclude_none=True)
         reading = {name: x for name, x in reading.items() if name not in ("files", "signal")}
-        read: Any = recipe.read
-        files = [RecipeFile(x, lambda: surface, reading, lambda x=x: [read(x)]) for x in recipe.files]
+        bare = recipe.with_data(columns=None, noise=None)  # those that the page has fields for
+
+        def samples(path: str) -> RecipeFile:
+            return RecipeFile(
+                path, lambda: surface, reading, lambda given: [bare.with_data(**given).read(path)]
+            )
+
+        files = [*map(samples, recipe.files)]
         about = {"spectra": _first(files), "reading": reading, "files": files}
         return Session(surface, Path(path).parent, title=title, **about)
     data = recipe.tables.data
@@ -120,7 +126,7 @@ def _session(path: str | None, flags: SceneFlags, light: LightFlags) -> Session:
 def _first(files: list[RecipeFile]) -> Sequence[Any]:
     """The data of the first file; none, with a line on stderr, where it cannot be read."""
     try:
-        return files[0].read() if files else []
+        return files[0].read(files[0].reading) if files else []
     except DataError as error:
         say(f"{error} (the explorer starts without data)")
         return []
@@ -136,5 +142,10 @@ def _file(path: str, recipe: FilmRecipe) -> RecipeFile:
     from pellicle.cli.reading import read
     from pellicle.explorer.shown import RecipeFile
 
-    options = FileOptions(**recipe.reading)
-    return RecipeFile(path, recipe.scene, _reading(recipe), lambda: read(path, options, recipe.scene()))
+    stated = _reading(recipe)
+    light = {name: x for name, x in recipe.reading.items() if name not in stated}
+
+    def data(reading: Mapping[str, Any]) -> Sequence[Any]:
+        return read(path, FileOptions.of({**light, **reading}), recipe.scene())
+
+    return RecipeFile(path, recipe.scene, stated, data)

@@ -281,4 +281,4 @@ def fitted_names(controls: Collection[Control], asked: Any) -> list[str]:
             raise UsageError(f"`free` must be a list of one or more of {', '.join(sorted(known))}")
         return list(asked)
     free = [control.name for control in controls if control.free is not None]
-    return free or [control.name for control in controls if control.path[-1].name == "thickness"]
+    return free or [control.name for control in controls if key_of(control.name) == "thickness"]

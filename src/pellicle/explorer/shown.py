@@ -37,7 +37,7 @@ class RecipeFile(NamedTuple):
     path: str
     scene: Callable[[], Scene | Surface]
     reading: Mapping[str, Any]
-    read: Callable[[], Sequence[Any]]
+    read: Callable[[Mapping[str, Any]], Sequence[Any]]
 
 
 class Shown:
@@ -66,7 +66,7 @@ class Shown:
         self.number = 0 if spectra else None  # of the file that is shown
         self._source: Mapping[str, Any] | Path | None = Path(spectra[0].path).resolve() if spectra else None
         self._light: Any = getattr(scene, "light", None)  # of the scene without data
-        self._first = self.view, self.spectra, reading, self._nm, self._light
+        self._first = self.view, self.spectra, reading, self._nm, self._light, self._source
         self.edited = False
         self.materials = MaterialFiles(folder)
         self._views: dict[tuple[Any, tuple[float, ...]], FilmView] = {}  # at other angles of incidence
@@ -83,7 +83,7 @@ class Shown:
         if type(number) is not int or number not in range(len(self.files)):
             raise UsageError(f"no file {number!r}: the recipe has {len(self.files)}")
         own = self.files[number]
-        scene, spectra = own.scene(), self._located(own.read())
+        scene, spectra = own.scene(), self._located(own.read(own.reading))
         light = getattr(scene, "light", None)
         if self.edited:
             scene = with_value(self.film().scene, LIGHT, light)
@@ -116,13 +116,22 @@ class Shown:
         if "name" in body or "file" in body or self._source is None:
             self._source, self.number = body, None
         reading = reading_fields.options_of(body.get("reading") or {})
+        own = None if self.number is None or not self.files else self.files[self.number]
+        if own is not None:  # what has no field stays, and the recipe knows how counts and colours are read
+            reading |= {name: x for name, x in own.reading.items() if name not in reading_fields.FIELDS}
         if isinstance(surface := view.scene, Surface):
             samples = measured(
-                self._source, self.folder, lambda path: [surface_samples(path, surface, **reading)]
+                self._source,
+                self.folder,
+                lambda path: [*own.read(reading)] if own else [surface_samples(path, surface, **reading)],
             )
             return self.take(self._view_of(surface, samples), samples, reading)
         signal = self._light.signal
-        spectra = measured(self._source, self.folder, lambda path: spectra_of(path, signal, reading))
+        spectra = measured(
+            self._source,
+            self.folder,
+            lambda path: [*own.read(reading)] if own else spectra_of(path, signal, reading),
+        )
         base = FilmView(self._unlit(view.scene), view.wavelength)
         if body.get("angles") is not None:
             base = base.at(asked_angles(body["angles"]))
@@ -138,7 +147,7 @@ class Shown:
 
     def reset(self, body: Mapping[str, Any]) -> dict[str, Any]:
         """Show what the session began with."""
-        view, spectra, reading, self._nm, self._light = self._first
+        view, spectra, reading, self._nm, self._light, self._source = self._first
         self.edited, self.number = False, 0 if spectra else None
         return self.take(view, spectra, reading)
 
