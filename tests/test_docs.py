@@ -74,6 +74,7 @@ SLOW = (
     "pellicle fit graded.csv --recipe docs/examples/graded.toml --out results/graded",
     "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
+    "pellicle fit full.csv --recipe docs/surfaces/figure_3_deviated.toml",
     "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel",  # sampling
     # draw more than one sphere of eight, and in full size
     *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
@@ -124,7 +125,8 @@ ELSEWHERE = (
     *each("python benchmarks/{}.py", "calibration posterior colour brdf_errors brdf_recovery"),
     # take minutes, for which a test has a few films or pixels: reference, colour, mapping, rendering, brdf
     *each("python benchmarks/{}.py", "published colour_inverse colour_series map_regions renderers"),
-    *each("python benchmarks/{}.py", "camera_colours multiple_scattering brdf_bands mitsuba_films"),
+    *each("python benchmarks/{}.py", "camera_colours brdf_bands mitsuba_films mitsuba_textures"),
+    "python benchmarks/multiple_scattering.py",
     "python benchmarks/sample_coverage.py",  # fits 120 times; fitting/film/test_samples.py: errors by noise
     "python benchmarks/series.py",  # fits for minutes; mapping/test_series.py: a few films
     "python benchmarks/shared_index.py",  # fits for minutes; fitting/film/test_samples.py: two samples

@@ -38,10 +38,14 @@ WHITE_PERCENTILE = 99.5
 """Percentile of the luminance that is shown as white: lamps are brighter than what they light."""
 
 
-def exposure(*renderings: Rendering, percentile: float = WHITE_PERCENTILE) -> float:
-    """Factor, of two digits, that shows this percentile of the spheres' luminance as white."""
-    luminance = np.concatenate([(p.linear @ LUMINANCE)[p.coverage > 0.5] for p in renderings])
-    white = np.percentile(luminance, percentile)
+def exposure(*renderings: Rendering, percentile: float = WHITE_PERCENTILE, coloured: bool = False) -> float:
+    """Factor, of two digits, that shows this percentile of the spheres' luminance as white.
+
+    `coloured`: of their largest channel, so that what is lit most keeps its colour.
+    """
+    seen = [p.linear.max(axis=-1) if coloured else p.linear @ LUMINANCE for p in renderings]
+    bright = [each[p.coverage > 0.5] for each, p in zip(seen, renderings, strict=True)]
+    white = np.percentile(np.concatenate(bright), percentile)
     return float(f"{1 / white:.2g}") if white > 0 else 1.0
 
 
@@ -107,7 +111,7 @@ def sphere(
     rendering = render(surface, ENVIRONMENTS[environment](light), size)
     with jax.enable_x64(True):
         lobes = {angle: in_plane(surface, angle, LEAVING) for angle in INCIDENCES}
-    factor = exposure(rendering)
+    factor = exposure(rendering, coloured=True)
     figure = new_figure(8.0, 5.0)
     grid = figure.add_gridspec(len(lobes), 2, width_ratios=[2.2, 1])
     axes = figure.add_subplot(grid[:, 0])

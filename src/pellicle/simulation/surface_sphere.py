@@ -260,11 +260,14 @@ class Relief(NamedTuple):
 
 
 def relief(normal: np.ndarray, axes: np.ndarray, rng: np.random.Generator) -> Relief:
-    """Return noise of a few bumps over the sphere, at normals (..., 3) with frames (..., 3, 3)."""
+    """Return noise of a few bumps over the sphere, at normals (..., 3) with frames (..., 3, 3).
+
+    All heights have the same share of the normals, so that no thickness is rare in a rendering.
+    """
     waves = rng.normal(0.0, 3.0, (WAVES, 3))
     phase = normal @ waves.T + rng.uniform(0, 2 * np.pi, WAVES)
     height, gradient = np.cos(phase).sum(-1), -np.sin(phase) @ waves
     along, beside = ((axes[:, row] * gradient).sum(-1) for row in (0, 1))
     slope = np.hypot(along, beside)
-    span = np.ptp(height)
-    return Relief((height - height.min()) / span, slope / slope.max(), np.rad2deg(np.arctan2(beside, along)))
+    even = np.argsort(np.argsort(height, axis=None)).reshape(height.shape) / max(height.size - 1, 1)
+    return Relief(even, slope / slope.max(), np.rad2deg(np.arctan2(beside, along)))

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from pellicle.fitting.brdf.summary import direction_warnings, evidence, number_warnings, weight_warnings
+from pellicle.brdf.models import MODELS
+from pellicle.fitting.brdf.summary import (
+    direction_warnings,
+    evidence,
+    model_warnings,
+    number_warnings,
+    weight_warnings,
+)
 from pellicle.fitting.result import Baseline, Estimate, Rival
 from pellicle.scene.free import Free
 from pellicle.scene.surface import Surface
@@ -116,3 +123,12 @@ def test_several_thicknesses_do_not_mean_that_there_is_no_layer():
     assert result.verdict == (
         "The samples do not determine the thickness of the layer: 500 nm fits as well as 300 nm (Δχ² 3.0)."
     )
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_misfit_names_models_until_there_is_none_left(name):
+    seen = []
+    while name not in seen and (found := model_warnings(Surface(name))):
+        seen.append(name)
+        [name] = [each for each in MODELS if f'"{each}"' in found[0]]
+    assert name == "clear-coat-film"

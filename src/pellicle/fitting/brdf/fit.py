@@ -178,8 +178,9 @@ def _warnings(
     """Warnings on weights, directions, numbers and what the data do not determine."""
     form, values = judged.best.ranked.problem.views[0].form, judged.best.ranked.values
     numbers = {k: np.asarray(x) for k, x in form.numbers(values, surface.fixed_numbers()).items()}
+    of_misfit = [*summary.weight_warnings(parameters), *summary.model_warnings(surface)]
     return [
-        *(summary.weight_warnings(parameters) if status is Status.MISFIT else ()),
+        *(of_misfit if status is Status.MISFIT else ()),
         *summary.direction_warnings(together(samples), surface),
         *summary.number_warnings(surface, parameters, numbers),
         *identifiability.bounded(parameters, ()),

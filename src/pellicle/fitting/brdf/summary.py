@@ -187,6 +187,26 @@ def weight_warnings(parameters: Mapping[str, Estimate]) -> list[str]:
     return [f"fixed: {listed}; {unless} {name} = {{ lower = 0, upper = 10 }}" for name in list(fixed)[:1]]
 
 
+_NEXT = {
+    "granier-heidrich": ("granier-heidrich-full", "has the layered diffuse part, too"),
+    "granier-heidrich-reciprocal": ("granier-heidrich-full", "has the layered diffuse part, too"),
+    "granier-heidrich-diffuse": ("granier-heidrich-full", "has both lobes, too"),
+    "granier-heidrich-full": ("microfacet-film", "has facets of one normal and a base that may absorb"),
+    "blinn-phong-film-published": ("blinn-phong-film", "has the right phase"),
+    "blinn-phong-film": ("microfacet-film", "has GGX facets and a base that may absorb"),
+    "microfacet-film": ("clear-coat-film", "has a second lobe, of a clear coat"),
+}
+"""The model to try after another that does not explain the samples, and what it has."""
+
+
+def model_warnings(surface: Surface) -> list[str]:
+    """A sentence on the model to try next, for a fit that does not explain the samples."""
+    if surface.model not in _NEXT:
+        return []
+    name, why = _NEXT[surface.model]
+    return [f'if {surface.model} does not explain the samples, try model = "{name}", which {why}']
+
+
 def number_warnings(
     surface: Surface, parameters: Mapping[str, Estimate], fitted: Mapping[str, Any]
 ) -> list[str]:
