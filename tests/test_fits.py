@@ -62,9 +62,11 @@ def test_changes_are_reported(script):
     assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 5.0", "n is new"]
 
 
+STUDIES = [recipe.parent.relative_to(FITS).as_posix() for recipe in sorted(FITS.glob("**/recipe.toml"))]
+
+
 @pytest.mark.slow  # two minutes
-def test_all_studies_are_reproduced(script, monkeypatch):
+@pytest.mark.parametrize("study", STUDIES)
+def test_every_study_is_reproduced(script, monkeypatch, study):
     monkeypatch.setenv("PELLICLE_CACHE", "off")
-    assert {script.name_of(study): script.rerun(study) for study in script.studies()} == {
-        script.name_of(study): [] for study in script.studies()
-    }
+    assert script.rerun(FITS / study) == []
