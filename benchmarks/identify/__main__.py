@@ -10,10 +10,14 @@ by simulating and fitting it. `--real` identifies measurements and files of othe
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+# small matrices: several threads of BLAS wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import decisions
 import nested

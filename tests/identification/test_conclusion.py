@@ -16,14 +16,14 @@ from pellicle.identification.signal_view import SignalView
 from pellicle.identification.structure import OXIDE, Material, Structure
 
 
-def weighed(films, ln_z, error=1.0, *, most=3000.0, adequate=True):
+def weighed(films, ln_z, error=1.0, *, most=3000.0, adequate=True, remaining=1.0):
     """Layers (name, thickness) with an error of each thickness; the lowest is `most` nm thick at most."""
     limits = [*[3000.0] * (len(films) - 1), most]
     structure = Structure(tuple(Material(name, own) for (name, _), own in zip(films, limits, strict=True)))
     x = np.array([depth for _, depth in films])
     errors, attempt = np.full(len(x), error), Attempt(structure, x, np.zeros(9), np.zeros((9, len(x))), 0.0)
     changes = (0.0,) * len(x)
-    return Weighed(attempt, x, errors, errors, changes, ln_z, 1.0, adequate, True, ("scale", 1.0), 1.0)
+    return Weighed(attempt, x, errors, errors, changes, ln_z, remaining, adequate, True, ("scale", 1.0), 1.0)
 
 
 def test_two_layers_of_unknown_thickness_stay_beside_those_that_are_known():
@@ -87,6 +87,10 @@ def test_two_layers_are_certain_only_where_all_that_are_left_are_these():
     assert doubt(tables, [best, weighed([("MgO", 60.0), ("PMMA", 119.0)], -1.0)]) == ""
     assert doubt(tables, [best, weighed([("MgO", 60.0), ("PMMA", 110.0)], -1.0)]) == SEVERAL
     assert doubt(tables, [best, weighed([("Ta2O5", 50.0), ("SiO2", 120.0)], -4.5)]) == SEVERAL
+    assert doubt(tables, [best._replace(remaining=1.4)]) == "its residuals are 1.4 times the noise"
+    assert doubt(of_constant_indices("R", MgO=1.73, SiO2=1.46), [best]).startswith("one spectrum of R or T")
+    one = [weighed([("MgO", 60.0), ("SiO2", 8.0)], 0.0, remaining=1.4)]
+    assert doubt(of_constant_indices("R", MgO=1.73, SiO2=1.46), one) == ""
 
 
 def test_the_thickness_of_one_film_covers_all_its_names():
