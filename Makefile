@@ -10,8 +10,11 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # Tests spend most of their time in compilation. These flags halve the compilation time, at the cost of run time.
 # Rounding may differ, so tests that count digits (EXACT) run without them.
-QUICK_COMPILE := XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \
-  --xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+# jaxlib 0.11 has one code generator, and ends the process for a flag that it does not know
+OLDER_CODE = $(shell $(BIN)/python -c "import jaxlib; \
+  print('--xla_cpu_use_fusion_emitters=false' * (jaxlib.version.__version_info__ < (0, 11)))")
+QUICK_COMPILE = XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true \
+  --xla_cpu_parallel_codegen_split_count=1 $(OLDER_CODE)"
 # both cores have tests, so a program is compiled by one thread; glibc keeps memory that a compilation returns
 ONE_THREAD := XLA_FLAGS=--xla_cpu_parallel_codegen_split_count=1
 KEEP_MEMORY := MALLOC_TRIM_THRESHOLD_=4000000000 MALLOC_MMAP_THRESHOLD_=4000000000 MALLOC_TOP_PAD_=67108864

@@ -19,6 +19,7 @@ from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import polarised, transmittances
 from pellicle.optics.ellipsometry import mueller_elements
 from pellicle.optics.pair import Pair, imag, real
+from pellicle.programs.cache import compiler_options
 from pellicle.signals.generalised import Generalised
 from pellicle.signals.waves import ratio_sums_of_mueller
 
@@ -26,11 +27,6 @@ TABLE = json.loads(Path(__file__).with_name("anisotropic.json").read_text(encodi
 CASES = TABLE["cases"]
 POINTS = np.array([case["at"] for case in CASES.values()])
 SLOW = pytest.mark.slow(reason="more programs of the films of test_values_and_reverse_mode")
-QUICKLY = {  # an eighth of the compilation time; no digit is lost here
-    "xla_backend_optimization_level": 0,
-    "xla_llvm_disable_expensive_passes": True,
-    "xla_cpu_use_fusion_emitters": False,
-}
 
 VALUE, SLOPE = 3e-12, 1e-10
 """Layers of 1 mm need these: 2e4 radians are rounded to 4e-12. All others are within 5e-13 and 1e-11."""
@@ -52,7 +48,8 @@ def computed(as_tensors, dtype):
         return jax.jvp(lambda *columns: outputs(as_tensors, *columns), columns, tangents)
 
     columns = tuple(jnp.asarray(column, dtype) for column in POINTS.T)
-    value_and_slope = jax.jit(both).lower(columns, columns).compile(QUICKLY)
+    # an eighth of the compilation time; no digit is lost here
+    value_and_slope = jax.jit(both).lower(columns, columns).compile(compiler_options("few"))
     slopes = []
     for i in range(len(columns)):
         tangents = tuple(jnp.full_like(column, i == j) for j, column in enumerate(columns))
@@ -73,7 +70,7 @@ WEIGHTS = np.linspace(1.0, 2.0, 10)
 
 def called(function, *arguments):
     """function(*arguments), compiled quickly."""
-    return jax.jit(function).lower(*arguments).compile(QUICKLY)(*arguments)
+    return jax.jit(function).lower(*arguments).compile(compiler_options("few"))(*arguments)
 
 
 def test_values_and_reverse_mode():

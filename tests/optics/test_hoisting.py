@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from pellicle.optics.hoisting import hoist, pointwise, stored
+from pellicle.optics.hoisting import hoist, pointwise, stored, stored_by_cpu
 from pellicle.optics.pair import Pair
 
 
@@ -37,15 +37,33 @@ def in_two_results(keep):
     return results
 
 
-@pytest.mark.parametrize(("use", "keep"), [(on_a_grid, hoist), (in_two_results, stored)])
-def test_kept_values_are_computed_once(use, keep):
+COLUMN, ROW = np.ones((200, 1)), np.ones((1, 50))
+
+
+def compiled(use, keep):
+    return jax.jit(use(keep)).lower(COLUMN, ROW).compile()
+
+
+def inlined(value, *_):
+    return value
+
+
+def test_hoisted_values_are_computed_once():
     """Only a value that is computed outside the loop of its uses takes memory of its own."""
-    column, x = np.ones((200, 1)), np.ones((1, 50))
+    plain, kept = (compiled(on_a_grid, keep).memory_analysis() for keep in (inlined, hoist))
+    assert plain.temp_size_in_bytes < ROW.nbytes <= kept.temp_size_in_bytes
 
-    def temporary_bytes(keep):
-        return jax.jit(use(keep)).lower(column, x).compile().memory_analysis().temp_size_in_bytes
 
-    assert temporary_bytes(lambda x, *_: x) < x.nbytes <= temporary_bytes(keep)
+def test_stored_values_are_computed_once():
+    """The code of 20 squares stands once, not in the loop of each result."""
+    plain, kept = (compiled(in_two_results, keep).as_text().count("multiply(") for keep in (inlined, stored))
+    assert (plain, kept) == (41, 21)
+
+
+def test_a_gpu_stores_nothing_that_is_cheap(monkeypatch):
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    numbers = [jnp.ones(3)]
+    assert stored_by_cpu(numbers) is numbers
 
 
 def test_values_used_at_few_points_are_not_hoisted():

@@ -27,7 +27,7 @@ from pellicle.optics.anisotropy import Index, Principal, mixes_polarisations, se
 from pellicle.optics.characteristic import matrix_elements, propagating_elements
 from pellicle.optics.film import film
 from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
-from pellicle.optics.hoisting import stored
+from pellicle.optics.hoisting import stored_by_cpu as stored
 from pellicle.optics.interface import (
     equal_media,
     incident_factor,

@@ -142,14 +142,13 @@ _CALLS = re.compile(r"custom_call @([\w.]+)")
 
 @lru_cache(maxsize=3)
 def compiler_options(calls: Calls) -> Options:
-    """Options of XLA for programs of so many calls; none for a GPU, or for an XLA that lacks them."""
-    if jax.default_backend() != "cpu" or not _OPTIONS[calls]:
-        return {}
-    try:
-        jax.jit(lambda: 0.0).lower().compile(compiler_options=_OPTIONS[calls])
-    except jax.errors.JaxRuntimeError:
-        return {}
-    return _OPTIONS[calls]
+    """Options of XLA for programs of so many calls: those that it knows, and none for a GPU."""
+    options: Options = {}
+    for name, value in _OPTIONS[calls].items() if jax.default_backend() == "cpu" else ():
+        with suppress(jax.errors.JaxRuntimeError):  # jaxlib 0.11 has one code generator
+            jax.jit(lambda: 0.0).lower().compile(compiler_options={name: value})
+            options[name] = value
+    return options
 
 
 def load(path: Path, key: bytes) -> Program | None:
