@@ -1,4 +1,4 @@
-"""The device of a benchmark: the flag --device, time on it, and the bandwidth of its memory.
+"""The device of a benchmark, time on it, and the bandwidth of its memory.
 
 Programs run asynchronously on a GPU, and many of them for less time than a call takes: `seconds` starts
 several calls, waits for the last one and measures the wall time.
@@ -6,7 +6,6 @@ several calls, waits for the last one and measures the wall time.
 
 from __future__ import annotations
 
-import argparse
 import statistics
 import sys
 import time
@@ -19,11 +18,6 @@ import jax.numpy as jnp
 COPIED_BYTES = {"cpu": 2**28, "gpu": 2**31}
 """Size of the array that is copied: far above the caches."""
 LEAST_SECONDS = 0.05
-
-
-def add_flag(parser: argparse.ArgumentParser) -> None:
-    """Add --device to the flags of a benchmark."""
-    parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu", help="where JAX computes (cpu)")
 
 
 def chosen(kind: str) -> Any:

@@ -5,10 +5,9 @@ Run `python benchmarks/film.py`. A point is one (wavelength, thickness) with unp
 the minimum for any film formula: one exponential, and one sine and cosine by the same polynomial, at
 every point, written to one array as large as pellicle's. Competitors take turns in each round; the
 table gives medians, and the median of each round's ratio to the floor of the same precision.
-Compilation is timed separately. A second table, the only one with `--device gpu`, has points per second
-of pellicle by wall time, beside the limit by the bandwidth of the device's memory. A third compares a Bragg
-mirror of 200 layers at 401 wavelengths with a film times 200, and with tmm, in turns. Packages take part if
-they are installed (`pip install tmm_fast tmmax tmm-faster`); slow ones compute fewer points.
+Compilation is timed separately. A second table compares a Bragg mirror of 200 layers at 401 wavelengths
+with a film times 200, and with tmm, in turns. Packages take part if they are installed (`pip install
+tmm_fast tmmax tmm-faster`); slow ones compute fewer points. `gpu.py` measures films on a GPU.
 """
 
 from __future__ import annotations
@@ -27,7 +26,6 @@ from typing import Any, NamedTuple
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-import device as on_device
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -242,59 +240,11 @@ def mirror_table(rounds: int) -> None:
         print(f"{name + ' × 200' * (name == 'film'):<32}{statistics.median(each) * 1e3:>10.3g}{ratio:>14.3g}")
 
 
-def device_table(device: Any, thicknesses: int) -> None:
-    """Points per second of pellicle on a device, beside the limit by the bandwidth of its memory.
-
-    The time is the wall time of queued calls; the limit is that of writing R and T of each point. The error
-    is the largest of R and T against the formula in float64 in NumPy, on a part of the thicknesses.
-    """
-    bandwidth = on_device.bandwidth(device)
-    print(f"{device.device_kind}, jax {jax.__version__}: a copy moves {bandwidth / 1e9:.0f} GB/s")
-    print(f"{'':<32}{'points per s':>14}{'limit':>12}{'share':>8}{'error':>10}")
-    for dtype in (np.float32, np.float64):
-        limit = bandwidth / (2 * np.dtype(dtype).itemsize)
-        for layer, kind in (
-            (TRANSPARENT, "transparent"),
-            (ABSORBING, "absorbing"),
-            (DISPERSING, "dispersing"),
-        ):
-            rate, error = _on(device, dtype, layer, thicknesses)
-            name = f"{np.dtype(dtype).name}, {kind}"
-            print(f"{name:<32}{rate:>14.3g}{limit:>12.3g}{rate / limit:>8.1%}{error:>10.1e}")
-
-
-def _on(device: Any, dtype: type, layer: complex | np.ndarray, thicknesses: int) -> tuple[float, float]:
-    """Points per second and the error of one film on a device."""
-    kind = np.result_type(dtype, np.complex64) if np.iscomplexobj(layer) else dtype
-    axes = WAVELENGTH[None, :], np.linspace(0.0, 1000.0, thicknesses)[:, None]
-    wavelength, thickness = (jax.device_put(axis.astype(dtype), device) for axis in axes)
-    index = jax.device_put(np.asarray(layer, kind), device)
-
-    @jax.jit
-    def both(wavelength: Any, thickness: Any, index: Any) -> Any:
-        media = index, dtype(SUBSTRATE)
-        return tuple(
-            f(wavelength, thickness, *media, angle=dtype(ANGLE)) for f in (pl.reflectance, pl.transmittance)
-        )
-
-    rate = thicknesses * WAVELENGTH.size / on_device.seconds(lambda: both(wavelength, thickness, index))
-    some = np.asarray(thickness[:: max(1, thicknesses // 1000)])
-    truth = numpy_airy(layer, np.asarray(wavelength, float), np.asarray(some, float))
-    found = both(wavelength, jax.device_put(some, device), index)
-    assert all(x.dtype == dtype for x in found), [x.dtype for x in found]
-    return rate, max(float(np.max(np.abs(np.asarray(a) - b))) for a, b in zip(found, truth, strict=True))
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=31)
-    parser.add_argument("--thicknesses", type=int, help="of 401 points each (1000; 100000 on a GPU)")
-    on_device.add_flag(parser)
+    parser.add_argument("--thicknesses", type=int, default=1000, help="of 401 points each (1000)")
     given = parser.parse_args()
-    where = on_device.chosen(given.device)
-    if given.device == "cpu":
-        main(given.rounds, given.thicknesses or 1000)
-        print()
-        mirror_table(given.rounds)
-        print()
-    device_table(where, given.thicknesses or (1000 if given.device == "cpu" else 100_000))
+    main(given.rounds, given.thicknesses)
+    print()
+    mirror_table(given.rounds)

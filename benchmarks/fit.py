@@ -17,8 +17,6 @@ right where its χ² is within 4 of the minimum reached from the true values; pr
 than 95 % of the files are struck out. The others return the best values, lmfit also their covariance.
 `pl.fit` also estimates the noise, and computes standard errors, limits by profile likelihood, rivals and the
 status.
-
-`--device gpu` has one table instead, of the search on a GPU: candidates of the scan, in points per second.
 """
 
 from __future__ import annotations
@@ -29,13 +27,12 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import device as on_device
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -184,32 +181,6 @@ def rows(case: Case, rounds: int) -> tuple[str, ...]:
     )
 
 
-def search(case: Case, device: Any) -> list[tuple[str, ...]]:
-    """Lines of the table of the search on a device: points per second of the deviances of many candidates."""
-    problem = make(measured(spectrum(case), case.scene))
-    [view] = problem.views
-    size = 2**22 // view.rows if device.platform != "cpu" else 4 * CANDIDATES
-    units = np.random.default_rng(1).uniform(0.1, 0.9, (size, len(problem.parameters)))
-    values = problem.seen_by(view, np.asarray(problem.values(units)))
-
-    def found(dtype: type, device: Any, values: np.ndarray) -> tuple[Callable[[], Any], np.ndarray]:
-        arrays, values = jax.tree_util.tree_map(
-            lambda x: jax.device_put(np.asarray(x, dtype), device), (view.arrays, values)
-        )
-        run = lambda: deviances(view.form, arrays, values).value  # noqa: E731
-        return run, np.asarray(run())
-
-    _, truth = found(np.float64, jax.devices("cpu")[0], values[:CANDIDATES])
-    lines = []
-    for dtype in (np.float32, np.float64):
-        with jax.enable_x64(dtype is np.float64):
-            run, answer = found(dtype, device, values)
-            rate = size * view.rows / on_device.seconds(run)
-        error = np.max(np.abs(answer[:CANDIDATES] / truth - 1))
-        lines.append((f"{case.name}, {np.dtype(dtype).name}", f"{rate:.3g}", f"{error:.1e}"))
-    return lines
-
-
 def whole_fits(chosen: list[str], files: int | None) -> None:
     """Print the tables of whole fits, of all cases or of those whose name contains a word of `chosen`."""
     from whole_fits import cases, comparison, tables
@@ -225,8 +196,8 @@ def whole_fits(chosen: list[str], files: int | None) -> None:
     table(*tables.ratios(found))
 
 
-def table(header: tuple[str, ...], lines: list[tuple[str, ...]]) -> None:
-    """Print a Markdown table."""
+def table(header: tuple[str, ...], lines: Iterable[tuple[str, ...]]) -> None:
+    """Print a Markdown table, each line when it comes."""
     print("| " + " | ".join(header) + " |")
     print("|" + "---|" * len(header))
     for line in lines:
@@ -241,14 +212,7 @@ def main() -> None:
     parser.add_argument("--no-evaluations", action="store_true", help="only the whole fits")
     parser.add_argument("--only", nargs="*", default=[], help="words in the names of the whole fits to time")
     parser.add_argument("--files", type=int, help="files of each whole fit (20; 119 of soap films)")
-    on_device.add_flag(parser)
     asked = parser.parse_args()
-    device = on_device.chosen(asked.device)
-    if asked.device == "gpu":
-        print(f"{device.device_kind}, jax {jax.__version__}\n")
-        header = "search", "points per s", "largest relative error of the deviance"
-        table(header, [line for case in CASES for line in search(case, device)])
-        return
     print(f"jax {jax.__version__}, Python {platform.python_version()}, {platform.machine()}, one thread\n")
     if not asked.no_evaluations:
         head = ("ns per point", "film function", "deviance", "x film", "residuals and Jacobian", "x deviance")
