@@ -14,6 +14,7 @@ from pellicle.identification.evidence import Weighed
 from pellicle.identification.growth import BARE, NOISE_LIKE, SIGNIFICANT, STRAINED, Growth, needed
 from pellicle.identification.hypothesis import TABLE_UNCERTAINTY, Hypothesis, SupposedLayer
 from pellicle.identification.problem import Problem
+from pellicle.identification.structure import OXIDE
 
 DECIDED = 5.0
 """Δ ln Z that excludes a hypothesis: odds of 150 to 1."""
@@ -76,7 +77,7 @@ def plausible(weighed: Sequence[Weighed]) -> list[Weighed]:
 def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
     """Reason for which the best of the structures that are left is not certain, empty for none."""
     best, alike = kept[0], one_film(problem, kept)
-    layered = len([depth for depth in _depths(best) if depth > BARE]) > 1
+    layered = sum(layer.most > OXIDE for layer in best.structure.layers) > 1
     share = 1.0 if layered else _SHARE
     if len(alike) < len(kept) and sum(_shares(alike, best)) < share * sum(_shares(kept, best)):
         return SEVERAL
