@@ -76,7 +76,7 @@ def test_slopes_are_those_of_finite_differences_by_tmm(drifts):
     order = [0, 2, 1] if drifts else [0, 1]
     with jax.enable_x64(True):
         fixed, simulate = tabulated(scene), build(exact(scene).static_key)
-        slope = jax.jacfwd(lambda v: simulate(insert(fixed, v)))([float(at[i]) for i in order])
+        slope = jax.jit(jax.jacfwd(lambda v: simulate(insert(fixed, v))))([float(at[i]) for i in order])
     for i, got in zip(order, slope, strict=True):
         step = np.eye(3)[i] * (1e-6 if i == 2 else 1e-4)
         expected = (by_other_code(at + step) - by_other_code(at - step)) / (2 * step[i])
