@@ -2,6 +2,7 @@
 
 import json
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -22,11 +23,11 @@ def looks():
     return {name: appearance(scene) for name, scene in (("oil", OIL), ("steel", STEEL))}
 
 
-def write(to, look, path):
+def write(to, look, path, nm=None):
     """Write a film as it is, without the seconds of solving for effective numbers."""
     formula = target(to).formula(look)
     solution = physical(formula, look)
-    target(to).write(path, Material(path.stem, look, Solved(formula, solution, solution, "physical")))
+    target(to).write(path, Material(path.stem, look, Solved(formula, solution, solution, "physical"), nm))
     return solution
 
 
@@ -91,6 +92,29 @@ def test_open_pbr_has_micrometres(folder, library, looks):
     np.testing.assert_allclose(value(node, "thin_film_thickness"), 0.4, rtol=1e-6)
     assert (value(node, "thin_film_weight"), value(node, "transmission_weight")) == (1, 1)
     np.testing.assert_allclose(value(node, "specular_ior"), 1.33, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("to", "inputs", "unit"),
+    [
+        (
+            "materialx",
+            {"film_conductor": "thinfilm_thickness", "film_standard_surface": "thin_film_thickness"},
+            1,
+        ),
+        ("openpbr", {"film_open_pbr": "thin_film_thickness"}, 1e-3),
+    ],
+)
+def test_an_uneven_film_takes_its_thickness_from_an_image(folder, library, to, inputs, unit):
+    nm = np.array([[20.0, 35.0], [60.0, 41.0]])
+    write(to, appearance(STEEL, np.unique(nm)), folder / f"uneven_{to}.mtlx", nm)
+    found = document(folder / f"uneven_{to}.mtlx", library)
+    for name, key in inputs.items():
+        node = found.getNode(name).getConnectedNode(key)
+        image = node.getConnectedNode("in")
+        shares = plt.imread(folder / value(image, "file"))
+        low, high = (value(node, each) for each in ("outlow", "outhigh"))
+        np.testing.assert_allclose(low + (high - low) * shares, nm * unit, atol=1e-3 * unit)
 
 
 def test_open_pbr_metal_has_two_colours(folder, library, looks):

@@ -223,7 +223,7 @@ def export(
     - `path`: file to write, which must not exist; a record in JSON is written beside it.
     - `numbers`: the set that the renderer draws, "effective" or "physical".
     - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left, or the path of
-      a `.npy` file or a grey image of them ("gltf").
+      a `.npy` file or a grey image of them; not for "usd".
     - `layer`: name of the layer whose thickness it is (the free one, or else the first).
 
     **Returns:** `Export`: the files, and `material` with both sets of numbers and their errors.

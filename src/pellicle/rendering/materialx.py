@@ -27,7 +27,7 @@ from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import ColourError, Formula, Key, Numbers, series
 from pellicle.rendering.formula import error as colour_error
-from pellicle.rendering.targets import Material, Target
+from pellicle.rendering.targets import Material, Target, write_grey_image
 
 XYZ_TO_RGB = np.array(
     [
@@ -185,7 +185,9 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     standard = document.addNode("standard_surface", "film_standard_surface", "surfaceshader")
     set_inputs(standard, standard_surface(material))
     add_material(document, standard, material, standard_surface_error(material), "_standard_surface")
-    return save(document, path)
+    inputs = {"thinfilm_thickness": bsdf, "thin_film_thickness": standard}
+    images = connect_map(document, path, material, inputs)
+    return (*save(document, path), *images)
 
 
 def new_document() -> Any:
@@ -225,6 +227,25 @@ def save(document: Any, path: Path) -> tuple[Path, ...]:
     with replacing(path) as temporary:
         _library().writeToXmlFile(document, str(temporary))
     return (path,)
+
+
+def connect_map(
+    document: Any, path: Path, material: Material, inputs: dict[str, Any], unit: float = 1.0
+) -> tuple[Path, ...]:
+    """Write the image of an uneven film, and connect it to inputs of nodes, in nm times `unit`."""
+    if material.thickness_map is None:
+        return ()
+    image = write_grey_image(path.with_name(f"{path.stem}_thickness.png"), material.thickness_map)
+    low, high = material.drawn.chosen.scale * unit * material.look.thickness[[0, -1]]
+    texture = document.addNode("image", "thickness_image", "float")
+    set_inputs(texture, {"file": ("filename", image.name), "vaddressmode": ("string", "clamp")})
+    range_of = document.addNode("remap", "thickness_of_image", "float")
+    range_of.setConnectedNode("in", texture)
+    set_inputs(range_of, _floats(outlow=low, outhigh=high))
+    for name, node in inputs.items():
+        node.removeInput(name)
+        node.setConnectedNode(name, range_of)
+    return (image,)
 
 
 def bsdf_of(material: Material) -> tuple[str, str, dict[str, tuple[str, Any]]]:
@@ -300,7 +321,8 @@ def write_open_pbr(path: Path, material: Material) -> tuple[Path, ...]:
     surface = document.addNode("open_pbr_surface", "film_open_pbr", "surfaceshader")
     set_inputs(surface, open_pbr(material))
     add_material(document, surface, material, material.drawn.chosen.error)
-    return save(document, path)
+    images = connect_map(document, path, material, {"thin_film_thickness": surface}, unit=1e-3)
+    return (*save(document, path), *images)
 
 
 def open_pbr(material: Material) -> dict[str, tuple[str, Any]]:
@@ -333,7 +355,7 @@ def _library() -> Any:
     return import_module("MaterialX")
 
 
-TARGET = Target("materialx", "MaterialX", (".mtlx",), ("MaterialX",), formula, write)
+TARGET = Target("materialx", "MaterialX", (".mtlx",), ("MaterialX",), formula, write, takes_map=True)
 OPEN_PBR = Target(
-    "openpbr", "OpenPBR", (".mtlx",), ("MaterialX",), partial(formula, metal=METAL), write_open_pbr
+    "openpbr", "OpenPBR", (".mtlx",), ("MaterialX",), partial(formula, metal=METAL), write_open_pbr, True
 )
