@@ -346,6 +346,16 @@ def test_whole_surfaces_are_what_mitsuba_evaluates(tmp_path, surface, median):
     assert np.median(np.abs(found - exact) / exact.max(axis=1, keepdims=True)) < median
 
 
+def test_a_table_of_another_version_is_refused(tmp_path):
+    np.savez(tmp_path / "old.npz", rgb=np.ones((2, 2, 3)), thickness=[0.0, 1.0])
+    mi.set_variant("scalar_rgb")
+    mitsuba_plugin.register()
+    with pytest.raises(
+        RuntimeError, match=r"old\.npz: is of another version of pellicle; export the film again"
+    ):
+        mi.load_dict({"type": "pellicle_film", "filename": str(tmp_path / "old.npz")})
+
+
 def test_surfaces_without_colour_are_refused(tmp_path):
     with pytest.raises(UsageError, match="has R, G and B: the surface has 1 wavelengths"):
         write_surface(tmp_path / "x.bsdf", pl.Surface("microfacet-film", wavelengths=(550.0,)))

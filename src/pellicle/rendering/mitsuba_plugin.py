@@ -62,10 +62,12 @@ def register() -> None:
 def _init(film: Any, props: Any) -> None:
     mi.BSDF.__init__(film, props)
     with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
+        if "eta" not in table:
+            raise ValueError(f"{props['filename']}: is of another version of pellicle; export the film again")
         film.span = [float(x) for x in table["thickness"]]
         own = float(table["default_thickness"])
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
-        film.eta = float(table["eta"]) if "eta" in table else 0.0  # 0: it only reflects
+        film.eta = float(table["eta"])  # 0: it only reflects
         values = _values(table, "")
         if film.eta:
             values = _both_sides(values, _values(table, "_transmitted"), _values(table, "_below"))
