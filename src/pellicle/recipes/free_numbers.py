@@ -122,6 +122,7 @@ def _free_shift(dispersion: AbstractDispersion) -> Free:
     low, high = getattr(dispersion, "wavelength_range", (380.0, 780.0))
     wavelength = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
     rises = wavelength[0] < wavelength[-1]
-    least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
+    with jax.enable_x64(True):  # the same bounds wherever the scene is built, as a recipe is checked by them
+        least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
     lowest = 1.0 - least if least >= 1 else -0.9 * least
     return Free(max(-0.5, lowest), 0.5, start=0.0, limits=(lowest, 2.0))
