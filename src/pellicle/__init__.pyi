@@ -11,6 +11,7 @@ from pellicle.api.maps import series as series
 from pellicle.api.plans import cost as cost
 from pellicle.api.plans import plan as plan
 from pellicle.api.plans import plan_measurement as plan_measurement
+from pellicle.api.recipe_fits import read_problems as read_problems
 from pellicle.api.simulations import depth_profile as depth_profile
 from pellicle.api.simulations import explore as explore
 from pellicle.api.simulations import export as export

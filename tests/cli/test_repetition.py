@@ -1,5 +1,7 @@
-"""Command and recipe that repeat a fit: the same data and the same scene, whichever option was given."""
+"""Command, program and recipe that repeat a fit: the same data and scene, whichever option was given."""
 
+import html
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -7,9 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import pellicle as pl
+from pellicle.api.recipe_fits import Inputs, measurement
 from pellicle.cli import app
 from pellicle.cli.flags import SamplerFlags, SceneFlags
-from pellicle.cli.inputs import Inputs, inputs
+from pellicle.cli.inputs import inputs
 from pellicle.data.fingerprint import fingerprint
 from pellicle.data.options import FileOptions, FitOptions
 from pellicle.fitting.result import Fit, Part
@@ -121,8 +125,21 @@ def parsed(command: str) -> Inputs:
 
 def told(made: Inputs) -> str:
     """Hash of data, scenes and settings of the fits of a command."""
-    read = [(one.read(), one.scene) for one in made.files]
-    return fingerprint([data for data, _ in read], [scene for _, scene in read], made.loss, made.tolerance)
+    fits = [measurement(files, made.joint) for files in made.groups]
+    return fingerprint(fits, made.loss, made.tolerance, made.residual)
+
+
+def executed(program: str, monkeypatch) -> str:
+    """Hash of data, scenes and settings of the fits of a program."""
+    fits, settings = [], []
+
+    def seen(data, scene, *, loss="least-squares", tolerance=0.0, residual=None):
+        fits.append((data, scene))
+        settings[:] = loss, tolerance, residual
+
+    monkeypatch.setattr(pl, "fit", seen, raising=False)
+    exec(program, {})
+    return fingerprint(fits, *settings)
 
 
 def test_every_option_has_a_case():
@@ -131,14 +148,20 @@ def test_every_option_has_a_case():
 
 
 @pytest.mark.parametrize("option", OPTIONS)
-def test_command_and_recipe_keep_an_option(option, folder):
+def test_command_program_and_recipe_keep_an_option(option, folder, monkeypatch):
     command, value = OPTIONS[option]
     flag = f"--{option.replace('_', '-')}"
     made = parsed(f"fit {command} {flag}" + (f" {shlex.quote(value)}" if value else ""))
     [first] = made.groups[0]
     part, shown = object.__new__(Part), object.__new__(Fit)  # of a fit only the paths count
     vars(part)["data"], vars(shown)["parts"] = first.read()[0], (part,)
-    (_, again), (_, recipe) = repetition(shown, made.described, lambda where: made.recipe([first], where))
+    saved = Path("out") / "recipe.toml"
+    saved.parent.mkdir()
+    saved.write_text(made.recipe([first], saved.parent), "utf-8")
+    (_, again), (_, program), (_, recipe) = repetition(
+        shown, made.described, lambda where: made.recipe([first], where), saved
+    )
+    assert executed(program, monkeypatch) == told(made)
     assert told(parsed(again.removeprefix("pellicle "))) == told(made)
     (folder / "again.toml").write_text(recipe, "utf-8")
     assert told(parsed("fit --recipe again.toml")) == told(made)
@@ -149,12 +172,36 @@ def test_command_and_recipe_keep_an_option(option, folder):
     assert without != told(made)
 
 
-def test_a_posterior_is_repeated_by_its_own_command(folder):
-    made = parsed(f"fit {FILM}")
+def test_a_posterior_is_repeated_by_its_own_command_and_program(folder, monkeypatch):
+    made = parsed(f"fit {FILM} --tolerance 0.01")
     part, shown = object.__new__(Part), object.__new__(Fit)
     vars(part)["data"], vars(shown)["parts"] = made.files[0].read()[0], (part,)
     sampler = {"walkers": 40, "seed": 7}
-    [(_, again), *_] = repetition(shown, {**made.described, "sampler": sampler}, lambda where: "")
+    saved = Path("recipe.toml")
+    saved.write_text(made.recipe(made.files, Path()), "utf-8")
+    described = {**made.described, "sampler": sampler}
+    (_, again), (_, program), _ = repetition(shown, described, lambda where: "", saved)
     command, bound, _ = app.parse_args(shlex.split(again)[1:], print_error=False, exit_on_error=False)
     assert command.__name__ == "sample"
     assert bound.arguments["chain"] == SamplerFlags(walkers=40, seed=7)
+    sampled = []
+    monkeypatch.setattr(pl, "sample", lambda *given, **flags: sampled.append((given, flags)), raising=False)
+    exec(program, {})
+    [((data, scene), flags)] = sampled
+    assert fingerprint(data, scene) == fingerprint(*measurement(made.files, made.joint))
+    assert flags == {"tolerance": 0.01} | sampler
+
+
+@pytest.mark.parametrize("joint", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_program_in_a_report_gives_the_numbers_of_the_command(joint, pellicle, spectrum_file, tmp_path):
+    files = [spectrum_file(f"{name}.csv", seed=seed) for seed, name in enumerate("ab"[: 1 + joint])]
+    how = "--layer SiO2 --substrate 3.9+0.02j --thickness 100:600 --free n --uncertainty none"
+    how += " --loss huber --noise 0.003 --range 450:750 --json" + " --joint" * joint
+    [found] = pellicle("fit", *files, *shlex.split(how), "--out", tmp_path / "out").objects
+    page = html.unescape((tmp_path / "out" / "report.html").read_text("utf-8"))
+    [program] = re.findall(r"import pellicle as pl.*?print\(fit\)", page, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(program, names)
+    free = {p.name: (p.value, p.stderr) for p in names["fit"].parameters.values() if p.free}
+    assert len(free) == 2
+    assert free == {name: (p["value"], p["stderr"]) for name, p in found["parameters"].items() if p["free"]}

@@ -203,6 +203,26 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     assert answer["commands"]["toml"] == "Run it: pellicle fit recipe.toml, saved beside film.csv"
 
 
+def test_the_program_of_the_explorer_fits_as_it_does(session, monkeypatch, capsys):
+    """With every option of reading and of the fit, and with the free numbers of the page."""
+    film = pl.simulate(pl.Scene(pl.Layer("SiO2", 300.0), "Si"), NM, noise=0.002, seed=1)
+    (session.folder / "film.csv").write_text(csv("wavelength_nm,R_percent", NM, 100 * film.values))
+    reading = {"range": "450:750", "noise": "0.4 %", "signal_unit": "percent"}
+    session.answer("data", {"file": "film.csv", "reading": reading})
+    session.shown.reading = {**session.shown.reading, "loss": "huber", "tolerance": 1e-3}
+    body = {"values": {"thickness": 320.0, "roughness": 1.0}, "free": ["thickness"]}
+    found = session.answer("fit", body)
+    answer = session.answer("recipe", body)
+    assert answer["commands"]["python"] == "Run it: python film.py, saved beside recipe.toml"
+    (session.folder / "recipe.toml").write_text(answer["toml"])
+    monkeypatch.chdir(session.folder)
+    names: dict = {}
+    exec(answer["python"], names)
+    assert names["options"] == {"loss": "huber", "tolerance": 1e-3}
+    assert names["fit"]["thickness"].value == found["values"]["thickness"]
+    assert "thickness" in capsys.readouterr().out
+
+
 def test_a_film_is_identified_and_shown(session):
     """The scene has an oxide, and the data are of titania."""
     assert session.answer("identify", {})["error"].startswith("there are no data to identify")

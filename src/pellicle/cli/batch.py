@@ -14,8 +14,8 @@ from logging import INFO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pellicle.api.recipe_fits import LEAST_SQUARES, Input, Inputs, measurement
 from pellicle.cli.flags import SamplerFlags
-from pellicle.cli.inputs import LEAST_SQUARES, Input, Inputs
 from pellicle.cli.messages import (
     LOG,
     Progress,
@@ -40,13 +40,9 @@ from pellicle.cli.session import (
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
-    from pellicle.data.brdf_samples import BrdfSamples
-    from pellicle.data.spectrum import Spectrum
     from pellicle.fitting.repeated_measurements import Repeats
     from pellicle.fitting.result import Fit
     from pellicle.sampling.result import Posterior
-    from pellicle.scene.film import Scene
-    from pellicle.scene.surface import Surface
 
 JOURNAL_MM = 86.0
 """Width of a column of most journals of physics."""
@@ -192,8 +188,8 @@ class Batch:
 
         paths, identity = [file.path for file in files], ""
         try:
-            notes = not (self.brief and (self.later or self.records))
-            data, scene = measurement(files, self.inputs.joint, notes)
+            said = None if self.brief and (self.later or self.records) else say
+            data, scene = measurement(files, self.inputs.joint, said)
             if folder is not None:
                 settings = self.inputs.tolerance, self.inputs.loss, self.inputs.residual, self.sampler
                 identity = fingerprint(data, scene, settings)
@@ -282,34 +278,6 @@ def _captured(task: tuple[Batch, Path | None]) -> tuple[int, Batch, str, str]:
     with redirect_stdout(out), redirect_stderr(err), log_to_stderr() if batch.verbose else nullcontext():
         code = batch._fit(batch.inputs.files, folder)
     return code, replace(batch, inputs=Inputs([], False)), out.getvalue(), err.getvalue()
-
-
-def measurement(
-    files: list[Input], joint: bool, notes: bool = True
-) -> tuple[Spectrum | BrdfSamples | list[Any], Scene | Surface | list[Scene]]:
-    """Read files: data and scene as `pellicle.fit` takes them, lists in a joint fit.
-
-    The notes of the readers go to stderr, unless `notes` is false.
-    """
-    from pellicle.data.spectrum import Spectrum
-    from pellicle.fitting.film.problem import without_scale
-    from pellicle.scene.film import Scene
-    from pellicle.scene.surface import Surface
-
-    data, scenes = [], []
-    for file in files:
-        spectra = file.read()
-        for values in spectra:
-            say(*(f"{file.path}: {note}" for note in values.notes if notes))
-            shared = len(files) + len(spectra) > 2 and not file.own_scale
-            scene = file.scene
-            if shared and isinstance(values, Spectrum) and isinstance(scene, Scene):
-                scene = without_scale(scene, values)
-            data.append(values)
-            scenes.append(scene)
-    if not joint and len(data) == 1:
-        return data[0], scenes[0]
-    return data, scenes[0] if isinstance(scenes[0], Surface) else scenes
 
 
 def written(write: Callable[[], object], done: str = "", failed: str | None = "") -> int:

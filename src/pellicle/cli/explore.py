@@ -139,7 +139,7 @@ def _reading(recipe: FilmRecipe) -> dict[str, Any]:
 
 def _file(path: str, recipe: FilmRecipe) -> RecipeFile:
     """One of the files of a recipe, by the recipe of this file."""
-    from pellicle.cli.reading import read
+    from pellicle.api.data_files import read
     from pellicle.explorer.shown import RecipeFile
 
     stated = _reading(recipe)

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.batch import Batch, measurement, written
+from pellicle.api.recipe_fits import LEAST_SQUARES, Inputs, measurement
+from pellicle.cli.batch import Batch, written
 from pellicle.cli.flags import (
     OUTPUT,
     SAMPLER,
@@ -20,8 +21,8 @@ from pellicle.cli.flags import (
     flag,
     switch,
 )
-from pellicle.cli.inputs import LEAST_SQUARES, Inputs, inputs
-from pellicle.cli.messages import Progress, show, with_flags
+from pellicle.cli.inputs import inputs
+from pellicle.cli.messages import Progress, say, show, with_flags
 from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
 from pellicle.errors import DataError, UsageError
 
@@ -121,7 +122,8 @@ def _compare(
     def fitted_by(name: str, explained: bool) -> Any:
         log.info("comparison: now %s", name)
         files, residual = candidates[name].groups[position], candidates[name].residual
-        data, scene = measurement(files, len(files) > 1, notes=name == first and not explained)
+        said = say if name == first and not explained else None
+        data, scene = measurement(files, len(files) > 1, said)
         with Progress(f"{label}, {name}") as progress:
             options = {"residual": residual, "progress": progress, "explained": explained}
             return with_flags(fitted(data, scene, **options))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field, make_dataclass
 from math import inf
 from pathlib import Path
@@ -18,6 +18,7 @@ from pellicle.data.options import (
     Option,
     Options,
     length_range,
+    named,
     parse_signal,
 )
 from pellicle.errors import UsageError
@@ -48,11 +49,6 @@ def flag(group: Group, help: str | None = None, **how: Any) -> Parameter:
 def switch(group: Group, help: str | None = None, **how: Any) -> Parameter:
     """A flag without a --no- form, such as one without a value."""
     return flag(group, help, negative="", **how)
-
-
-def named(names: Iterable[str]) -> list[str]:
-    """The flags of arguments: `plate_mm` is --plate-mm."""
-    return [f"--{name.replace('_', '-')}" for name in names]
 
 
 class Flags:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from pellicle.api.data_files import check_words, is_of_colours, read
 from pellicle.cli.batch import written
 from pellicle.cli.flags import OUTPUT, SCENE, FileFlags, flag, switch
 from pellicle.cli.messages import Progress, show
-from pellicle.cli.reading import check_words, is_of_colours, read
 from pellicle.cli.session import GOOD, UNCLEAR, check_folder, error_message, reported, start
 from pellicle.data.options import CONDITIONS, FileOptions, parse_number
 from pellicle.errors import UsageError

@@ -1,117 +1,34 @@
-"""Data files of a command, each with the scene or surface that is fitted to it."""
+"""Data files of a command, by a recipe or by flags, with the scene or surface that is fitted to them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from glob import glob
-from logging import getLogger
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags, light, named
-from pellicle.cli.messages import say
-from pellicle.cli.reading import (
-    check_camera,
-    check_words,
-    is_of_colours,
-    of_kind,
-    read,
-    read_films,
-    refuse_camera,
+from pellicle.api.data_files import check_camera
+from pellicle.api.recipe_fits import (
+    Input,
+    Inputs,
+    check_film,
+    film_inputs,
+    of_recipe,
+    without_light,
 )
-from pellicle.data.options import BRDF, FileOptions, FitOptions
+from pellicle.cli.flags import FileFlags, FitFlags, SceneFlags
+from pellicle.cli.messages import say
+from pellicle.data.options import FileOptions, FitOptions
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from pellicle.data.brdf_samples import BrdfSamples
-    from pellicle.data.colours import Colours
     from pellicle.data.spectrum import Spectrum
-    from pellicle.recipes.read import FilmRecipe, SurfaceRecipe
-    from pellicle.scene.film import Scene
-    from pellicle.scene.surface import Surface
 
-log = getLogger(__name__)
-
-LEAST_SQUARES = "least-squares"
 _NO_DATA = {".toml", ".md", ".pdf", ".svg", ".html", ".json", ".ipynb", ".py", ".docx", ".log"}
 """Suffixes of files beside data in a folder, which are left out."""
-
-
-class Input(NamedTuple):
-    """A data file, the function that reads it, and the scene or surface that is fitted to it.
-
-    Several spectra of one film in one file are fitted together; films of a file of colours one by one.
-    `own_scale` is true where the recipe gives this file a scale or an offset of its own. `file` is the path
-    without the `name` of one of several spectra or films in it; empty for a sweep, which no recipe can name.
-    """
-
-    path: str
-    read: Callable[[], list[Spectrum] | list[Colours] | list[BrdfSamples]]
-    scene: Scene | Surface
-    own_scale: bool = False
-    file: str = ""
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Data files, fitted together (`joint`) or one by one, and the options of their fits.
-
-    `repeats` is true where the files are repeated measurements of one spot. `described` is what the scene was
-    built from, for the record: the recipe, or the flags. `written` are the options of a recipe that repeats
-    the fits; `base` is its scene and `tables` are those of its `[[data.file]]`, where the recipe has them;
-    `samples` returns the text of a recipe of several samples with these options in a folder.
-    """
-
-    files: list[Input]
-    joint: bool
-    fitting: FitOptions = field(default_factory=FitOptions)
-    residual: str | None = None
-    repeats: bool = False
-    described: dict[str, Any] | None = None
-    written: dict[str, Any] = field(default_factory=dict)
-    base: Scene | None = None
-    tables: list[dict[str, Any]] = field(default_factory=list)
-    samples: Callable[[dict[str, Any], Path], str] | None = None
-
-    @property
-    def loss(self) -> str:
-        """Loss of the fits."""
-        return self.fitting.loss or LEAST_SQUARES
-
-    @property
-    def tolerance(self) -> float:
-        """Largest error of the effects that the fits leave out."""
-        return self.fitting.tolerance or 0.0
-
-    @property
-    def groups(self) -> list[list[Input]]:
-        """Files of each fit."""
-        return [self.files] if self.joint else [[file] for file in self.files]
-
-    def recipe(self, files: list[Input], folder: Path) -> str:
-        """Text of a recipe in `folder` that repeats the fit of a group. Raises UsageError where none can."""
-        from pellicle.recipes.write import recipe_text
-
-        if self.samples is not None:
-            return self.samples(self.fitting.given(), folder)
-        if not all(file.file for file in files):
-            raise UsageError("a recipe cannot name one of several sweeps")
-        paths = list(dict.fromkeys(file.file for file in files))
-        options = self.written | ({"joint": True} if self.joint else {})
-        if isinstance(noise := options.get("noise"), str) and "%" not in noise:
-            sigma = getattr(files[0].read()[0], "sigma", None)
-            if sigma is not None and (sigma == float(noise)).all():  # not in the unit of a file in percent
-                options["noise"] = float(noise)
-        if not self.joint and files[0].name:
-            options["spectrum"] = files[0].name
-        if self.base is None:
-            return recipe_text(files[0].scene, folder, files=paths, reading=options)
-        tables = [table for table in self.tables if table["path"] in paths]
-        return recipe_text(self.base, folder, reading=options, tables=tables)
 
 
 def inputs(
@@ -138,16 +55,10 @@ def inputs(
         result = _by_flags(files, scene_flags, reading)
         described: dict[str, Any] = {"flags": {n: x for n, x in vars(scene_flags).items() if x is not None}}
     else:
-        from pellicle.recipes.read import SurfaceRecipe, read_recipe
-
-        table = read_recipe(recipe)
         if scene_flags.given():
             flags = ", ".join(scene_flags.given())
             raise UsageError(f"{flags} and --recipe exclude each other: describe the scene in the recipe")
-        if isinstance(table, SurfaceRecipe):
-            result = _by_surface_recipe(files, table, reading)
-        else:
-            result = _by_film_recipe(files, table, reading)
+        result = of_recipe(files, recipe, reading)
         described = {"recipe": recipe}
     described |= {"reading": how} if (how := reading.given() | fitting.given()) else {}
     options = FitOptions(**result.fitting.given() | fitting.given())
@@ -210,7 +121,7 @@ def _sweep(read_file: Callable[[], Any], number: int) -> list[Spectrum]:
 def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -> Inputs:
     from pellicle.scene.free import check_free_count, free_leaves
 
-    _check_film(reading)
+    check_film(reading)
     if not files:
         raise UsageError(
             "no data: name the file, as in pellicle fit oxide.csv --layer SiO2 --substrate Si, or give a"
@@ -221,113 +132,5 @@ def _by_flags(files: list[str], scene_flags: SceneFlags, reading: FileOptions) -
         say("thickness: 1 to 5000 nm, since no --thickness was given")
     check_free_count(len(free_leaves(scene)))
     check_camera(reading, [(file, reading) for file in files])
-    inputs = [one for file in files for one in _film_inputs(file, scene, reading)]
-    return Inputs(inputs, False, written=_without_light(reading.given()))
-
-
-def _by_film_recipe(files: list[str], recipe: FilmRecipe, reading: FileOptions) -> Inputs:
-    import equinox as eqx
-
-    _check_film(reading)
-    if recipe.each and files:
-        own = "[[sample]]" if recipe.tables.sample else "[[data.file]]"
-        raise UsageError(f"{recipe.path}: {own} and files on the command line exclude each other")
-    files = _files(files, recipe)
-    recipes = recipe.each or [recipe] * len(files)
-    options = [FileOptions.of(one.reading | reading.given()) for one in recipes]
-    check_camera(reading, zip(files, options, strict=True))
-    inputs = []
-    for file, how, one in zip(files, options, recipes, strict=True):
-        scene = one.scene(fitted=True)
-        scene = eqx.tree_at(lambda s: s.light, scene, light(how, scene.light.azimuth))
-        own_scale = any(x.rescales for x in (*one.tables.data.file, one.sample) if x is not None)
-        inputs += _film_inputs(file, scene, how, own_scale)
-    data = recipe.tables.data
-    if recipe.tables.sample:
-        from pellicle.recipes.write import samples_text
-
-        written = partial(samples_text, recipe, reading.given())
-        return Inputs(inputs, True, FitOptions.of(data.given()), samples=written)
-    result = Inputs(inputs, data.joint, FitOptions.of(data.given()), repeats=data.repeats)
-    if not recipe.each:
-        return replace(result, written=_without_light(recipe.reading | reading.given()))
-    tables = [
-        table.model_dump(exclude_unset=True)
-        | recipe.with_paths(table)
-        | {"path": file, "camera": recipe.with_paths(table.camera)}
-        | reading.given()
-        for file, table in zip(files, data.file, strict=True)
-    ]
-    return replace(result, written=_without_light(recipe.reading), base=recipe.scene(), tables=tables)
-
-
-def _without_light(options: dict[str, Any]) -> dict[str, Any]:
-    """The options that the light of a scene does not state."""
-    return {name: x for name, x in options.items() if name not in ("angle", "polarisation")}
-
-
-def _by_surface_recipe(files: list[str], recipe: SurfaceRecipe, reading: FileOptions) -> Inputs:
-    if refused := [name for name in reading.given() if name not in of_kind(BRDF)]:
-        flags = ", ".join(named(refused))
-        raise UsageError(f"{flags} cannot be used on a BRDF; the recipe describes the surface")
-    if reading.signal not in (None, "brdf"):
-        raise UsageError(f"{recipe.path}: describes a surface, whose signal is brdf, not {reading.signal}")
-    if reading.noise is not None:
-        from pellicle.signals.limits import noise_level
-
-        noise_level(reading.noise, "--noise")
-    recipe = recipe.with_data(**{name: x for name, x in reading.given().items() if name != "signal"})
-    surface = recipe.scene(fitted=True)
-    paths = _files(files, recipe)
-    inputs = [Input(path, partial(_samples, recipe, surface, path), surface, file=path) for path in paths]
-    data = recipe.tables.data
-    written = data.model_dump(exclude_none=True, exclude={"signal", "files"})
-    return Inputs(inputs, False, FitOptions.of(data.given()), residual=data.residual, written=written)
-
-
-def _files(files: list[str], recipe: FilmRecipe | SurfaceRecipe) -> list[str]:
-    if not (files or recipe.files):
-        raise UsageError(
-            f"{recipe.path}: names no data files: give them on the command line or in [data] files"
-        )
-    return files or recipe.files
-
-
-def _film_inputs(path: str, scene: Scene, reading: FileOptions, own_scale: bool = False) -> list[Input]:
-    """One input for a file of a film; one for each film of a file of colours, and with --spectrum all for
-    each of several spectra."""
-    from pellicle.data.read_spectrum import ALL
-
-    of_colours = is_of_colours(path, reading)
-    if not of_colours:
-        refuse_camera(path, reading)
-    read_file = partial(read_films, path, reading) if of_colours else partial(read, path, reading, scene)
-    whole = Input(path, read_file, scene, own_scale, path)
-    if not of_colours and reading.spectrum != ALL:
-        return [whole]
-    try:
-        parts = read_file()
-    except ValueError:
-        return [whole]  # the error is reported when it is fitted
-    if len(parts) == 1:
-        return [whole._replace(read=partial(list, parts))]
-    return [whole._replace(path=one.source, read=partial(list, [one]), name=one.name) for one in parts]
-
-
-def _samples(recipe: SurfaceRecipe, surface: Surface, path: str) -> list[BrdfSamples]:
-    samples = recipe.read(path)
-    channels = ", ".join(samples.channels)
-    log.info("surface: %s, by %d samples of %s", surface.model, len(samples), channels)
-    for number in surface.free_numbers():
-        log.info("free: %s between %g and %g", number.name, number.free.lower, number.free.upper)
-    return [samples]
-
-
-def _check_film(reading: FileOptions) -> None:
-    """Raise UsageError for options that are wrong for every file of a film."""
-    if reading.signal == "brdf":
-        raise UsageError("--signal brdf needs a --recipe that describes the surface under [scene.surface]")
-    from pellicle.signals.limits import check_noise
-
-    check_words(reading)
-    check_noise(reading.noise)
+    inputs = [one for file in files for one in film_inputs(file, scene, reading)]
+    return Inputs(inputs, False, written=without_light(reading.given()))

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
-from pellicle.cli.flags import OUTPUT, CameraFlags, CubeFlags, Flags, flag, named, switch
+from pellicle.cli.flags import OUTPUT, CameraFlags, CubeFlags, Flags, flag, switch
 from pellicle.cli.messages import PixelProgress, as_flags, say, show
 from pellicle.cli.session import GOOD, INTERRUPTED, UNCLEAR, check_folder, start
-from pellicle.data.options import SPACES
+from pellicle.data.options import SPACES, named
 from pellicle.errors import UsageError
 
 if TYPE_CHECKING:

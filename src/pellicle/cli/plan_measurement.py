@@ -89,7 +89,7 @@ def _described(path: str) -> tuple[Scene | Fit, np.ndarray]:
     import numpy as np
 
     from pellicle.api.fits import fit
-    from pellicle.cli.batch import measurement
+    from pellicle.api.recipe_fits import measurement
     from pellicle.cli.inputs import inputs
     from pellicle.cli.reading import measured_scene
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
@@ -100,7 +100,7 @@ def _described(path: str) -> tuple[Scene | Fit, np.ndarray]:
     if not recipe.files:
         return measured_scene(recipe)
     files = inputs([], path).groups[0]
-    data, scene = measurement(files, len(files) > 1)
+    data, scene = measurement(files, len(files) > 1, say)
     with Progress(path) as progress:
         result = fit(data, scene, progress=progress)
     say(f"{path}: fitted to {', '.join(file.path for file in files)}: {result.status}")

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, named, switch
+from pellicle.api.data_files import check_camera, check_words, is_of_colours, read_films, refuse_camera
+from pellicle.api.data_files import read as read_file
+from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, switch
 from pellicle.cli.messages import as_flags, say, show
-from pellicle.cli.reading import check_camera, check_words, is_of_colours, read_films, refuse_camera
-from pellicle.cli.reading import read as read_file
 from pellicle.cli.session import BAD_DATA, GOOD, error_message, reported, start
-from pellicle.data.options import Family, FileOptions
+from pellicle.data.options import Family, FileOptions, named
 from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:

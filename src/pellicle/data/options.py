@@ -7,7 +7,7 @@ nothing heavy: `pellicle --help` loads it.
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from inspect import get_annotations
@@ -35,6 +35,11 @@ Family = Literal[
 _ILLUMINANTS = ("E", "A", "D50", "D55", "D65", "D75")
 
 Record = TypeVar("Record", bound="Options")
+
+
+def named(names: Iterable[str]) -> list[str]:
+    """The flags of arguments: `plate_mm` is --plate-mm."""
+    return [f"--{name.replace('_', '-')}" for name in names]
 
 
 def parse_number(text: str, name: str, expected: str = "a number") -> float:

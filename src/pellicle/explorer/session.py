@@ -188,16 +188,18 @@ class Session:
             program = python_program(scene)
         if self.shown.spectra:
             files = list(dict.fromkeys(folder / spectrum.path for spectrum in self.shown.spectra))
-            about = {"files": files, "reading": self.shown.reading}
+            joint = {"joint": True} if len(self.shown.spectra) > 1 else {}  # as they are fitted here
+            about = {"files": files, "reading": {**self.shown.reading, **joint}}
             if isinstance(scene, Scene) and np.ndim(scene.light.angle):  # those of the files
                 scene = with_value(scene, ANGLE, 0.0)
+            program = python_program(scene, "recipe.toml") if fitted else program
         verb = "fit" if self.shown.spectra else "simulate"
         beside = [Path(spectrum.path).name for spectrum in self.shown.spectra] + self.shown.materials.used(
             scene
         )
         files = ", ".join(dict.fromkeys(beside))
         toml = self.shown.materials.recipe(scene, folder, **about)
-        return {"toml": toml, "python": program, "commands": _commands(verb, files)}
+        return {"toml": toml, "python": program, "commands": _commands(verb, files, bool(fitted))}
 
     def _view(self, body: Mapping[str, Any]) -> dict[str, Any]:
         view, warnings = self.shown.at(body), []
@@ -253,8 +255,9 @@ class Session:
                 self._compiler.get((view.key(kind), needed), partial(view.compile, kind, needed), urgency)
 
 
-def _commands(verb: str, files: str) -> dict[str, str]:
+def _commands(verb: str, files: str, fitted: bool) -> dict[str, str]:
     """Sentences that say how to run a recipe and a program that are saved beside the files that they name."""
     place = f", saved beside {files}" if files else ""
     out = "" if verb == "fit" else " --out film.csv"
-    return {"toml": f"Run it: pellicle {verb} recipe.toml{out}{place}", "python": "Run it: python film.py"}
+    toml, python = f"Run it: pellicle {verb} recipe.toml{out}{place}", "Run it: python film.py"
+    return {"toml": toml, "python": f"{python}, saved beside recipe.toml" if fitted else python}

@@ -44,11 +44,15 @@ class _Text(str):
     """An expression that is finished."""
 
 
-def python_program(scene: Scene | Surface) -> str:
-    """Return a program that builds a scene and simulates it, at the wavelengths of its light where given."""
+def python_program(scene: Scene | Surface, recipe: str = "") -> str:
+    """Return a program that builds a scene and simulates it, at the wavelengths of its light where given; or
+    that fits its free parameters to the data of a `recipe`."""
     nm = scene.light.wavelength if isinstance(scene, Scene) else None
     lines = ["import pellicle as pl", "", f"scene = {python_text(scene)}"]
-    numpy = ["import numpy as np"] if nm is not None or "np." in lines[-1] else []
+    numpy = ["import numpy as np"] if (nm is not None and not recipe) or "np." in lines[-1] else []
+    if recipe:
+        lines.append(f"[(data, _, options)] = pl.read_problems({recipe!r})")
+        return "\n".join([*numpy, *lines, "fit = pl.fit(data, scene, **options)", "print(fit)", ""])
     if nm is None:
         return "\n".join([*numpy, *lines, "simulated = pl.simulate(scene)", "print(simulated.values)", ""])
     lines = [*numpy, *lines, f"wavelength = {_array(np.asarray(nm, float))}  # nm"]

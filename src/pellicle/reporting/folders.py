@@ -73,13 +73,15 @@ def write_fit(
     if profiles := fitted_profiles(fit):
         contents["profile.csv"] = profile_csv(fit, profiles)
     target = write_result(folder, record, contents | {"figure.png": draw_fit(fit)})
+    saved = None
     if recipe is not None:
         with suppress(UsageError):  # of a scene that no recipe can express
             write_text(target / "recipe.toml", recipe(target), overwrite=True)
+            saved = target / "recipe.toml"
     pictures = {} if posterior is None else _write_posterior(target, posterior)
     image = (target / "figure.png").read_bytes()
     library = f"../{LIBRARY}" if (target.parent / LIBRARY).exists() else ""
-    text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe), library)
+    text = fit_page(fit, image, posterior, pictures, repetition(fit, described, recipe, saved), library)
     write_text(target / PAGE, text, overwrite=True)
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)

@@ -1,4 +1,4 @@
-"""Recipe and command that repeat a fit, and the sources to cite with it."""
+"""Command, program in Python and recipe that repeat a fit, and the sources to cite with it."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -18,12 +18,17 @@ _LONGEST = 200_000
 
 
 def repetition(
-    fit: Fit, described: Mapping[str, Any] | None, recipe_in: Callable[[Path], str] | None = None
+    fit: Fit,
+    described: Mapping[str, Any] | None,
+    recipe_in: Callable[[Path], str] | None = None,
+    saved: Path | None = None,
 ) -> list[tuple[str, str]]:
-    """Descriptions and texts of the command and the recipe of a fit; only the recipe for a fit in Python.
+    """Descriptions and texts of the command, the program in Python and the recipe of a fit; only the recipe
+    for a fit in Python.
 
     `described` is what the scene was built from, a recipe's path or flags, with the flags of a sampler.
-    `recipe_in` gives the text of a recipe in a folder that repeats a fit by flags.
+    `recipe_in` gives the text of a recipe in a folder that repeats a fit by flags; `saved` is the path of the
+    one that was written for the program.
     """
     if described is None:
         return _written(fit)
@@ -41,6 +46,7 @@ def repetition(
         words += [flag] if value is True else [flag, _word(value)]
     joint = ["--joint"] if len(files) > 1 and recipe is None else []
     result = [("Command", shlex.join([*words, *joint]))]
+    result += [] if saved is None else [("Python", _program(saved, sampler))]
     if recipe is None:
         try:
             return [*result, *([("Recipe", recipe_in(Path()))] if recipe_in else _written(fit))]
@@ -51,6 +57,19 @@ def repetition(
     except (OSError, ValueError):  # it has gone since
         return result
     return result if len(text) > _LONGEST else [*result, (f"Recipe {Path(recipe).name}", text)]
+
+
+def _program(recipe: Path, sampler: Mapping[str, Any] | None) -> str:
+    """A program that repeats a fit, or the sampling of its posterior, by a recipe."""
+    what, verb = ("fit", "fit") if sampler is None else ("posterior", "sample")
+    arguments = ["data", "scene", "**options", *(f"{name}={x!r}" for name, x in (sampler or {}).items())]
+    return f"""\
+import pellicle as pl
+
+[(data, scene, options)] = pl.read_problems({recipe.as_posix()!r})
+{what} = pl.{verb}({", ".join(arguments)})
+print({what})
+"""
 
 
 def _word(value: Any) -> str:
