@@ -62,6 +62,14 @@ def test_scan_of_the_other_programs_starts_beside_the_truth(benchmark):
     assert nearest < 40  # nm; neighbouring minima are 140 nm or more apart
 
 
+def test_reference_of_stacks_on_a_gpu_agrees_with_tmm(benchmark):
+    gpu = benchmark("gpu")
+    depths = np.array([[50.0, 120.0], [80.0, 40.0], [110.0, 70.0]])
+    indices = [1.0, gpu.PAIR[0], gpu.PAIR[1], gpu.PAIR[0], gpu.SUBSTRATE]
+    expected = [films("s", gpu.WAVELENGTH, indices, column, angle=45.0) for column in depths.T]
+    np.testing.assert_allclose(gpu._by_numpy(depths), expected, rtol=1e-11)
+
+
 def test_device_that_is_absent_ends_with_code_2(benchmark, capsys):
     if any(device.platform == "gpu" for device in jax.devices()):
         pytest.skip("this machine has a GPU")

@@ -44,8 +44,9 @@ EXIT_4 = (
     "pellicle fit --recipe measurements/recipes/gold_on_glass_300nm.toml",
     "pellicle sample --recipe docs/examples/five_bands.toml --out results/five_bands",
     "pellicle fit film.csv --layer TiO2 --substrate Si",
+    "pellicle identify film.csv --substrate Si",
 )
-"""Their fits do not converge to one answer (exit code 4), as their pages say."""
+"""These find no single answer (exit code 4), as their pages say."""
 SLOW = (
     "pellicle identify unknown.csv",  # cli/test_identify.py
     "pellicle fit --recipe found/1.toml",  # identification/test_identify.py
@@ -105,6 +106,7 @@ ELSEWHERE = (
     # install several GB; test_benchmarks.py needs no other package
     *("make peers", "python benchmarks/peers/agreement.py --stacks 1000"),
     *each("python benchmarks/peers --group {} --write", "birefringent dispersion graded"),
+    "python benchmarks/gpu.py",  # needs a GPU; test_benchmarks.py: its reference
     "make schema",  # recipes/test_schema.py: the kept schema
     "make figures",  # reference: the numbers; the figures are kept
     "source .venv/bin/activate",  # a shell builtin; make fit creates the folder
