@@ -144,6 +144,7 @@ def test_freeing_a_table_adds_a_constant():
         ("1.46", ["n=1.7:1.3"], "reversed"),
         ("1.46", ["n=1.7"], "LO:HI"),
         ("SiO2", ["n=1.3:1.7"], "added to the index"),
+        ("1.5", ["n=-0.1:0.1"], r"those of the index itself, as in n=1\.35:1\.65"),
     ],
 )
 def test_media_refused(layer, free, message, refuses):

@@ -5,6 +5,7 @@ from itertools import product
 from pathlib import Path
 
 import equinox as eqx
+import jax
 import numpy as np
 import pytest
 
@@ -168,6 +169,14 @@ def test_flags_that_free_by_default_read_back():
         scene = pl.Scene(pl.Layer(medium(word, free), 100.0), "Si")
         text = recipe_text(scene)
         assert eqx.tree_equal(_parsed(text, Path("x.toml")), scene), text
+
+
+def test_a_scene_of_flags_reads_back_after_jax_is_set_to_float64():
+    """A command parses its flags before that, and writes the recipe after it."""
+    with jax.enable_x64(False):
+        scene = pl.Scene(pl.Layer(medium("SiO2", ["n"]), 100.0), "Si")
+    with jax.enable_x64(True):
+        assert eqx.tree_equal(_parsed(recipe_text(scene), Path("x.toml")), scene)
 
 
 class _Own(AbstractDispersion):

@@ -275,9 +275,8 @@ def read_problems(recipe: str | os.PathLike[str]) -> list[tuple[Any, Any, dict[s
     ```
     """
     made = of_recipe([], os.fspath(recipe), FileOptions())
-    given = made.fitting.given() | {"residual": made.residual}
-    default = {"residual": None, "loss": LEAST_SQUARES}
-    options = {name: x for name, x in given.items() if name not in default or x != default[name]}
+    given = {"loss": made.loss, "tolerance": made.tolerance, "residual": made.residual}
+    options = {name: x for name, x in given.items() if x not in (None, 0.0, LEAST_SQUARES)}
     return [(*measurement(files, made.joint), options) for files in made.groups]
 
 

@@ -81,6 +81,11 @@ def _free_index(
         n, k = _start(dispersion.n), _start(dispersion.k or 0.0)
         if name == "k":
             return Constant(dispersion.n, _free_k(k, bounds))
+        if bounds and bounds[0] < 0:
+            raise UsageError(
+                f"cannot free 'n' from {bounds[0]:g}: the bounds of a constant index are those of the index"
+                f" itself, as in n={0.9 * n:.4g}:{1.1 * n:.4g}"
+            )
         least, most = (1.0, 5.0) if dispersion.k is None else (0.01, 10.0)  # of transparent films, of metals
         low, high = max(least, n - 0.5), max(least, n) + 0.5
         default = Free(low, high, start=max(n, low), limits=(least, max(most, high)))
