@@ -81,7 +81,7 @@ def compare(
     out: Annotated[str | None, flag(OUTPUT, "Folder for the comparison and every fit.")] = None,
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False,
 ) -> int:
-    """Fit data by several recipes and rank these by information criteria (AIC, BIC).
+    """Fit data by several recipes and rank these by their evidence (ln Z), with AIC and BIC beside it.
 
     Example: pellicle compare oxide.csv --recipe smooth.toml --recipe rough.toml
     """
