@@ -302,6 +302,7 @@ def test_the_recipe_reads_back_and_the_snippet_runs(opened, tmp_path):
     page.get_by_role("button", name="Python").click()
     page.get_by_role("heading", name="Python").wait_for()
     code = page.locator("dialog code").text_content()
+    (tmp_path / "wafer.csv").write_bytes(csv())
     ran = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
 
