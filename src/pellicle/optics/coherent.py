@@ -27,7 +27,7 @@ from pellicle.optics.anisotropy import Index, Principal, mixes_polarisations, se
 from pellicle.optics.characteristic import matrix_elements, propagating_elements
 from pellicle.optics.film import film
 from pellicle.optics.gradient import Gradient, coefficients, faces, is_graded
-from pellicle.optics.hoisting import stored_by_cpu as stored
+from pellicle.optics.hoisting import stored_by_cpu
 from pellicle.optics.interface import (
     equal_media,
     incident_factor,
@@ -63,7 +63,7 @@ def stack(
     shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
 
     bottom, top, q_top = (_full(number, shape, dtype) for number in (substrate, ambient, q0))
-    q_bottom: Any = stored(normal(bottom, a))
+    q_bottom: Any = stored_by_cpu(normal(bottom, a))
     uniform: Sequence[Any] = () if is_graded(layers) else layers
     empty = equal_media(ambient, substrate, *uniform)
     if is_graded(layers):
@@ -78,7 +78,7 @@ def stack(
             upper, lower = faces(rows.points) if is_graded(layers) else rows.points * 2
             faces_above: list[Any] = [q_top[None], normal(lower, a)]
             faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
-            q, q_ = stored((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
+            q, q_ = stored_by_cpu((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
             weight = jnp.concatenate([e0[None], _weight(lower, polarisation)])
             weight_ = jnp.concatenate([_weight(upper, polarisation), e2[None]])
             down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, ::-1]
@@ -91,7 +91,11 @@ def stack(
         # both directions have the same denominator except for its scale: rescale the second to the first
         reversed_ = (up - H_) / (up + H_) * denominator
         # one by one: what is not used is not computed
-        amplitudes = stored(zero_where(empty, down - H)), stored(reversed_), stored(denominator)
+        amplitudes = (
+            stored_by_cpu(zero_where(empty, down - H)),
+            stored_by_cpu(reversed_),
+            stored_by_cpu(denominator),
+        )
         squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
         responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
     return tuple(responses)
@@ -191,12 +195,12 @@ def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: An
     (1 − e^−x)/x, so that a smooth face, or one at a critical angle, is no special case.
     """
     square = rough * rough
-    damping, passed = stored(
+    damping, passed = stored_by_cpu(
         (square * _expm1_ratio(2 * square * q * q_below), jnp.exp(-0.5 * square * (q - q_below) ** 2))
     )
     E = 1 + damping * q_below * (q_below * weight / weight_below - q)
     H = 1 + damping * q * (q * weight_below / weight - q_below)
-    return stored(jnp.stack([E * passed, H * passed]))
+    return stored_by_cpu(jnp.stack([E * passed, H * passed]))
 
 
 def _expm1_ratio(x: Any) -> Any:
@@ -230,13 +234,13 @@ def _through(start: Any, rows: _Rows, faces: Any, a: Any, polarisation: str) -> 
             E, H = E * face[0], H * face[1]
         if len(points) == 1:
             square, e = normal_square(points[0], a), _weight(points[0], polarisation)
-            c, f, layer_scale, _ = stored(matrix_elements(square, k))
+            c, f, layer_scale, _ = stored_by_cpu(matrix_elements(square, k))
             E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
         else:
             alpha, beta, skew, square = coefficients(points, k, a, polarisation)
-            c, f, layer_scale, _ = stored(matrix_elements(square, k))
+            c, f, layer_scale, _ = stored_by_cpu(matrix_elements(square, k))
             E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
-        E, H = stored((E, H))
+        E, H = stored_by_cpu((E, H))
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
         size = jnp.sum(size, axis=0) if columns else size
         shrink = jax.lax.rsqrt(size)

@@ -81,14 +81,16 @@ def _init(film: Any, props: Any) -> None:
     film.smooth = isinstance(film.alpha, type(mi.Float(0))) and bool(np.all(np.array(film.alpha) == 0))
     film.straight = abs(film.eta - 1) < 1e-3
     varies = any(isinstance(x, mi.Texture) for x in (film.thickness, film.alpha))
-    flags, own = mi.BSDFFlags, mi.BSDFFlags.SpatiallyVarying if varies else 0
+    flags, varying = mi.BSDFFlags, mi.BSDFFlags.SpatiallyVarying if varies else 0
     sides = flags.FrontSide | flags.BackSide if film.eta else flags.FrontSide
     film.reflects = flags.DeltaReflection if film.smooth else flags.GlossyReflection
     through = flags.DeltaTransmission if film.smooth else flags.GlossyTransmission
     film.transmits = flags.Null if film.straight else through
-    film.m_components = [film.reflects | sides | own]
+    film.m_components = [film.reflects | sides | varying]
     if film.eta:
-        film.m_components.append(film.transmits | sides | own | (0 if film.straight else flags.NonSymmetric))
+        film.m_components.append(
+            film.transmits | sides | varying | (0 if film.straight else flags.NonSymmetric)
+        )
     film.m_flags = film.m_components[0] | film.m_components[-1]
 
 
