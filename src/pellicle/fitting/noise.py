@@ -19,7 +19,7 @@ correlation from the residuals of a short or featureless spectrum, so fewer is n
 WINDOW = 5
 """Correlation times at which the window of their own sum closes (A. Sokal, 1997, Monte Carlo methods in
 statistical mechanics)."""
-_STEPS, _WHOLE = tuple(10.0**-k for k in range(-1, 7)), 1e-6
+_STEPS, _WHOLE, _FIRST = tuple(10.0**-k for k in range(-1, 7)), 1e-6, 8
 """Steps to which files are rounded, and how near to a whole number of them values lie."""
 _UNEVEN, _REGION, _BESIDE, _WHITE = 4.0, 15, 6, 1.5
 """Ratio to the noise of the quieter half at which noise differs along a spectrum, the fewest points where it
@@ -70,9 +70,17 @@ def rounding(values: np.ndarray) -> np.ndarray:
     power of ten: step/√12, 0 where there is no such step."""
     result, span = np.zeros((*values.shape[:-1], 1)), np.ptp(values, axis=-1, keepdims=True)
     for step in _STEPS:
-        off = np.abs(values / step - np.round(values / step)).max(axis=-1, keepdims=True)
-        result = np.where((result == 0) & (off < _WHOLE) & (span > step), step / math.sqrt(12), result)
+        # the first points show nearly always that there is no such step
+        some = _off(values[..., :_FIRST], step) < _WHOLE
+        if some.any():
+            off = np.where(some, _off(values, step), np.inf)
+            result = np.where((result == 0) & (off < _WHOLE) & (span > step), step / math.sqrt(12), result)
     return result
+
+
+def _off(values: np.ndarray, step: float) -> np.ndarray:
+    """Largest distance (..., 1) of `values` (..., points) from a multiple of a step, in steps."""
+    return np.abs(values / step - np.round(values / step)).max(axis=-1, keepdims=True)
 
 
 def local_noise(values: np.ndarray, window: int = 51) -> np.ndarray:
