@@ -10,7 +10,7 @@ from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.optics.pair import real
 from pellicle.recipes import media, medium_schema
-from pellicle.recipes.parts import same, written_medium
+from pellicle.recipes.written_media import same, written_medium
 
 BK7 = {"D0": 1.86e-6, "D1": 1.31e-8, "D2": -1.37e-11, "E0": 4.34e-7, "E1": 6.27e-10, "lambda_TK": 0.170}
 """Data sheet of Schott N-BK7 (517642.251)."""

@@ -11,7 +11,7 @@ from pellicle.errors import UsageError
 from pellicle.materials.contents import known_words
 from pellicle.recipes.dispersion_models import MODELS
 from pellicle.recipes.media import thickness
-from pellicle.recipes.parts import written_medium
+from pellicle.recipes.written_media import written_medium
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.layers import Interface, Layer, Plate

@@ -18,9 +18,9 @@ from pellicle.errors import UsageError
 from pellicle.files import write_text
 from pellicle.materials.formats.detect import names_file
 from pellicle.recipes import parts
-from pellicle.recipes.parts import same, written_medium, written_number
 from pellicle.recipes.read import FilmRecipe, checked
 from pellicle.recipes.schema import SceneTable
+from pellicle.recipes.written_media import same, written_medium, written_number
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free
 from pellicle.scene.layers import medium as medium_of
