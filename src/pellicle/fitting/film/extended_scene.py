@@ -10,17 +10,24 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from pellicle.dispersion.anisotropic import Anisotropic, each_principal, ordinary_index
-from pellicle.dispersion.empirical import Constant, Scaled, Tabulated
+from pellicle.dispersion.anisotropic import Anisotropic
+from pellicle.dispersion.empirical import Constant
 from pellicle.effects.film_plan import exact
 from pellicle.effects.presence import computes_roughness, scene_media
+from pellicle.fitting.film.changed_media import (
+    OXIDE_INDEX,
+    AllowedEffects,
+    allowed_effects,
+    like_oxide,
+    scaled,
+    with_slope,
+)
 from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
 from pellicle.forward_model.film_signal import depolarises
 from pellicle.forward_model.plan import Plan, Row
-from pellicle.optics.pair import Pair, imag, real
 from pellicle.programs.cache import kept
 from pellicle.scene.expressions import value
 from pellicle.scene.film import Reference, Scene, thickness_spread, unchecked
@@ -28,15 +35,8 @@ from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, rem
 from pellicle.scene.graded import each_medium
 from pellicle.scene.layers import Interface, Layer
 
-OXIDE_INDEX = 1.46
-"""Index of a native oxide, about that of SiO₂."""
 OVERLAYER_INDEX = 1.5
 """Index of an overlayer, about that of adventitious carbon and of water with organics in it."""
-_LIKE_OXIDE = 0.05
-_OXIDISES = 2.0
-"""Substrates of a higher index than this, or with absorption, are semiconductors and metals with an oxide."""
-_GAS = 0.01
-"""Media whose index is within this of 1 are gases."""
 _ROUND = 16
 """Numbers of candidates are multiples of this."""
 _WIDEST = 10.0
@@ -101,16 +101,6 @@ class Program(NamedTuple):
     order: list[int]
 
 
-class _Judged(NamedTuple):
-    """Effects that the indices of a scene allow: which layers and whether its substrate are no gas, whether
-    that oxidises, and whether the last layer is like an oxide already."""
-
-    layers: tuple[bool, ...]
-    substrate: bool
-    oxidises: bool
-    like_oxide: bool
-
-
 def extended(view: SpectrumView | ColoursView, values: np.ndarray) -> ExtendedScene:
     """The extended scene of a view whose parameters are at `values` (parameters,).
 
@@ -119,8 +109,8 @@ def extended(view: SpectrumView | ColoursView, values: np.ndarray) -> ExtendedSc
     on the values themselves.
     """
     scene, given = view.scene, tuple(map(float, values))
-    judged = _judged(scene, given if free_media(scene) else None)
-    return _extended(view.form, scene, judged, given if _planned_by_values(scene) else None)
+    allowed = allowed_effects(scene, given if free_media(scene) else None)
+    return _extended(view.form, scene, allowed, given if _planned_by_values(scene) else None)
 
 
 @remembered
@@ -133,27 +123,10 @@ def _planned_by_values(scene: Scene) -> bool:
 
 
 @remembered
-def _judged(scene: Scene, values: tuple[float, ...] | None) -> _Judged:
-    """Effects that the indices allow at these values of the free numbers; None where no medium has any."""
-    free = free_leaves(scene)
-    at = insert(scene, [0.5] * len(free) if values is None else values)
-    nm, foot = np.asarray(at.light.wavelength), at.layers[-1]
-    bulk, layers = at.substrate.material, [x.material if isinstance(x, Layer) else None for x in at.layers]
-    return _Judged(
-        tuple(medium is not None and _solid(medium, nm) for medium in layers),
-        _solid(bulk, nm),
-        bool(_median(bulk, nm) > _OXIDISES or np.median(np.asarray(imag(ordinary_index(bulk, nm)))) > 0.1),
-        isinstance(foot, Layer)
-        and not free_leaves(getattr(scene.layers[-1], "material", None))
-        and abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE,
-    )
-
-
-@remembered
 def _extended(
-    form: SpectrumForm | ColourForm, scene: Scene, judged: _Judged, values: tuple[float, ...] | None
+    form: SpectrumForm | ColourForm, scene: Scene, allowed: AllowedEffects, values: tuple[float, ...] | None
 ) -> ExtendedScene:
-    return ExtendedScene(form, scene, judged, values)
+    return ExtendedScene(form, scene, allowed, values)
 
 
 class ExtendedScene:
@@ -170,10 +143,10 @@ class ExtendedScene:
         self,
         form: SpectrumForm | ColourForm,
         scene: Scene,
-        judged: _Judged,
+        allowed: AllowedEffects,
         values: tuple[float, ...] | None,
     ):
-        self._form, self._fitted, self._judged, self._free = form, scene, judged, list[Free]()
+        self._form, self._fitted, self._allowed, self._free = form, scene, allowed, list[Free]()
         self.parameters = len(free_leaves(scene))
         # as the scene, with its parameters still free: another best fit is no other program
         starts = [_ANY] * self.parameters if values is None else values
@@ -201,25 +174,25 @@ class ExtendedScene:
             if isinstance(layer, Layer):
                 own = layer if spread is None else replace(layer, thickness_spread=spread)
                 layers[i] = self._layer(i, own, nm)
-        below = _with_slope(opened.substrate.material, nm)
-        if judged.substrate:
+        below = with_slope(opened.substrate.material, nm)
+        if allowed.substrate:
             self.substrate_index, change = self._number(0.0, -0.5)
-            below = _scaled(below, change)
+            below = scaled(below, change)
         self._plain = unchecked(
             opened,
             layers=tuple(layers),
             substrate=replace(opened.substrate, material=below),
-            ambient=_with_slope(opened.ambient, nm),
+            ambient=with_slope(opened.ambient, nm),
             instrument=instrument,
             reference=self._reference(opened, layers, below),
         )
         self._foot: list[Any] = []
         self._with_face: dict[int, tuple[Any, ...]] = {}
         self._stacks, self._programs = [tuple(layers)], dict[int, Program]()
-        if judged.substrate:
+        if allowed.substrate:
             self._stacks.append(tuple(self._faces(layers)))
         self._stack_of = dict.fromkeys(self._with_face, _WITH_FACES)
-        if judged.substrate and isinstance(layers[0], Layer):
+        if allowed.substrate and isinstance(layers[0], Layer):
             # apart: the roughness of a covered face is that of two
             self.overlayer, thin = self._number(0.0)
             self._stack_of[self.overlayer.position] = len(self._stacks)
@@ -240,7 +213,7 @@ class ExtendedScene:
                 return x
             given, changed = alike.get(Content(x.material), (None, None))
             if changed is None or given is None:
-                return replace(x, material=_with_slope(x.material, nm))
+                return replace(x, material=with_slope(x.material, nm))
             same = isinstance(x, Layer) and not is_free(x.thickness) and x.thickness == given.thickness
             thickness = {"thickness": changed.thickness} if same else {}
             return replace(x, material=changed.material, **thickness)
@@ -260,7 +233,7 @@ class ExtendedScene:
         same = False
         if isinstance(foot, Layer):
             nm = np.asarray(self._fitted.light.wavelength)
-            oxidised = abs(_median(foot.material, nm) - OXIDE_INDEX) < _LIKE_OXIDE
+            oxidised = like_oxide(foot.material, nm)
             added = [x for x in added if not (oxidised and isinstance(x, Layer))]
             same = isinstance(own, Layer) and Content(foot.material) == Content(own.material)
         if not same and not any(isinstance(x, Layer) for x in added):
@@ -275,8 +248,8 @@ class ExtendedScene:
             self.roughness, rough = self._number(0.0)
             layers = [replace(top, roughness=rough), *plain[1:]]
             self._with_face[self.roughness.position] = tuple(layers)
-        if isinstance(foot, Layer) and self._judged.oxidises:
-            if not self._judged.like_oxide:
+        if isinstance(foot, Layer) and self._allowed.oxidises:
+            if not self._allowed.like_oxide:
                 self.oxide, thin = self._number(0.0)
                 self._foot = [Layer(Constant(OXIDE_INDEX), thin)]
                 layers = [*layers, *self._foot]
@@ -298,15 +271,15 @@ class ExtendedScene:
         return Number(len(self._free) - 1), free
 
     def _layer(self, i: int, layer: Layer, nm: np.ndarray) -> Layer:
-        material = each_medium(lambda medium: _with_slope(medium, nm), layer.material)
-        if self._judged.layers[i]:
+        material = each_medium(lambda medium: with_slope(medium, nm), layer.material)
+        if self._allowed.layers[i]:
             position = 2 * (nm - nm.min()) / max(np.ptp(nm), 1e-9) - 1
             given = not free_leaves(getattr(self._fitted.layers[i], "material", None))
             number, change = self._number(0.0, -0.5)
             (self.index if given else self.shape)[i] = number
             # level and slope of a model are its own: what it may lack is a curvature
             shape = 1.0 if given else 2 * position**2 - 1
-            material = each_medium(lambda medium: _scaled(medium, change, shape), material)
+            material = each_medium(lambda medium: scaled(medium, change, shape), material)
         thickness: Any = layer.thickness
         if is_free(thickness) and thickness.tie is not None:
             # the thickness of this layer alone, from where the tie has it
@@ -382,42 +355,3 @@ def _rows_of_fit(plan: Plan) -> list[Row]:
         counts = [own.row("angle-spread").count for own in (plan, plan.reference) if own is not None]
         rows.append(replace(cone, count=max(counts), around=max(cone.around, _AZIMUTHS)))
     return rows
-
-
-def _scaled(medium: Any, change: Any, shape: Any = 1.0) -> Any:
-    """The medium with a relative change of its index, in an anisotropic one the same of all its indices."""
-    return each_principal(lambda own: Scaled(own, change, shape), medium)
-
-
-def _with_slope(medium: Any, nm: np.ndarray) -> Any:
-    """The medium with the slope in wavelength of all that is tabulated in it, from neighbouring points."""
-    if isinstance(medium, Anisotropic):
-        return medium.with_media(lambda own: _with_slope(own, nm))
-    if not isinstance(medium, Tabulated):
-        return jax.tree.map(
-            lambda part: _with_slope(part, nm) if isinstance(part, Tabulated) else part,
-            medium,
-            is_leaf=lambda part: isinstance(part, Tabulated) or is_free(part),
-        )
-    if medium.slope is not None:
-        return medium
-    order, first, inverse = np.unique(nm, return_index=True, return_inverse=True)
-
-    def slope(x: Any) -> Any:
-        column = np.broadcast_to(np.asarray(x), nm.shape)[first]
-        return (np.gradient(column, order) if len(order) > 1 else np.zeros(1))[inverse]
-
-    value = medium.value
-    if isinstance(value, Pair):
-        parts = [None if x is None else slope(x) for x in (value.re, value.im)]
-        return Tabulated(medium.wavelength, value, Pair(*parts))
-    return Tabulated(medium.wavelength, value, slope(value))
-
-
-def _median(medium: Any, nm: np.ndarray) -> float:
-    return float(np.median(np.asarray(real(ordinary_index(medium, nm)))))
-
-
-def _solid(medium: Any, nm: np.ndarray) -> bool:
-    index = ordinary_index(medium, nm)
-    return bool(np.max(np.hypot(np.asarray(real(index)) - 1, np.asarray(imag(index)))) > _GAS)
