@@ -173,7 +173,9 @@ def test_an_uneven_film_takes_its_thickness_from_an_image(tmp_path):
     colour = np.linalg.solve(TO_XYZ, xyz(airy(eye.wavelength, nm[0, 4], LAYER, BASE), eye.wavelength))
     # 16 bits of 50 nm, and the table's own error
     np.testing.assert_allclose(value / lobe(*np.array([[0, 0, 1.0]] * 2), ALPHA)[0][1], colour, atol=1e-3)
-    with pytest.raises(UsageError, match=r"a \.bsdf has one thickness; export a map of thicknesses as \.xml"):
+    with pytest.raises(
+        UsageError, match=r"a \.bsdf has one thickness and one roughness; export a map of them"
+    ):
         pl.export(STEEL, to="mitsuba", path=tmp_path / "uneven.bsdf", thickness_map=nm)
 
 

@@ -23,6 +23,8 @@ from pellicle.simulation.depth_profile import depth_profile as film_depth_profil
 from pellicle.simulation.spectra import default_wavelengths, simulate_spectrum
 
 if TYPE_CHECKING:
+    from pellicle.mapping.map_result import Map
+    from pellicle.mapping.photograph import ThicknessMap
     from pellicle.rendering.export import Export
 
 
@@ -206,7 +208,8 @@ def export(
     to: str,
     path: str | os.PathLike[str],
     numbers: str = "effective",
-    thickness_map: ArrayLike | str | os.PathLike[str] | None = None,
+    thickness_map: ArrayLike | Map | ThicknessMap | str | os.PathLike[str] | None = None,
+    roughness_map: ArrayLike | str | os.PathLike[str] | None = None,
     layer: str | None = None,
 ) -> Export:
     """Write a film as a material of a renderer, and how far its formula is from the exact colours.
@@ -222,8 +225,11 @@ def export(
     - `to`: "blender", "gltf", "materialx", "mitsuba", "openpbr" or "usd".
     - `path`: file to write, which must not exist; a record in JSON is written beside it.
     - `numbers`: the set that the renderer draws, "effective" or "physical".
-    - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left, or the path of
-      a `.npy` file or a grey image of them; not for "usd".
+    - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left; the path of
+      a `.npy` file or a grey image of them; or what `pellicle.map` returns. Pixels without a thickness take
+      the nearest. Other free parameters of `scene` take the medians of a cube's map. Not for "usd".
+    - `roughness_map`: roughness of the facets over the object, GGX α from 0 to 1, as an array or the path of
+      a `.npy` file or a grey image (white is 1); not for "usd".
     - `layer`: name of the layer whose thickness it is (the free one, or else the first).
 
     **Returns:** `Export`: the files, and `material` with both sets of numbers and their errors.
@@ -233,4 +239,5 @@ def export(
     """
     from pellicle.rendering.export import export as export_film
 
-    return export_film(scene, to, path, numbers=numbers, thickness_map=thickness_map, layer=layer)
+    maps = {"thickness_map": thickness_map, "roughness_map": roughness_map}
+    return export_film(scene, to, path, numbers=numbers, layer=layer, **maps)

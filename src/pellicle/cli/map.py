@@ -96,7 +96,7 @@ def map_cube(
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
     show(cube_json(made) if json else as_flags(cube_report(made)), folder is not None)
     if folder is not None:
-        _write(folder, made, _command(path, described.path, run, cube, str(out)))
+        _write(folder, made, _command(path, described.path, run, cube, str(out)), described.path)
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
 
 
@@ -168,14 +168,14 @@ def _command(path: str, recipe: str, run: RunFlags, cube: CubeFlags, out: str) -
     return shlex.join(words)
 
 
-def _write(folder: Path, made: Map, command: str) -> None:
+def _write(folder: Path, made: Map, command: str, recipe: str) -> None:
     from pellicle.files import replacing
     from pellicle.mapping.growth import TIME
     from pellicle.reporting.map_figures import write_cube_map
     from pellicle.reporting.map_sites import SITES
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
-    write_cube_map(folder, made, command)
+    write_cube_map(folder, made, command, recipe)
     names = [STORE, NETCDF, *([SITES] if (folder / SITES).exists() else [])]
     if TIME in made.dims:
         try:
@@ -291,5 +291,5 @@ def _map_photograph(
     made: Any = maps.map(photograph, scene, space=space, noise=noise, **flags, **seen)
     show(to_json(made) if json else report(made), out is not None)
     if out is not None:
-        say(f"{write_map(out, made)}: report, figure and tables written")
+        say(f"{write_map(out, made, described.path)}: report, figure and tables written")
     return GOOD if made.converged >= MOST_CONVERGED else UNCLEAR

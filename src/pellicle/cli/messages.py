@@ -33,8 +33,8 @@ _OTHER_NAMES = {"folder": "--out", "path": "--out", "space": "--signal"}
 """Flags of arguments that have another name."""
 _COMMAND_ARGUMENTS = (
     *("depth", "joint", "no_browser", "numbers", "port", "posterior", "recipe", "repeats", "strip"),
-    *("allow", "among", "budget", "family", "idle", "next", "no_page", "thickness_map", "time_from", "to"),
-    *("angles", "noise_degrees", "polarisations", "signals"),
+    *("allow", "among", "budget", "family", "idle", "next", "no_page", "roughness_map", "thickness_map"),
+    *("angles", "noise_degrees", "polarisations", "signals", "time_from", "to"),
 )
 """Flags that one command has outside the groups of `pellicle.cli.flags`."""
 _NEGATIVES = {"folded=False": "--no-folded", "resume=False": "--no-resume"}

@@ -36,7 +36,8 @@ from pellicle.optics.pair import Pair, abs2, real
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers
 from pellicle.rendering.gltf import XYZ_TO_REC709
-from pellicle.rendering.targets import Material, Target, write_grey_image
+from pellicle.rendering.targets import Material, Target
+from pellicle.rendering.textures import share_of_range, write_grey_image
 
 ORDERS = 3
 _POINTS = 1022
@@ -123,7 +124,7 @@ def cycles_formula(look: Appearance) -> Formula:
 
 
 def write(path: Path, material: Material) -> tuple[Path, ...]:
-    """Write the script, the image of a map, and a `.blend` if the path ends so.
+    """Write the script, the images of maps, and a `.blend` if the path ends so.
 
     **Raises:** UsageError for a `.blend` without bpy, and where bpy fails.
     """
@@ -137,7 +138,10 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     write_text(script, script_text(material, path.stem))
     if material.thickness_map is not None:
         image = path.with_name(f"{path.stem}_thickness.png")
-        written.append(write_grey_image(image, material.thickness_map))
+        written.append(write_grey_image(image, share_of_range(material.thickness_map)))
+    if material.roughness_map is not None:
+        image = path.with_name(f"{path.stem}_roughness.png")
+        written.append(write_grey_image(image, np.sqrt(material.roughness_map)))
     if path != script:
         written.insert(0, _save(script, path))
     return tuple(written)
@@ -155,6 +159,7 @@ def script_text(material: Material, stem: str) -> str:
         "METALLIC": material.look.metallic,
         "ROUGHNESS": float(np.sqrt(material.look.roughness)),  # Blender squares it to GGX's α
         "THICKNESS_MAP": None if material.thickness_map is None else f"{stem}_thickness.png",
+        "ROUGHNESS_MAP": None if material.roughness_map is None else f"{stem}_roughness.png",
     }
     body = [f"{key} = {pformat(value, width=100, sort_dicts=False)}" for key, value in constants.items()]
     template = files("pellicle.rendering").joinpath("blender_script.txt").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""Export of a film to a renderer, with the error of the renderer's formula, and maps of thickness in nm.
+"""Export of a film to a renderer, with the error of the renderer's formula.
 
 Films are those of scenes, of surfaces, and of fits with their best values.
 """
@@ -22,6 +22,7 @@ from pellicle.fitting.result import Fit
 from pellicle.rendering.appearance import appearance
 from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import SETS, Material, Solved, target
+from pellicle.rendering.textures import mapped_film, roughness_image
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert
 from pellicle.scene.layers import Layer
@@ -29,55 +30,6 @@ from pellicle.scene.surface import Surface, check_scene
 
 _NODES = 9
 """Thicknesses of a map at which colours are compared: its quantiles from the least to the largest."""
-
-_LEAST = 3.0
-"""Largest thickness (nm) of a map in nm at least: one of 3 µm is beyond all interference colours."""
-
-
-def read_thickness_map(path: str | os.PathLike[str]) -> np.ndarray:
-    """Read a map of thicknesses in nm, (rows, columns): an array in `.npy`, or a grey image of 8 or 16 bits.
-
-    **Raises:** DataError for a file that cannot be read, and for an image in colour.
-    """
-    try:
-        if Path(path).suffix.lower() == ".npy":
-            values = np.load(path, allow_pickle=False)
-        else:
-            from PIL import Image  # a requirement of Matplotlib
-
-            with Image.open(path) as image:
-                values = np.asarray(image)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise DataError(
-            f"{path}: cannot be read as a map of thicknesses ({reason}); give an array in .npy or a grey PNG,"
-            " in nm"
-        ) from None
-    if values.ndim != 2:
-        raise DataError(
-            f"{path}: has the shape {values.shape}; a map of thicknesses is (rows, columns), as a grey image"
-        )
-    try:
-        return checked(values)
-    except UsageError as error:
-        raise DataError(f"{path}: {error}") from None
-
-
-def checked(values: Any) -> np.ndarray:
-    """Return a map of thicknesses as an array. Raises UsageError for another shape, and for wrong values."""
-    try:
-        array = np.asarray(values, float)
-    except ValueError:
-        raise UsageError("`thickness_map` must have numbers, thicknesses in nm") from None
-    if array.ndim != 2 or array.size == 0:
-        raise UsageError(f"`thickness_map` must have the shape (rows, columns), not {array.shape}")
-    if not np.all(np.isfinite(array)) or np.min(array) < 0:
-        raise UsageError("`thickness_map` must have finite thicknesses in nm, none below 0")
-    if np.max(array) < _LEAST:
-        raise UsageError(
-            f"`thickness_map` is {np.max(array):.3g} nm thick at most: give thicknesses in nm, not in µm"
-        )
-    return array
 
 
 @dataclass(frozen=True)
@@ -106,6 +58,7 @@ def export(
     *,
     numbers: str = "effective",
     thickness_map: Any = None,
+    roughness_map: Any = None,
     layer: str | None = None,
 ) -> Export:
     """Write a film as a material; see `pellicle.export`."""
@@ -118,18 +71,20 @@ def export(
     for each in (out, record):
         if each.exists():
             raise UsageError(f"{each}: exists and is not overwritten; choose another `path` or remove it")
-    nodes = None
-    if isinstance(thickness_map, str | os.PathLike):
-        thickness_map = read_thickness_map(thickness_map)
+    if not chosen.takes_map and (thickness_map is not None or roughness_map is not None):
+        raise UsageError(
+            f"{chosen.title} takes no textures of thickness or roughness: choose another target, or export"
+            " the recipe alone"
+        )
+    nodes, values, notes, nm = None, {}, (), None
     if thickness_map is not None:
-        if not chosen.takes_map:
-            raise UsageError(f"{chosen.title} takes no map of thicknesses; leave `thickness_map` out")
-        thickness_map = checked(thickness_map)
-        nodes = np.unique(np.quantile(thickness_map, np.linspace(0.0, 1.0, _NODES)))
-    film = film_of(scene)
+        nm, values, notes = mapped_film(thickness_map, layer)
+        nodes = np.unique(np.quantile(nm, np.linspace(0.0, 1.0, _NODES)))
+    rough = None if roughness_map is None else roughness_image(roughness_map)
+    film = film_of(with_values(scene, values) if values and not isinstance(scene, Fit) else scene)
     look = appearance(film.scene, nodes, layer)
     lacking = () if chosen.formula is None else look.lacking  # tables have the colours of any film
-    look = replace(look, roughness=film.roughness, notes=(*lacking, *look.notes, *film.notes))
+    look = replace(look, roughness=film.roughness, notes=(*lacking, *look.notes, *film.notes, *notes))
     solved = None
     if chosen.formula is not None:
         formula = chosen.formula(look)
@@ -137,7 +92,7 @@ def export(
             solved = Solved(formula, physical(formula, look), effective(formula, look), numbers)
         except ImportError as missing:  # colour-science
             raise UsageError(str(missing)) from None
-    material = Material(out.stem, look, solved, thickness_map)
+    material = Material(out.stem, look, solved, nm, rough)
     files = chosen.write(out, material)
     text = json.dumps({"target": to} | material.record(), ensure_ascii=False, indent=1, allow_nan=False)
     write_text(record, text + "\n")

@@ -24,7 +24,8 @@ import numpy as np
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers, series
-from pellicle.rendering.targets import Material, Target, share_of_range
+from pellicle.rendering.targets import Material, Target
+from pellicle.rendering.textures import share_of_range
 
 XYZ_TO_REC709 = np.array(
     [
@@ -170,32 +171,43 @@ def extensions(material: Material) -> dict[str, dict[str, Any]]:
 
 
 def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> bytes:
-    """Add the material, and return the image of its thickness for the buffer."""
-    from PIL import Image  # a requirement of Matplotlib
-
+    """Add the material, and return the images of its textures for the buffer."""
     look, added = material.look, extensions(material)
     colour = np.asarray(material.drawn.chosen.numbers["base"]).tolist() if look.metallic else [1.0] * 3
-    image = b""
-    if material.thickness_map is not None:
-        pixels = np.zeros((*material.thickness_map.shape, 3), np.uint8)
-        pixels[..., 1] = np.round(255 * share_of_range(material.thickness_map))  # in the green channel
-        file = BytesIO()
-        Image.fromarray(pixels).save(file, format="PNG")
-        image = file.getvalue()
-        model.bufferViews.append(gltf.BufferView(buffer=0, byteOffset=offset, byteLength=len(image)))
-        model.images = [gltf.Image(bufferView=len(model.bufferViews) - 1, mimeType="image/png")]
-        model.samplers = [gltf.Sampler(magFilter=9729, minFilter=9987, wrapS=10497, wrapT=33071)]
-        model.textures = [gltf.Texture(source=0, sampler=0)]
-        added["KHR_materials_iridescence"]["iridescenceThicknessTexture"] = {"index": 0}
-    model.extensionsUsed = list(added)
+    roughness = float(np.sqrt(look.roughness))  # glTF squares it to GGX's α
     pbr = gltf.PbrMetallicRoughness(
-        baseColorFactor=[*colour, 1.0],
-        metallicFactor=float(look.metallic),
-        roughnessFactor=float(np.sqrt(look.roughness)),  # glTF squares it to GGX's α
+        baseColorFactor=[*colour, 1.0], metallicFactor=float(look.metallic), roughnessFactor=roughness
     )
+    images = b""
+    if material.thickness_map is not None:
+        images = _add_texture(model, gltf, share_of_range(material.thickness_map), 0.0, offset)
+        texture = {"index": len(model.textures) - 1}
+        added["KHR_materials_iridescence"]["iridescenceThicknessTexture"] = texture
+    if material.roughness_map is not None:
+        share = np.sqrt(material.roughness_map)
+        images += _add_texture(model, gltf, share, float(look.metallic), offset + len(images))
+        pbr.metallicRoughnessTexture = gltf.TextureInfo(index=len(model.textures) - 1)
+        pbr.roughnessFactor = 1.0
+    model.extensionsUsed = list(added)
     about = {"pbrMetallicRoughness": pbr, "extras": {"pellicle": material.record()}}
     model.materials = [gltf.Material(name=material.name, extensions=added, **about)]
-    return image
+    return images
+
+
+def _add_texture(model: Any, gltf: Any, green: np.ndarray, blue: float, offset: int) -> bytes:
+    """Add a texture of values from 0 to 1 in its green channel, and return its image."""
+    from PIL import Image  # a requirement of Matplotlib
+
+    pixels = np.zeros((*green.shape, 3), np.uint8)
+    pixels[..., 1], pixels[..., 2] = np.round(255 * green), np.round(255 * blue)
+    file = BytesIO()
+    Image.fromarray(pixels).save(file, format="PNG")
+    image = file.getvalue()
+    model.bufferViews.append(gltf.BufferView(buffer=0, byteOffset=offset, byteLength=len(image)))
+    model.images.append(gltf.Image(bufferView=len(model.bufferViews) - 1, mimeType="image/png"))
+    model.samplers = [gltf.Sampler(magFilter=9729, minFilter=9987, wrapS=10497, wrapT=33071)]
+    model.textures.append(gltf.Texture(source=len(model.images) - 1, sampler=0))
+    return image + b"\0" * (-len(image) % 4)
 
 
 def _add_sphere(model: Any, gltf: Any) -> bytes:

@@ -27,7 +27,8 @@ from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import ColourError, Formula, Key, Numbers, series
 from pellicle.rendering.formula import error as colour_error
-from pellicle.rendering.targets import Material, Target, write_grey_image
+from pellicle.rendering.targets import Material, Target
+from pellicle.rendering.textures import share_of_range, write_grey_image
 
 XYZ_TO_RGB = np.array(
     [
@@ -186,7 +187,8 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     set_inputs(standard, standard_surface(material))
     add_material(document, standard, material, standard_surface_error(material), "_standard_surface")
     inputs = {"thinfilm_thickness": bsdf, "thin_film_thickness": standard}
-    images = connect_map(document, path, material, inputs)
+    images = connect_thickness(document, path, material, inputs)
+    images += connect_roughness(document, path, material, standard, bsdf)
     return (*save(document, path), *images)
 
 
@@ -229,23 +231,56 @@ def save(document: Any, path: Path) -> tuple[Path, ...]:
     return (path,)
 
 
-def connect_map(
+def connect_thickness(
     document: Any, path: Path, material: Material, inputs: dict[str, Any], unit: float = 1.0
 ) -> tuple[Path, ...]:
     """Write the image of an uneven film, and connect it to inputs of nodes, in nm times `unit`."""
     if material.thickness_map is None:
         return ()
-    image = write_grey_image(path.with_name(f"{path.stem}_thickness.png"), material.thickness_map)
+    image, texture = _image(document, path, "thickness", share_of_range(material.thickness_map))
     low, high = material.drawn.chosen.scale * unit * material.look.thickness[[0, -1]]
-    texture = document.addNode("image", "thickness_image", "float")
-    set_inputs(texture, {"file": ("filename", image.name), "vaddressmode": ("string", "clamp")})
-    range_of = document.addNode("remap", "thickness_of_image", "float")
-    range_of.setConnectedNode("in", texture)
+    range_of = _node(document, "remap", "thickness_of_image", "float", **{"in": texture})
     set_inputs(range_of, _floats(outlow=low, outhigh=high))
     for name, node in inputs.items():
-        node.removeInput(name)
-        node.setConnectedNode(name, range_of)
+        _connect(node, name, range_of)
     return (image,)
+
+
+def connect_roughness(
+    document: Any, path: Path, material: Material, surface: Any, bsdf: Any = None
+) -> tuple[Path, ...]:
+    """Write the image of an uneven roughness, √α, and connect it to a surface, and squared to a BSDF."""
+    if material.roughness_map is None:
+        return ()
+    image, texture = _image(document, path, "roughness", np.sqrt(material.roughness_map))
+    _connect(surface, "specular_roughness", texture)
+    if bsdf is not None:
+        alpha = _node(document, "multiply", "alpha", "float", in1=texture, in2=texture)
+        both = _node(document, "combine2", "alpha_of_both_axes", "vector2", in1=alpha, in2=alpha)
+        _connect(bsdf, "roughness", both)
+    return (image,)
+
+
+def _image(document: Any, path: Path, what: str, share: np.ndarray) -> tuple[Path, Any]:
+    """Write a grey image beside the document, and add its node."""
+    image = write_grey_image(path.with_name(f"{path.stem}_{what}.png"), share)
+    texture = document.addNode("image", f"{what}_image", "float")
+    set_inputs(texture, {"file": ("filename", image.name), "vaddressmode": ("string", "clamp")})
+    return image, texture
+
+
+def _node(document: Any, category: str, name: str, kind: str, **inputs: Any) -> Any:
+    """Add a node whose inputs are connected to other nodes."""
+    node = document.addNode(category, name, kind)
+    for key, source in inputs.items():
+        node.setConnectedNode(key, source)
+    return node
+
+
+def _connect(node: Any, name: str, source: Any) -> None:
+    """Connect an input in place of its value."""
+    node.removeInput(name)
+    node.setConnectedNode(name, source)
 
 
 def bsdf_of(material: Material) -> tuple[str, str, dict[str, tuple[str, Any]]]:
@@ -321,7 +356,8 @@ def write_open_pbr(path: Path, material: Material) -> tuple[Path, ...]:
     surface = document.addNode("open_pbr_surface", "film_open_pbr", "surfaceshader")
     set_inputs(surface, open_pbr(material))
     add_material(document, surface, material, material.drawn.chosen.error)
-    images = connect_map(document, path, material, {"thin_film_thickness": surface}, unit=1e-3)
+    images = connect_thickness(document, path, material, {"thin_film_thickness": surface}, unit=1e-3)
+    images += connect_roughness(document, path, material, surface)
     return (*save(document, path), *images)
 
 

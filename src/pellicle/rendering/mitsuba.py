@@ -6,7 +6,7 @@ which needs no Python, and `film_lookup.xml` by the lookup, whose thickness may 
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -28,7 +28,8 @@ from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
 from pellicle.optics.pair import to_complex
 from pellicle.rendering.appearance import FILM, Appearance
-from pellicle.rendering.targets import Material, Target, write_grey_image
+from pellicle.rendering.targets import Material, Target
+from pellicle.rendering.textures import share_of_range, write_grey_image
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
 from pellicle.simulation.colours import BANDS
@@ -42,9 +43,11 @@ PLUGIN = "pellicle_film"
 def write(path: Path, material: Material) -> tuple[Path, ...]:
     """Write tables, plugin and scenes beside each other, the tables alone for a `.bsdf`.
 
-    An uneven film has no `.bsdf`, whose directions are those of one thickness.
+    A film with a texture has no `.bsdf`, whose directions are those of one thickness and roughness.
     """
-    look, uneven = material.look, material.thickness_map is not None
+    look = material.look
+    maps = {"map": material.thickness_map, "roughness": material.roughness_map}
+    uneven = [key for key, values in maps.items() if values is not None]
     alpha = look.roughness if look.roughness > 0 else ALPHA
     chosen = _paths(path, uneven)
     for key, file in chosen.items():
@@ -60,12 +63,14 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
         write_text(chosen["plugin"], _text("mitsuba_plugin.py"), overwrite=True)
         nm = look.thickness if material.thickness_map is None else material.thickness_map
         if "map" in chosen:
-            write_grey_image(chosen["map"], nm)
+            write_grey_image(chosen["map"], share_of_range(nm))
+        if "roughness" in chosen:
+            write_grey_image(chosen["roughness"], np.asarray(material.roughness_map))
         scene = {
             "comment": f"import {PLUGIN} and call its register() first, see there",
             "table": chosen["lookup"].name,
             "alpha": f"{alpha:g}",
-            "map": chosen["map"].name if uneven else "",
+            **{key: chosen[key].name if key in chosen else "" for key in maps},
             "least": f"{np.min(nm):.6g}",
             "largest": f"{np.max(nm):.6g}",
         }
@@ -77,8 +82,8 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     return tuple(chosen.values())
 
 
-def _paths(path: Path, uneven: bool) -> dict[str, Path]:
-    """The files that are written, by what they are."""
+def _paths(path: Path, uneven: Sequence[str]) -> dict[str, Path]:
+    """The files that are written, by what they are; `uneven` are the keys of textures."""
     names = {
         "rgb": f"{path.stem}.bsdf",
         "spectral": f"{path.stem}_spectral.bsdf",
@@ -89,11 +94,14 @@ def _paths(path: Path, uneven: bool) -> dict[str, Path]:
     }
     if path.suffix.lower() == ".bsdf":
         if uneven:
-            raise UsageError(f"{path}: a .bsdf has one thickness; export a map of thicknesses as .xml")
+            raise UsageError(
+                f"{path}: a .bsdf has one thickness and one roughness; export a map of them as .xml"
+            )
         names = {key: names[key] for key in ("rgb", "spectral")}
     elif uneven:
-        names = names | {"map": f"{path.stem}_thickness.png", "scene": names["measured"]}
-        names = {key: names[key] for key in ("lookup", "map", "plugin", "scene")}
+        images = {"map": f"{path.stem}_thickness.png", "roughness": f"{path.stem}_roughness.png"}
+        names = names | images | {"scene": names["measured"]}
+        names = {key: names[key] for key in ("lookup", *uneven, "plugin", "scene")}
     return {key: path.with_name(name) for key, name in names.items()}
 
 

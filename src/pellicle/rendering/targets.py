@@ -12,10 +12,8 @@ from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
 
 from pellicle.errors import UsageError, did_you_mean, install_command
-from pellicle.files import replacing
 from pellicle.rendering.appearance import ANGLES, Appearance
 from pellicle.rendering.formula import Formula, Solution
 
@@ -49,13 +47,15 @@ class Material:
     """A film for a renderer.
 
     `solved` is None for a target without a formula of its own, which tabulates the exact colours.
-    `thickness_map` (rows, columns) is in nm, None for an even film.
+    `thickness_map` (rows, columns) is in nm, None for an even film; `roughness_map` (rows, columns) is the
+    GGX α over the object, None for that of `look`.
     """
 
     name: str
     look: Appearance
     solved: Solved | None
     thickness_map: np.ndarray | None = None
+    roughness_map: np.ndarray | None = None
 
     @property
     def thickness(self) -> float:
@@ -90,22 +90,6 @@ class Material:
                 "delta_e2000": {"mean": solution.error.mean, "largest": solution.error.largest},
             }
         return entries
-
-
-def share_of_range(thickness: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "rows columns"]:
-    """A map of thickness from 0 at its least to 1 at its largest thickness."""
-    span = np.ptp(thickness)
-    return (thickness - thickness.min()) / (span if span > 0 else 1.0)
-
-
-def write_grey_image(path: Path, thickness: Float[np.ndarray, "rows columns"]) -> Path:
-    """Write a map as a grey PNG of 16 bits from the least thickness (0) to the largest (65535)."""
-    from PIL import Image  # a requirement of Matplotlib
-
-    with replacing(path) as temporary:
-        pixels = np.round(65535 * share_of_range(thickness)).astype(np.uint16)
-        Image.fromarray(pixels).save(temporary, format="PNG")
-    return path
 
 
 class Target(NamedTuple):

@@ -283,11 +283,13 @@ def _line(sheet: Sheet, variable: str) -> Figure:
     return figure
 
 
-def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map, command: str = "") -> Path:
+def write_cube_map(
+    folder: str | os.PathLike[str], made: Dataset | Map, command: str = "", recipe_path: str = ""
+) -> Path:
     """Write result.json, report.txt, report.html and figures of a map, and return the folder.
 
-    A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `command` is the
-    one that repeats the map.
+    A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `command`
+    repeats the map, with the recipe at `recipe_path`.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
@@ -295,7 +297,8 @@ def write_cube_map(folder: str | os.PathLike[str], made: Dataset | Map, command:
     texts = {REPORT: cube_report(made, summary)}
     if summary.axes.kind != "image":
         texts[SITES] = sites_csv(made, summary)
-    target = write_result(folder, cube_json(made, summary), texts)
+    record = cube_json(made, summary) | ({"scene": {"recipe": recipe_path}} if recipe_path else {})
+    target = write_result(folder, record, texts)
     for name, figure in figures(made, summary):
         path = save_figure(figure, target / f"{name}.png", overwrite=True)
         images[name] = path.read_bytes()

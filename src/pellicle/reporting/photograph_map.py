@@ -81,15 +81,18 @@ def to_csv(made: ThicknessMap) -> str:
     return csv_rows(_HEADER, rows)
 
 
-def write_map(folder: str | os.PathLike[str], made: ThicknessMap) -> Path:
+def write_map(folder: str | os.PathLike[str], made: ThicknessMap, recipe_path: str = "") -> Path:
     """Write result.json, report.txt, map.png, and strip.csv or arrays (.npy, nm), each complete or not.
+
+    `recipe_path` is that of the scene.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
     name = Path(made.path).name
     contents = {"report.txt": report(made), "map.png": draw(made, name)}
     contents |= {} if made.position is None else {"strip.csv": to_csv(made)}
-    target = write_result(folder, to_json(made), contents)
+    record = to_json(made) | ({"scene": {"recipe": recipe_path}} if recipe_path else {})
+    target = write_result(folder, record, contents)
     if made.position is None:
         for key in ("thickness", "stderr", "probability"):
             values = getattr(made.found, key)[..., 0].astype(np.float32)
