@@ -46,9 +46,10 @@ def test_data_that_do_not(pellicle, scene_recipe, spectrum_file):
     assert "A is not needed" in found["verdict"] or "prefer a.toml" in found["verdict"]
 
 
-def test_bad_input_in_one_sentence(pellicle, scene_recipe, spectrum_file, tmp_path):
+def test_bad_input_in_one_sentence_before_a_fit(pellicle, scene_recipe, spectrum_file, tmp_path, monkeypatch):
+    monkeypatch.setattr("pellicle.api.fits.fitted", lambda *given, **how: pytest.fail("fitted"))
     path, a = spectrum_file(), scene_recipe(name="a.toml")
-    narrow = scene_recipe("range = [402, 800]", "narrow.toml")  # 99 points of 100: the same programs
+    narrow = scene_recipe("range = [402, 800]", "narrow.toml")  # 99 points of 100
     robust = scene_recipe('loss = "huber"', "robust.toml")
     for recipes, code, words in (
         ([a], 2, "two recipes or more"),

@@ -1,8 +1,11 @@
 """`pellicle map`: strips and photographs of a wedge; a cube, its folder and its interruption."""
 
+import html
 import json
 import os
+import re
 import signal
+from typing import Any
 
 import numpy as np
 import pytest
@@ -178,6 +181,11 @@ def test_the_folder_of_a_map(pellicle, words, fits, tmp_path, monkeypatch):
         np.testing.assert_allclose(map.thickness, 100 * cube.R[..., 0])
         assert map.attrs["recipe"] == words[3].read_text()
     assert xarray.open_zarr(tmp_path / "out/map.zarr").status.shape == (24, 20)
+    page = html.unescape((tmp_path / "out/report.html").read_text("utf-8"))
+    [program] = re.findall(r"import pellicle as pl.*?print\(result\)", page, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(program, names)
+    np.testing.assert_array_equal(names["result"].dataset.thickness, map.thickness)
 
 
 @pytest.mark.slow

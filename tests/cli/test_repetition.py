@@ -17,7 +17,7 @@ from pellicle.cli.inputs import inputs
 from pellicle.data.fingerprint import fingerprint
 from pellicle.data.options import FileOptions, FitOptions
 from pellicle.fitting.result import Fit, Part
-from pellicle.reporting.page.repetition import repetition
+from pellicle.reporting.page.repetition import comparison_again, map_program, repetition
 
 FILM = "film.csv --layer SiO2 --substrate Si --thickness 10:800"
 PLATE = "film.csv --layer TiO2 --substrate BK7 --thickness 10:800"
@@ -205,3 +205,36 @@ def test_the_program_in_a_report_gives_the_numbers_of_the_command(joint, pellicl
     free = {p.name: (p.value, p.stderr) for p in names["fit"].parameters.values() if p.free}
     assert len(free) == 2
     assert free == {name: (p["value"], p["stderr"]) for name, p in found["parameters"].items() if p["free"]}
+
+
+def test_command_and_program_repeat_a_comparison(folder, monkeypatch):
+    layer = "[scene]\nsubstrate = 'Si'\n[[scene.layer]]\nmaterial = 'SiO2'\nthickness = { lower = 10, upper"
+    recipes = {name: str(folder / f"{name}.toml") for name in ("narrow", "wide")}
+    for upper, path in zip((400, 800), recipes.values(), strict=True):
+        Path(path).write_text(f"[data]\nnoise = 0.01\n{layer} = {upper} }}\n", "utf-8")
+    (_, command), (_, program), *texts = comparison_again(recipes, ["film.csv", "again.csv"], 1)
+    (folder / "again.csv").write_text((folder / "film.csv").read_text().replace("0.5,", "0.51,"))
+    seen = []
+    monkeypatch.setattr(pl, "compare", lambda *given, **how: seen.append((given, how)), raising=False)
+    exec(program, {})
+    [((data, scenes), how)] = seen
+    assert (data.path, list(scenes), how) == ("again.csv", ["narrow", "wide"], {"residual": None})
+    assert [own.layers[0].thickness.upper for own in scenes.values()] == [400, 800]
+    _, bound, _ = app.parse_args(shlex.split(command)[1:], print_error=False, exit_on_error=False)
+    assert bound.arguments["recipe"] == [*recipes.values()]
+    assert bound.args == ("film.csv", "again.csv")
+    assert [text for _, text in texts] == [Path(path).read_text("utf-8") for path in recipes.values()]
+
+
+def test_a_program_of_a_map_has_its_options_and_the_scenes_of_its_recipes(folder, monkeypatch):
+    film = pl.Scene(pl.Layer("SiO2", pl.Free(10, 400)), "Si")
+    pl.write_recipe(film, "film.toml")
+    options = {"noise": 0.01, "range": (450.0, 700.0), "workers": 4, "recipe": "the text", "resume": True}
+    written = {"lamp_reference": "pl.read_recipe('film.toml').scene()"}
+    program = map_program("map", "cube.nc", "film.toml", options, written)
+    seen = []
+    monkeypatch.setattr(pl, "map", lambda *given, **how: seen.append((given, how)), raising=False)
+    exec(program, {})
+    [((path, scene), how)] = seen
+    assert fingerprint(scene, how.pop("lamp_reference")) == fingerprint(film, film)
+    assert (path, how) == ("cube.nc", {"noise": 0.01, "range": (450.0, 700.0)})

@@ -1,5 +1,6 @@
 """Movies of soap films that drain, by a simulator of its own: order, anchor, breaks, laws and the command."""
 
+import html
 import json
 
 import numpy as np
@@ -212,6 +213,9 @@ def test_the_command_follows_grey_frames_to_the_black_film(tmp_path):
     assert record["black_film"]["place"].startswith("x 0")
     best = next(law for law in record["thinning"] if law["law"] == "exponential")["parameters"]
     assert best["time constant"]["value"] == pytest.approx(20, abs=0.3)
+    page = html.unescape((out / "report.html").read_text("utf-8"))
+    assert f"--frame-rate {rate} --strip 3,0,3,15 --wavelengths 550" in page
+    assert "strip='3,0,3,15'" in page
     assert "no frames between" in (out / "report.txt").read_text()
     assert (out / "series.csv").read_text().startswith("time_s,mean_thickness_nm,thickness_nm_x_3")
 

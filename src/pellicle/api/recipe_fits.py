@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from logging import getLogger
@@ -249,13 +249,15 @@ def measurement(
     return data, scenes[0] if isinstance(scenes[0], Surface) else scenes
 
 
-def read_problems(recipe: str | os.PathLike[str]) -> list[tuple[Any, Any, dict[str, Any]]]:
-    """Read the data files of a recipe: data, scene and options of each of its fits.
+def read_problems(
+    recipe: str | os.PathLike[str], files: Sequence[str | os.PathLike[str]] = ()
+) -> list[tuple[Any, Any, dict[str, Any]]]:
+    """Read the data files of a recipe, or other `files`: data, scene and options of each of its fits.
 
     `pellicle.fit` takes them as `pellicle fit --recipe` does: all files are one fit where the recipe is joint
     or has samples, else each file is one.
 
-    **Arguments:** `recipe`, the path of a recipe that names its data files.
+    **Arguments:** `recipe`, the path of a recipe; `files`, data files in place of those that it names.
 
     **Returns:** a list with data, scene and options for each fit. The options are those that the recipe
     gives: `tolerance`, a robust `loss`, which `pellicle.sample` does not take, and `residual` of a BRDF.
@@ -274,7 +276,7 @@ def read_problems(recipe: str | os.PathLike[str]) -> list[tuple[Any, Any, dict[s
 
     ```
     """
-    made = of_recipe([], os.fspath(recipe), FileOptions())
+    made = of_recipe([os.fspath(file) for file in files], os.fspath(recipe), FileOptions())
     given = {"loss": made.loss, "tolerance": made.tolerance, "residual": made.residual}
     options = {name: x for name, x in given.items() if x not in (None, 0.0, LEAST_SQUARES)}
     return [(*measurement(files, made.joint), options) for files in made.groups]

@@ -102,33 +102,45 @@ def compare(
     if out is not None:
         check_folder(out)
     start()
+    from pellicle.reporting.page.repetition import comparison_again
+
     worst, several = GOOD, len(groups[0]) > 1
     for position, paths in enumerate(groups[0]):
         folder = None if out is None else Path(out) / Path(paths[0]).stem if several else Path(out)
-        worst = max(worst, _compare(candidates, position, paths, folder, json))
+        again = comparison_again(dict(zip(names, recipes, strict=True)), data, position)
+        worst = max(worst, _compare(candidates, position, paths, folder, json, again))
     return worst
 
 
 def _compare(
-    candidates: dict[str, Inputs], position: int, paths: list[str], folder: Path | None, as_json: bool
+    candidates: dict[str, Inputs],
+    position: int,
+    paths: list[str],
+    folder: Path | None,
+    as_json: bool,
+    again: list[tuple[str, str]],
 ) -> int:
-    """Compare the fits of one group of files, print and write the result, and return its exit code."""
+    """Compare the fits of one group of files, print and write the result with what repeats it, and return its
+    exit code."""
     from pellicle.api.fits import fitted
-    from pellicle.fitting.comparison import best_explained
+    from pellicle.fitting.comparison import best_explained, check_same
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
 
     label, first = ", ".join(paths), next(iter(candidates))
 
     def fitted_by(name: str, explained: bool) -> Any:
         log.info("comparison: now %s", name)
-        files, residual = candidates[name].groups[position], candidates[name].residual
-        said = say if name == first and not explained else None
-        data, scene = measurement(files, len(files) > 1, said)
         with Progress(f"{label}, {name}") as progress:
-            options = {"residual": residual, "progress": progress, "explained": explained}
-            return with_flags(fitted(data, scene, **options))
+            options = {"residual": candidates[name].residual, "progress": progress, "explained": explained}
+            return with_flags(fitted(*problems[name], **options))
 
     try:
+        groups = {name: each.groups[position] for name, each in candidates.items()}
+        problems = {
+            name: measurement(files, len(files) > 1, say if name == first else None)
+            for name, files in groups.items()
+        }
+        check_same({n: data if isinstance(data, list) else [data] for n, (data, _) in problems.items()})
         comparison = best_explained(candidates, fitted_by)
     except ValueError as error:
         message = error_message(error, [label])
@@ -137,5 +149,5 @@ def _compare(
     code = GOOD if comparison.best.fit.status == "converged" else UNCLEAR
     if folder is None:
         return code
-    write = partial(write_comparison, folder, comparison)
+    write = partial(write_comparison, folder, comparison, again)
     return max(code, written(write, f"{folder}: comparison and fits written"))

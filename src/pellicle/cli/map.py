@@ -89,14 +89,17 @@ def map_cube(
     from pellicle.reporting.map_text import cube_json, cube_report
 
     options["recipe"] = Path(described.path).read_text(encoding="utf-8")
-    made = fitted("map", path, scene, folder, options | cube.arguments(described))
+    options |= cube.arguments(described)
+    made = fitted("map", path, scene, folder, options)
     if made is None:
         return INTERRUPTED
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
     show(cube_json(made) if json else as_flags(cube_report(made)), folder is not None)
     if folder is not None:
-        _write(folder, made, _command(path, described.path, run, cube, str(out)), described.path)
+        flags = vars(run) | vars(cube)
+        repeated = again("map", path, described.path, flags, options, str(out))
+        _write(folder, made, repeated, described.path)
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
 
 
@@ -157,25 +160,36 @@ def _started(folder: Path | None, progress: PixelProgress) -> Iterator[None]:
         raise
 
 
-def _command(path: str, recipe: str, run: RunFlags, cube: CubeFlags, out: str) -> str:
-    """The command of a map, without what does not change its numbers."""
-    words = ["pellicle", "map", path, "--recipe", recipe]
-    given = {**vars(run), **vars(cube), "resume": None, "overwrite": None, "out": out}
-    for name, value in given.items():
+def again(
+    verb: str, data: str | list[str], recipe: str, flags: dict[str, Any], options: dict[str, Any], out: str
+) -> list[tuple[str, str]]:
+    """Command and program that repeat a map or a series, without flags that do not change its numbers."""
+    from pellicle.reporting.page.repetition import map_program
+
+    words = ["pellicle", verb, *([data] if isinstance(data, str) else data), "--recipe", recipe]
+    for name, value in {**flags, "resume": None, "overwrite": None, "out": out}.items():
         if value is not None and value is not False:
             text = ":".join(f"{end:g}" for end in value) if isinstance(value, tuple) else str(value)
             words += named([name]) if value is True else [*named([name]), text]
-    return shlex.join(words)
+    written = {}
+    if flags.get("lamp_reference"):
+        written["lamp_reference"] = f"pl.read_recipe({flags['lamp_reference']!r}).scene()"
+    if callable(options.get("white_reflectance")):
+        light = "".join(f", {x}={options[x]!r}" for x in ("angle", "polarisation") if x in options)
+        white = f"pl.reflectance(nm, 0.0, 1.0, {flags['white_reflectance']!r}{light})"
+        written["white_reflectance"] = f"lambda nm: {white}"
+    program = map_program(verb, data, recipe, options, written)
+    return [("Command", shlex.join(words)), ("Python", program)]
 
 
-def _write(folder: Path, made: Map, command: str, recipe: str) -> None:
+def _write(folder: Path, made: Map, repeated: list[tuple[str, str]], recipe: str) -> None:
     from pellicle.files import replacing
     from pellicle.mapping.growth import TIME
     from pellicle.reporting.map_figures import write_cube_map
     from pellicle.reporting.map_sites import SITES
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
-    write_cube_map(folder, made, command, recipe)
+    write_cube_map(folder, made, repeated, recipe)
     names = [STORE, NETCDF, *([SITES] if (folder / SITES).exists() else [])]
     if TIME in made.dims:
         try:

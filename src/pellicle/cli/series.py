@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from pellicle.cli.flags import OUTPUT, READING, CameraFlags, CubeFlags, Flags, flag, switch
-from pellicle.cli.map import MOST_DECIDED, StoreFlags, film_recipe, fitted, refuse
+from pellicle.cli.map import MOST_DECIDED, StoreFlags, again, film_recipe, fitted, refuse
 from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.session import GOOD, INTERRUPTED, UNCLEAR, check_folder, start
 from pellicle.errors import UsageError
@@ -100,7 +100,10 @@ def series(
         return INTERRUPTED
     show(to_json(made) if json else as_flags(report(made)), folder is not None)
     if folder is not None:
-        say(f"{write_series(folder, made)}: series.nc, series.csv, report and figure written")
+        flags = vars(run) | vars(cube) | {"time_from": time_from}
+        repeated = again("series", source, described.path, flags, options, str(out))
+        repeated.append(("Recipe", options["recipe"]))
+        say(f"{write_series(folder, made, repeated)}: series.nc, series.csv, report and figure written")
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
 
 
@@ -137,8 +140,12 @@ def _movie(
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
     options = {"wavelengths": cube.wavelengths, "space": signal if signal in ("srgb", "rgb") else None}
     options |= flags | seen
-    made = maps.series(source, scene, **{name: x for name, x in options.items() if x is not None})
+    options = {name: x for name, x in options.items() if x is not None}
+    made = maps.series(source, scene, **options)
     show(to_json(made) if json else as_flags(report(made)), out is not None)
     if out is not None:
-        say(f"{write_movie(out, made)}: series.nc, series.csv, report and figure written")
+        given = flags | vars(cube) | vars(camera)
+        repeated = again("series", source, described.path, given, options, out)
+        repeated.append(("Recipe", Path(described.path).read_text(encoding="utf-8")))
+        say(f"{write_movie(out, made, repeated)}: series.nc, series.csv, report and figure written")
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR

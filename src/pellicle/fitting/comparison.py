@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from logging import getLogger
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -143,7 +143,9 @@ def compare(fits: Mapping[str, Fit]) -> Comparison:
     """Compare fits, by name, of the same data. Raises UsageError where they are not of the same data."""
     if len(fits) < 2:
         raise UsageError("a comparison needs two descriptions or more")
-    _check_same(fits)
+    check_same({name: [part.data for part in fit.parts] for name, fit in fits.items()})
+    if len({fit.layer_test and fit.layer_test.residual for fit in fits.values()}) > 1:
+        raise UsageError(f"{' and '.join(fits)} have different residuals: give all the same")
     with jax.enable_x64(True):
         explained = dict(zip(fits, _explained([fit.ranking for fit in fits.values()]), strict=True))
         nearest = max(explained.values(), key=lambda one: one.information)
@@ -178,13 +180,13 @@ def best_explained(names: Iterable[str], fit: Callable[[str, bool], Fit]) -> Com
     return compare(fits | {best.name: fit(best.name, True)})
 
 
-def _check_same(fits: Mapping[str, Fit]) -> None:
-    """Raise UsageError where fits differ in their points, their noise or their residual."""
+def check_same(measured: Mapping[str, Sequence[Any]]) -> None:
+    """Raise UsageError where the data of descriptions, by their name, differ in points, signal or noise."""
 
-    def about(fit: Fit) -> tuple[list[object], list[np.ndarray | None]]:
+    def about(parts: Sequence[Any]) -> tuple[list[object], list[np.ndarray | None]]:
         columns: list[np.ndarray | None] = []
-        names: list[object] = [fit.layer_test and fit.layer_test.residual]
-        for data in (part.data for part in fit.parts):
+        names: list[object] = []
+        for data in parts:
             names += [type(data), data.kind if isinstance(data, Spectrum) else ""]
             light = "angle" if isinstance(data, Colours) else "theta_i phi_i theta_o phi_o"
             if isinstance(data, Spectrum):
@@ -192,7 +194,7 @@ def _check_same(fits: Mapping[str, Fit]) -> None:
             columns += [getattr(data, name) for name in ("values", "sigma", *light.split())]
         return names, columns
 
-    (first, names, columns), *others = ((name, *about(fit)) for name, fit in fits.items())
+    (first, names, columns), *others = ((name, *about(parts)) for name, parts in measured.items())
     for other, other_names, other_columns in others:
         if names != other_names or not all(map(_equal, columns, other_columns)):
             raise UsageError(

@@ -86,17 +86,20 @@ def failure(path: str, error: str) -> dict[str, Any]:
     return failed(SCHEMA, {"path": path, "sha256": None, "signal": None, "points": 0}, error)
 
 
-def write_comparison(folder: str | os.PathLike[str], comparison: Comparison) -> Path:
+def write_comparison(
+    folder: str | os.PathLike[str], comparison: Comparison, again: Sequence[tuple[str, str]] = ()
+) -> Path:
     """Write report.txt, report.html and result.json into a folder, and each recipe's fit into a sub-folder.
 
-    Returns the folder. Raises UsageError as `write_fit` does.
+    `again` is what repeats it: descriptions and texts. Returns the folder. Raises UsageError as `write_fit`
+    does.
     """
     target = new_folder(folder)
     folders = folder_per_file(target, [c.name for c in comparison.candidates])
     for c, own in zip(comparison.candidates, folders, strict=True):
         write_fit(own, c.fit)
     links = [(own / PAGE).relative_to(target).as_posix() for own in folders]
-    contents = {REPORT: report(comparison), PAGE: comparison_page(comparison, links)}
+    contents = {REPORT: report(comparison), PAGE: comparison_page(comparison, links, again)}
     return write_result(target, to_json(comparison), contents)
 
 
@@ -104,11 +107,13 @@ _MOST_PARAMETERS = 6
 """Free parameters told of each fit; its own page has them all."""
 
 
-def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
+def comparison_page(
+    comparison: Comparison, pages: Sequence[str | None], again: Sequence[tuple[str, str]] = ()
+) -> str:
     """Format a comparison of recipes as a page.
 
     **Arguments:** `pages`, the path of each candidate's own page relative to this one, with slashes, None
-    where there is none.
+    where there is none; `again`, what repeats the comparison: descriptions and texts to copy.
     """
     best = comparison.best
     others = [c for c in comparison.candidates if c is not best]
@@ -141,4 +146,5 @@ def comparison_page(comparison: Comparison, pages: Sequence[str | None]) -> str:
         verdict=comparison.verdict,
         points=f"{comparison.effective_points:.3g}",
         rows=rows,
+        again=again,
     )

@@ -284,12 +284,15 @@ def _line(sheet: Sheet, variable: str) -> Figure:
 
 
 def write_cube_map(
-    folder: str | os.PathLike[str], made: Dataset | Map, command: str = "", recipe_path: str = ""
+    folder: str | os.PathLike[str],
+    made: Dataset | Map,
+    again: Sequence[tuple[str, str]] = (),
+    recipe_path: str = "",
 ) -> Path:
     """Write result.json, report.txt, report.html and figures of a map, and return the folder.
 
-    A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `command`
-    repeats the map, with the recipe at `recipe_path`.
+    A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `again` is
+    what repeats the map beside its recipe, descriptions and texts; the recipe is at `recipe_path`.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
@@ -303,7 +306,7 @@ def write_cube_map(
         path = save_figure(figure, target / f"{name}.png", overwrite=True)
         images[name] = path.read_bytes()
     recipe = str(summary.attributes.get("recipe", ""))
-    again = [(name, text) for name, text in (("Command", command), ("Recipe", recipe)) if text]
+    again = [*again, *([("Recipe", recipe)] if recipe else [])]
     write_text(target / PAGE, map_page(summary, images, again), overwrite=True)
     return target
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,8 +95,12 @@ def to_json(made: MovieResult) -> dict[str, Any]:
     )
 
 
-def write_movie(folder: str | os.PathLike[str], made: MovieResult) -> Path:
+def write_movie(
+    folder: str | os.PathLike[str], made: MovieResult, again: Sequence[tuple[str, str]] = ()
+) -> Path:
     """Write series.nc, series.csv, result.json, report and figure into a folder, and return it.
+
+    `again` is what repeats it: descriptions and texts.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
@@ -105,7 +110,7 @@ def write_movie(folder: str | os.PathLike[str], made: MovieResult) -> Path:
     target = write_result(folder, to_json(made), contents)
     with replacing(target / NETCDF, overwrite=True) as draft:
         made.dataset.to_netcdf(draft, engine="h5netcdf")
-    write_text(target / PAGE, _page(made, image.getvalue()), overwrite=True)
+    write_text(target / PAGE, _page(made, image.getvalue(), again), overwrite=True)
     return target
 
 
@@ -209,7 +214,7 @@ def _table(made: MovieResult) -> Table:
     return Table(columns)
 
 
-def _page(made: MovieResult, image: bytes) -> str:
+def _page(made: MovieResult, image: bytes, again: Sequence[tuple[str, str]]) -> str:
     sentences = [verdict(made), *(f"{text[0].upper()}{text[1:]}." for text in made.warnings)]
     return page(
         "map.html",
@@ -225,4 +230,5 @@ def _page(made: MovieResult, image: bytes) -> str:
         statuses=PageTable("Statuses, and what to do", (), _status_rows(made)),
         plan=PageTable("", (), []),
         file=PageTable("Frames, and how they were read", (), _file_rows(made)),
+        again=again,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,8 +80,12 @@ def to_json(series: Series) -> dict[str, Any]:
     )
 
 
-def write_series(folder: str | os.PathLike[str], series: Series) -> Path:
+def write_series(
+    folder: str | os.PathLike[str], series: Series, again: Sequence[tuple[str, str]] = ()
+) -> Path:
     """Write series.nc, series.csv, result.json, report and figure into a folder, and return it.
+
+    `again` is what repeats it: descriptions and texts.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
@@ -91,7 +96,7 @@ def write_series(folder: str | os.PathLike[str], series: Series) -> Path:
     target = write_result(folder, to_json(series), contents)
     with replacing(target / NETCDF, overwrite=True) as draft:
         dated(series.dataset).to_netcdf(draft, engine="h5netcdf")
-    write_text(target / PAGE, _page(series, image.getvalue()), overwrite=True)
+    write_text(target / PAGE, _page(series, image.getvalue(), again), overwrite=True)
     return target
 
 
@@ -237,7 +242,7 @@ def _table(series: Series) -> Table:
     return Table(columns)  # spreadsheets take the first line for the names of columns
 
 
-def _page(series: Series, image: bytes) -> str:
+def _page(series: Series, image: bytes, again: Sequence[tuple[str, str]]) -> str:
     return page(
         "map.html",
         f"Series of {Path(series.map.input).name}",
@@ -254,4 +259,5 @@ def _page(series: Series, image: bytes) -> str:
         statuses=PageTable("Statuses, and what to do", (), _status_rows(series)),
         plan=PageTable("Effects of the simulation", (), plan_rows(summarise(series.map))),
         file=PageTable("Files, and how they were read", (), _file_rows(series)),
+        again=again,
     )

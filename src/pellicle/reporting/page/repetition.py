@@ -1,7 +1,7 @@
 """Command, program in Python and recipe that repeat a fit, and the sources to cite with it."""
 
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -69,6 +69,56 @@ import pellicle as pl
 [(data, scene, options)] = pl.read_problems({recipe.as_posix()!r})
 {what} = pl.{verb}({", ".join(arguments)})
 print({what})
+"""
+
+
+def comparison_again(
+    recipes: Mapping[str, str], files: Sequence[str], position: int
+) -> list[tuple[str, str]]:
+    """Command, program and recipes of a comparison of recipes, paths by name, on their files or `files`;
+    the program is of the fits at one position."""
+    words = [
+        "pellicle",
+        "compare",
+        *files,
+        *(word for path in recipes.values() for word in ("--recipe", path)),
+    ]
+    program = f"""\
+import pellicle as pl
+
+recipes = {dict(recipes)!r}
+problems = {{name: pl.read_problems(path, {list(files)!r})[{position}] for name, path in recipes.items()}}
+data, _, options = next(iter(problems.values()))
+scenes = {{name: scene for name, (_, scene, _) in problems.items()}}
+comparison = pl.compare(data, scenes, residual=options.get("residual"))
+print(comparison)
+"""
+    texts = [(f"Recipe {name}", Path(path).read_text(encoding="utf-8")) for name, path in recipes.items()]
+    return [("Command", shlex.join(words)), ("Python", program), *texts]
+
+
+_OF_RUN = "workers", "scheduler", "resume", "overwrite", "out", "progress", "recipe"
+"""Arguments of a map that do not change its numbers."""
+
+
+def map_program(
+    verb: str, source: str | list[str], recipe: str, options: Mapping[str, Any], written: Mapping[str, str]
+) -> str:
+    """A program that repeats a map, or a series (`verb`), by the scene of a recipe.
+
+    `written` are expressions of options that have no literal.
+    """
+    given = {name: repr(x) for name, x in options.items() if name not in _OF_RUN} | written
+    words = "".join(f",\n    {name}={text}" for name, text in given.items())
+    return f"""\
+import pellicle as pl
+
+scene = pl.read_recipe({recipe!r}).scene()
+result = pl.{verb}(
+    {source!r},
+    scene{words},
+)
+print(result)
 """
 
 
