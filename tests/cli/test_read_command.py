@@ -21,6 +21,18 @@ def test_every_spectrum_is_described(pellicle, write):
     assert (record["declared"], record["range_nm"]) == ({"instrument": "X-100"}, [400, 490])
 
 
+def test_samples_of_a_brdf_are_described(pellicle, write, tmp_path):
+    rows = "".join(f"{angle},0,{angle},180,{0.1 + angle / 100:g},0.2,0.3,0.01\n" for angle in (0, 30, 60))
+    path = write("theta_i,phi_i,theta_o,phi_o,R,G,B,sigma\n" + rows, "steel.csv")
+    text = pellicle("read", path, code=0).out
+    for words in ("3 pairs of directions", "0 to 60° from the normal", "0.1 to 0.7 1/sr", "given, 0.01 1/sr"):
+        assert words in text
+    [found] = pellicle("read", path, "--json", code=0).objects
+    assert (found["schema"], found["samples"]) == ("pellicle.brdf/1", 3)
+    assert found["values"]["R"] == pytest.approx([0.1, 0.7])
+    pellicle("read", path, "--out", tmp_path / "out").refused(2, "--out writes spectra")
+
+
 def test_noise_is_the_scatter_of_neighbours(pellicle, write):
     noise = np.random.default_rng(5).normal(0, 0.01, 2000)
     rows = [f"{400 + i / 10},{0.3 + 0.1 * np.sin(i / 300) + x}" for i, x in enumerate(noise)]

@@ -14,9 +14,10 @@ from pellicle.cli.flags import OUTPUT, CubeOnlyFlags, FileFlags, flag, switch
 from pellicle.cli.messages import as_flags, say, show
 from pellicle.cli.session import BAD_DATA, GOOD, error_message, reported, start
 from pellicle.data.options import Family, FileOptions, named
-from pellicle.errors import DataError, UsageError
+from pellicle.errors import UsageError
 
 if TYPE_CHECKING:
+    from pellicle.data.brdf_samples import BrdfSamples
     from pellicle.data.colours import Colours
     from pellicle.data.cube import Cube
     from pellicle.data.spectrum import Spectrum
@@ -36,7 +37,7 @@ def read(
     ] = "csv",
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object per spectrum.")] = False,
 ) -> int:
-    """Show what is understood of files, photographs and cubes, without fitting, and convert spectra.
+    """Show what is understood of spectra, photographs, cubes and BRDF files, and convert spectra.
 
     Example: pellicle read wafer.txt --out converted --to csv,nexus
 
@@ -65,10 +66,11 @@ def read(
             message = error_message(error, [path])
             worst = reported(message, error_record(message, BAD_DATA) if json else None)
     if out is not None:
+        from pellicle.data.brdf_samples import BrdfSamples
         from pellicle.data.cube import Cube
 
-        if any(isinstance(one, Cube) for one in measurements):
-            raise UsageError("--out writes spectra, and a cube stays in its file: leave it out")
+        if any(isinstance(one, Cube | BrdfSamples) for one in measurements):
+            raise UsageError("--out writes spectra; a cube or a BRDF stays in its file: leave --out out")
     for one in measurements:
         show(to_json(one) if json else describe(one, tuple(map(as_flags, one.notes))))
     if out is not None:
@@ -78,8 +80,8 @@ def read(
 
 def _measurements(
     path: str, options: FileOptions, of_cube: CubeOnlyFlags
-) -> list[Spectrum] | list[Colours] | list[Cube]:
-    """Every spectrum of a file, the colours of every film in it, or its cube."""
+) -> list[Spectrum] | list[Colours] | list[Cube] | list[BrdfSamples]:
+    """Every spectrum of a file, the colours of every film in it, its cube, or its samples of a BRDF."""
     from pellicle.data.cubes.xarray_cubes import is_netcdf
     from pellicle.data.read_cube import is_cube
 
@@ -90,8 +92,10 @@ def _measurements(
     refuse_camera(path, options)
     try:
         return _spectra(path, options)
-    except DataError:
-        if not is_netcdf(Path(path)):
+    except ValueError as error:
+        if not options.given() and (samples := _samples(path)) is not None:
+            return [samples]
+        if isinstance(error, UsageError) or not is_netcdf(Path(path)):
             raise
         try:  # a NetCDF file that is no spectrum may be a cube
             return [_cube(path, options, of_cube)]
@@ -99,6 +103,16 @@ def _measurements(
             if "no axis" not in str(reason):
                 raise reason from None
         raise
+
+
+def _samples(path: str) -> BrdfSamples | None:
+    """The samples of a BRDF in a file; None where it has none."""
+    from pellicle.data.read_brdf import read_brdf_samples
+
+    try:
+        return read_brdf_samples(path)
+    except ValueError:
+        return None
 
 
 def _cube(path: str, options: FileOptions, of_cube: CubeOnlyFlags) -> Cube:

@@ -1,4 +1,4 @@
-"""Summaries of spectra, colours and cubes: what was read from a file, as text and as JSON."""
+"""Summaries of spectra, colours, cubes and BRDF samples: what was read from a file, as text and as JSON."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colour_rows import MEANING
 from pellicle.data.colours import Colours
 from pellicle.data.cube import Cube
@@ -19,7 +20,7 @@ from pellicle.signals.registry import KINDS
 _MAD = 1.4826  # standard deviation over median absolute deviation, for normal noise
 
 
-def describe(measured: Spectrum | Colours | Cube, notes: tuple[str, ...] | None = None) -> str:
+def describe(measured: Spectrum | Colours | Cube | BrdfSamples, notes: tuple[str, ...] | None = None) -> str:
     """Describe what was read: quantity, points, noise, and how the file was read.
 
     `notes` replace those of the data.
@@ -29,12 +30,14 @@ def describe(measured: Spectrum | Colours | Cube, notes: tuple[str, ...] | None 
             noun, rows = "spectrum", _spectrum_rows(measured)
         case Colours():
             noun, rows = "colours", _colours_rows(measured)
+        case BrdfSamples():
+            noun, rows = "samples", _samples_rows(measured)
         case _:
             noun, rows = "cube", _cube_rows(measured)
     return described(measured.path or noun, rows, measured.notes if notes is None else notes)
 
 
-def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
+def to_json(measured: Spectrum | Colours | Cube | BrdfSamples) -> dict[str, Any]:
     """Convert the summary to a dictionary; numbers that are unknown are None."""
     if isinstance(measured, Spectrum):
         errors = taken(measured, "sigma", "delta_sigma")
@@ -53,6 +56,16 @@ def to_json(measured: Spectrum | Colours | Cube) -> dict[str, Any]:
             **{name: None if x is None else [x.min(), x.max()] for name, x in errors.items()},
             "declared": dict(measured.declared),
             **left_out(measured),
+        }
+    elif isinstance(measured, BrdfSamples):
+        record = {
+            "schema": "pellicle.brdf/1",
+            **taken(measured, "path", "sha256", "channels"),
+            "samples": len(measured),
+            "values": dict(zip(measured.channels, _ends(measured.values), strict=True)),
+            "angles_deg": {
+                name: _ends(getattr(measured, name)[:, None])[0] for name in ("theta_i", "theta_o")
+            },
         }
     else:
         record = _colours_record(measured) if isinstance(measured, Colours) else _cube_record(measured)
@@ -81,6 +94,25 @@ def _spectrum_rows(spectrum: Spectrum) -> list[tuple[str, str]]:
         ("sweeps", f"{len(spectrum.sweeps)}, averaged" if spectrum.sweeps else ""),
         ("noise", "; ".join(text for text in noise if text)),
         *spectrum.declared,
+    ]
+
+
+def _ends(values: Float[np.ndarray, "samples channels"]) -> list[list[float]]:
+    """Least and largest value of each channel."""
+    return [[column.min(), column.max()] for column in values.T]
+
+
+def _samples_rows(samples: BrdfSamples) -> list[tuple[str, str]]:
+    """Labels and texts of samples of a BRDF."""
+    known = "" if samples.sigma is None else f"given, {np.median(samples.sigma):.2g} 1/sr in the median"
+    values = zip(samples.channels, _ends(samples.values), strict=True)
+    return [
+        ("quantity", "BRDF: a fit needs the recipe of its surface"),
+        ("samples", f"{len(samples)} pairs of directions"),
+        ("light", f"at {samples.theta_i.min():.4g} to {samples.theta_i.max():.4g}° from the normal"),
+        ("viewer", f"at {samples.theta_o.min():.4g} to {samples.theta_o.max():.4g}° from the normal"),
+        *((name, f"{low:.4g} to {high:.4g} 1/sr") for name, (low, high) in values),
+        ("noise", known),
     ]
 
 
