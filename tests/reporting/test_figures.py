@@ -238,6 +238,13 @@ def test_samples_model_and_residuals_in_sigma_are_drawn(brdf_fit):
     assert below.get_ylabel() == "residual / σ"
 
 
+def test_a_sample_of_zero_leaves_the_axis_of_a_brdf_logarithmic(brdf_fit, with_part):
+    values = np.where(brdf_fit.samples.values == brdf_fit.samples.values.min(), 0.0, brdf_fit.samples.values)
+    above = draw(with_part(brdf_fit, data=replace(brdf_fit.samples, values=values))).axes[0]
+    assert above.get_yscale() == "log"
+    np.testing.assert_allclose(above.get_ylim(), [0.1, 2.2])
+
+
 def test_without_sigma_residuals_have_the_unit_of_the_brdf(brdf_fit, with_part):
     curve = replace(brdf_fit.parts[0].curve, model=brdf_fit.model - 0.3)
     brdf_fit = with_part(brdf_fit, data=replace(brdf_fit.samples, sigma=None), curve=curve)

@@ -183,13 +183,16 @@ def _colours(part: Part, columns: Sequence[Quantity], x: np.ndarray) -> list[lis
 
 
 def _samples(samples: BrdfSamples, columns: Sequence[Quantity], x: np.ndarray) -> list[list[Panel]]:
-    """Samples and model, on a logarithmic axis if all are positive: a lobe spans decades; and residuals."""
+    """Samples and model, on a logarithmic axis if the model is positive (a lobe spans decades); residuals."""
     values, residuals = _channels(columns, [x] * len(columns), "point")
-    scale = "log" if min(line.y.min() for line in values) > 0 else "linear"
+    lowest = min(line.y.min() for line in values[1::2])
+    scale = "log" if lowest > 0 else "linear"
+    # noise of samples that are nearly 0 would take the axis down by many decades
+    limits = (lowest / 2, 2 * max(line.y.max() for line in values)) if lowest > 0 else None
     label = "residual (1/sr)" if samples.sigma is None else "residual / σ"
     values = [*values[::2], *values[1::2]]  # the model above all samples
     return [
-        [Panel("BRDF (1/sr)", values, height=3.0, legend="inside", scale=scale)],
+        [Panel("BRDF (1/sr)", values, height=3.0, legend="inside", scale=scale, limits=limits)],
         [Panel(label, residuals, zero=True)],
     ]
 
