@@ -59,3 +59,7 @@ def test_lines():
     ]
     whole = record(15002.93, 1700) | {"spec": {"thickness": "fail"}}
     assert one_line(whole) == "a.csv: converged; thickness 15003 ± 1700 nm (95 %); thickness FAIL"
+    whole["parameters"]["instrument.scale"] = {"value": 3.5, "expanded": 2.3, "unit": "", "free": True}
+    assert one_line(whole) == "a.csv: converged; thickness 15003 ± 1700 nm (95 %); thickness FAIL"
+    del whole["parameters"]["thickness"]
+    assert "instrument.scale 3.5 ± 2.3" in one_line(whole)

@@ -85,10 +85,13 @@ def with_error(parameter: Mapping[str, Any]) -> str:
 
 
 def one_line(record: Mapping[str, Any]) -> str:
-    """A fit of a batch in one line: file, status, free parameters with their 95 % errors."""
+    """A fit of a batch in one line: file, status, free parameters of the film with their 95 % errors; the
+    tables have those of the instrument too."""
     data = record["data"]
     parts = data if isinstance(data, list) else [data]
     paths = ", ".join(dict.fromkeys(str(part["path"]) for part in parts))
-    free = [f"{name} {with_error(p)}" for name, p in record["parameters"].items() if p["free"]]
+    fitted = {name: p for name, p in record["parameters"].items() if p["free"]}
+    film = {name: p for name, p in fitted.items() if not name.startswith("instrument.")} or fitted
+    free = [f"{name} {with_error(p)}" for name, p in film.items()]
     spec = [f"{name} {found.upper()}" for name, found in record.get("spec", {}).items()]
     return f"{paths}: {'; '.join([record['status'], *free, *spec])}"
