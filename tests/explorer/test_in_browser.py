@@ -288,6 +288,16 @@ def test_a_bad_file_gives_one_sentence_and_the_page_lives_on(opened, name):
     page.wait_for_selector(".trouble", state="hidden")
 
 
+def test_fields_of_a_file_that_needs_them_are_without_the_notes_of_another(opened):
+    page = opened()
+    drop(page, "wafer.csv", csv())
+    page.get_by_text("How wafer.csv is read").wait_for()
+    assert page.locator(".how .notes li").count() > 0
+    drop(page, "odd.csv", b"x;y\n400;12\n500;13\n600;14\n")
+    page.get_by_text("How odd.csv is read").wait_for()
+    assert page.locator(".how .notes li").count() == 0
+
+
 def test_the_recipe_reads_back_and_the_snippet_runs(opened, tmp_path):
     page = opened("&thickness=300")
     page.get_by_role("button", name="Recipe").click()

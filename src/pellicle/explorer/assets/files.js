@@ -10,7 +10,7 @@ function fileZone(take, target, marked) {
     },
   });
   const element = make("p", {}, make("button", { type: "button", onclick: () => chooser.click() }, "Open data…"), chooser,
-    make("span", { class: "soft" }, " or drop a CSV file here"));
+    make("span", { class: "soft" }, " or drop a file here"));
   let depth = 0; // of nested elements that a dragged file has entered
   const over = (change) => (event) => {
     if (![...(event.dataTransfer?.types ?? [])].includes("Files")) return;

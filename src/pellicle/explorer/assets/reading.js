@@ -33,6 +33,7 @@ class ReadingFields {
   }
 
   show(name, texts, notes) {
+    this.name = name;
     this.element.hidden = name === null;
     this.summary.textContent = `How ${name} is read`;
     this.notes.replaceChildren(...notes.map((text) => make("li", {}, text)));
@@ -45,9 +46,8 @@ class ReadingFields {
   /** Opens the fields for a file that cannot be read without some of them. */
   need(name, fields) {
     if (!fields?.length) return;
-    this.element.hidden = false;
+    if (name !== this.name) this.show(name, {}, []); // the notes are of the file before
     this.element.open = true;
-    this.summary.textContent = `How ${name} is read`;
     for (const [key, input] of this.inputs) input.toggleAttribute("aria-invalid", fields.includes(key));
     for (const key of fields) this.inputs.get(key)?.setAttribute("aria-invalid", "true");
     this.inputs.get(fields[0])?.focus();
