@@ -66,6 +66,8 @@ def test_data(check_refused, write, text, flags, words):
         ("--wavelength-unit inch", ("--wavelength-unit", "'inch'", "um")),
         ("--dark dark.csv", ("--dark", "--reference")),
         ("--layer bruggeman", ("bruggeman", "recipe")),
+        ("--layer SiO2,TiO2", ("one layer", "[[scene.layer]]")),
+        ("--layer 'cauchy(1.45,3000'", ("not closed", "write cauchy(1.45,3000)")),
         ("--layer hematit", ("hematit", "hematite")),
         ("--layer Unobtainium", ("Unobtainium", "pellicle materials")),
     ],

@@ -86,7 +86,7 @@ def test_fit_samples_on_demand(pellicle, spectrum_file, scene):
 @pytest.mark.parametrize(
     ("flags", "code", "words"),
     [
-        (("--walkers", "7"), 3, "an even number"),
+        (("--walkers", "7"), 2, "--walkers must be an even number"),
         (("--walkers", "1000000000"), 3, "GiB and the machine has"),
         (("--steps", "1"), 2, "--steps must be at least 10"),
         (("--seed", "-1"), 2, "--seed must lie in"),

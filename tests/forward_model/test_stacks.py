@@ -159,6 +159,10 @@ REFUSED = [
         lambda: scene(pl.Layer(1.5, 1), angle=88.0, instrument=pl.Instrument(angle_spread=5)),
         "beyond 90 degrees",
     ),
+    (
+        lambda: scene(pl.Layer(1.5, 1), instrument=pl.Instrument(numerical_aperture=1.4)),
+        "numerical_aperture.*must be below 1$",
+    ),
     (lambda: scene([pl.Interface(1.0), pl.Interface(2.0)]), "two interfaces are adjacent"),
     (lambda: pl.Interface(1.0, steps=0), "1 to 100 steps"),
     (lambda: pl.Interface(1.0, mix="brugeman"), "no mix 'brugeman'"),

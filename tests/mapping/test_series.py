@@ -1,9 +1,13 @@
 """Series of simulated films that grow, jump and hide, by a simulator of its own, and the command."""
 
+import html
 import json
+import re
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,6 +136,8 @@ def test_what_is_no_series_is_refused(tmp_path):
     with pytest.raises(UsageError, match="along `time` only"):
         pl.series(data.rename(time="x").expand_dims(y=[0.0]), SCENE)
     fixed = pl.Scene(pl.Layer(1.46, pl.Free(0, 3000, varies="shared")), 3.9)
+    with pytest.raises(UsageError, match="a series has no file"):
+        pl.series([], SCENE)
     with pytest.raises(UsageError, match="nothing varies"):
         pl.series(data, fixed)
 
@@ -151,6 +157,13 @@ def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeyp
     first = xarray.load_dataset("grown/series.nc")
     assert (np.abs(first.thickness - GROWN[::4]) < 5).all()
     assert {x.name for x in (tmp_path / "grown").iterdir()} >= {"series.csv", "series.png", "report.html"}
+    page = html.unescape(Path("grown/report.html").read_text("utf-8"))
+    [program] = re.findall(r"import pellicle as pl.*?print\(result\)", page, re.DOTALL)
+    made: dict[str, Any] = {}
+    exec(program, made)
+    np.testing.assert_array_equal(made["result"].dataset.thickness, first.thickness)
+    assert "pellicle series film_000s.csv" in page
+    assert "thickness = { lower = 0, upper = 3000 }" in page
     capsys.readouterr()
     assert app([*words, "--json"]) == 0
     record = json.loads(capsys.readouterr().out)

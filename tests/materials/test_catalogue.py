@@ -229,6 +229,11 @@ def test_chemical_names(words, formula):
     assert material(words) == material(formula)
 
 
+@pytest.mark.parametrize("name", ["Ag2S", "silver sulphide", "CuS", "Prussian blue", "gypsum"])
+def test_names_without_an_open_table_are_answered_by_a_model(name, refuses):
+    refuses(UnknownMaterial, r"no open table of its n and k .*fit them by the model [a-z]", material, name)
+
+
 @pytest.mark.parametrize("name", ["", "   ", "/", "a/b/c/d", "qqqqqq"])
 def test_hopeless_names_point_at_the_list(name, tmp_path, monkeypatch, refuses):
     monkeypatch.chdir(tmp_path)

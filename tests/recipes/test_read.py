@@ -111,9 +111,27 @@ def test_a_recipe_has_a_limit_of_layers_in_words(tmp_path, refuses):
         ('= "Si"', '= "Si"\n[scene]', r"line 5: \[scene\] defines again"),
         ("[[scene.layer]]", "[scene.layer]", r"write \[\[scene.layer\]\] with two brackets"),
         ("lower = 10, upper", "min = 10, max", "thickness.min': write lower"),
+        ('"SiO2"', '{ mixture = "bruggeman", parts = [] }', "key model, mix .*not mixture, parts"),
         ('["oxide.csv"]', '"oxide.csv"', r'write files = \["oxide.csv"\]'),
     ],
 )
 def test_what_is_written_otherwise_elsewhere_is_named(write, old, new, said):
     with pytest.raises(DataError, match=said):
         pl.read_recipe(write(FILM.replace(old, new)))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("10 to 800", r"thickness: '10 to 800' is a range: write { lower = 10, upper = 800 }"),
+        ("10-800", "thickness: .*write { lower = 10, upper = 800 }"),
+        ("2 apples", "thickness: '2 apples' is neither a number nor an expression"),
+    ],
+)
+def test_a_text_in_place_of_bounds_is_named(write, text, said):
+    with pytest.raises(DataError, match=said):
+        pl.read_recipe(write(FILM.replace("{ lower = 10, upper = 3000 }", f'"{text}"'))).scene()
+
+
+def test_a_table_in_place_of_a_recipe_is_named(write, refuses):
+    refuses(DataError, "is a table, and a recipe is a TOML", pl.read_recipe, write("nm,R\n400,1\n", "a.csv"))

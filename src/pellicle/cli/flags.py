@@ -234,6 +234,8 @@ class SamplerFlags(Flags):
         """These flags. Raises UsageError for an impossible number."""
         if self.steps is not None and self.steps < FEWEST_STEPS:
             raise UsageError(f"--steps must be at least {FEWEST_STEPS}, got {self.steps}")
+        if self.walkers is not None and (self.walkers < 4 or self.walkers % 2):
+            raise UsageError(f"--walkers must be an even number of at least 4, got {self.walkers}")
         if not 0 <= self.seed < 2**32:
             raise UsageError(f"--seed must lie in 0 to 4294967295, got {self.seed}")
         return self

@@ -197,6 +197,14 @@ def check_common_range(tree: Any, wavelengths: Any) -> None:
         )
 
 
+_WITHOUT_TABLE = {
+    "tauc-lorentz": "ag2s acanthite silver-sulfide cus covellite cu2s chalcocite copper-sulfide",
+    "spline-kk(400,500,600,700)": "prussian-blue malachite azurite",
+    "cauchy": "gypsum lead-white linseed-oil shellac damar",
+}
+"""Keys of names of which no measured n and k of the visible may be copied, by a model that fits them."""
+
+
 class UnknownMaterial(DataError):
     """A name that is neither in the catalogue, nor a page, nor a file."""
 
@@ -285,5 +293,12 @@ def _unknown(name: str, hint: str, book: list[str] | None = None) -> UnknownMate
         "`pellicle materials` lists the names that ship; of another material give a file of n and k, "
         "an index such as 1.5 or 2.9+0.1j, or a model such as cauchy"
     )
+    for model, absent in _WITHOUT_TABLE.items():
+        if index.key(name).replace("sulphide", "sulfide") in absent.split():
+            return UnknownMaterial(
+                f"unknown material {name!r}: there is no open table of its n and k in the visible, not in"
+                f" refractiveindex.info either; fit them by the model {model}, or give a file of n and k, as"
+                f" {index.key(name)}.csv"
+            )
     question = f"did you mean {' or '.join(near)}? " if near else ""
     return UnknownMaterial(f"unknown material {name!r}: {question}{'; '.join(advice)}")

@@ -19,7 +19,7 @@ from pellicle.dispersion.oscillators import Oscillators
 from pellicle.dispersion.profiles import PROFILES
 from pellicle.dispersion.temperature import AtTemperature, ThermoOptic
 from pellicle.errors import UsageError, did_you_mean
-from pellicle.materials import UnknownMaterial, material
+from pellicle.materials import UnknownMaterial, contents, material
 from pellicle.materials.formats.detect import names_file
 from pellicle.recipes import dispersion_models as models
 from pellicle.recipes import medium_schema
@@ -141,6 +141,14 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
         if _DECIMAL_COMMA.fullmatch(text):
             raise UsageError(
                 f"{text!r} is no material; an index has a decimal point: {text.replace(',', '.')}"
+            ) from None
+        if "," in text and all(contents.find_name(word) for word in text.split(",")):
+            raise UsageError(
+                f"{text}: flags describe one layer: write a [[scene.layer]] for each into a recipe"
+            ) from None
+        if "(" in text and text.partition("(")[0].strip().lower() in models.MODELS:
+            raise UsageError(
+                f"{name} {text}: the bracket of the model is not closed: write {text})"
             ) from None
         close = did_you_mean(text.lower(), models.MODELS, 0.8)
         raise UsageError(f"no material or model {text!r}{close}" if close else str(error)) from None
@@ -295,8 +303,16 @@ def number(value: medium_schema.Number, name: str, minimum: float | None = None)
         try:
             value = float(value)
         except ValueError:
-            with models.usage_errors(f"{name}: "):
+            ends = value.replace(" to ", ":")
+            if is_range(ends):
+                lower, upper = length_range(ends, name)
+                raise UsageError(
+                    f"{name}: {value!r} is a range: write {{ lower = {lower:g}, upper = {upper:g} }}"
+                ) from None
+            try:
                 return Tied(value)
+            except ValueError as error:
+                raise UsageError(f"{name}: {error}") from None
     if isinstance(value, float | int):
         lowest, result = float(value), float(value)
     elif value.lower is None and value.upper is None and value.value is not None:

@@ -78,6 +78,9 @@ def first_error(error: ValidationError, table: type[BaseModel]) -> str:
     if chosen["type"] == "model_type":
         known = list(tables[where[-1]].model_fields) if where[-1] in tables else []
         return f"{key} is a table{' of ' * bool(known)}{', '.join(known)}, not {chosen['input']!r}"
+    if chosen["type"] == "string_type" and isinstance(chosen["input"], dict):
+        kinds = "model, mix (host, inclusion, fraction), graded, ordinary and extraordinary, or x, y and z"
+        return f"{key}: the table of a material has the key {kinds}, not {', '.join(chosen['input'])}"
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -58,6 +59,8 @@ def read_recipe(path: str | os.PathLike[str]) -> FilmRecipe | SurfaceRecipe:
         ) from None
     except tomllib.TOMLDecodeError as error:
         known = remedy(content.decode("utf-8-sig"), error)
+        if not known and not re.search(rb"[=\[]", content[:4096]):
+            known = "is a table, and a recipe is a TOML file; data files are arguments of their own"
         raise DataError(f"{path}: {known or f'is not TOML, as a recipe must be: {error}'}") from None
     except RecursionError:
         raise DataError(f"{path}: is not a recipe: its brackets are nested too deeply") from None

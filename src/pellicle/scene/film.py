@@ -210,7 +210,14 @@ class Scene(eqx.Module):
             if not any(isinstance(x, Layer) and x.thickness_spread is None for x in self.layers):
                 raise ValueError("`thickness_spread` is given twice, or without a coherent layer")
         if self.instrument.has_cone and not isinstance(self.light.angle, Tracer):
-            half_angle = math.degrees(self.instrument.largest_half_angle(1.0))
+            ambient = getattr(self.ambient, "n", None)
+            known = isinstance(ambient, int | float)
+            half_angle = math.degrees(self.instrument.largest_half_angle(ambient if known else 1.0))
+            if known and half_angle >= 90:
+                raise UsageError(
+                    "`numerical_aperture` is the index of the ambient times the sine of the half angle of the"
+                    f" cone: it must be below {ambient:g}"
+                )
             if self.light.largest_angle + half_angle > 90:
                 raise ValueError(
                     f"the cone of light reaches beyond 90 degrees: {self.light.largest_angle:g} and a half "

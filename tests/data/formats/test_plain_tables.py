@@ -69,6 +69,7 @@ def test_percent_of_several_samples(write, header):
         ("wavelength,T\n1,400.5;0.5\n1,500.5;0.6\n", ("thousands separators",), {}),
         ("wavelength;T\n1.400,5;0,5\n1.500,5;0,6\n", ("'1.400,5'", "thousands"), {"signal": "T"}),
         ("wavelength,R\n400,10%\n500,20%\n", ("% signs", "header"), {}),
+        ("date,R\n2024-01-02,0.1\n2024-01-03,0.2\n", ("dates, not wavelengths",), {}),
         ("wavelength,R\n400,0.1\n500,0.2\nMean,0.15\n", ("line 4", "'Mean'"), {}),
         ("nm,n,k\n400,0.2,3.1\n500,0.3,4\n", ("optical constants", "`layer`"), {}),
         ("nm,n,k\n400,0.2,3.1\n500,0.3,4\n", ("optical constants", "`layer`"), {"signal": "psi-delta"}),

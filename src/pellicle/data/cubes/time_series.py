@@ -38,6 +38,8 @@ def read_series(paths: Sequence[Path], time_from: str | None, asked: Asked) -> R
 
     **Raises:** DataError or UsageError, one sentence with the file and the remedy.
     """
+    if not paths:
+        raise UsageError("a series has no file: name the spectra of its times, or a folder that has them")
     read = partial(read_spectra, signal=asked.signal, wavelength_unit=asked.unit)
     spectra = read(paths[0], spectrum="all") if len(paths) == 1 else []
     if len(spectra) > 1:

@@ -49,6 +49,8 @@ def layout_of(file: TextFile) -> Table:
         last, hint = lines[-1], ""
         if re.search(r"\d\s*%", last.text):
             hint = "; leave the % signs out of the cells and put one into the header"
+        elif re.match(r"\W*(\d{4}[-/]\d\d?[-/]|\d\d?[./]\d\d?[./])\d", last.text):
+            hint = "; the first column has dates, not wavelengths"
         elif re.search(r"\d{1,3}[.,' ]\d{3}(?!\d)", last.text):
             hint = "; export numbers without thousands separators"
         raise DataError(
