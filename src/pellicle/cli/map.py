@@ -95,7 +95,8 @@ def map_cube(
         return INTERRUPTED
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    show(cube_json(made) if json else as_flags(cube_report(made)), folder is not None)
+    told = {**cube_json(made), "scene": {"recipe": described.path}} if json else as_flags(cube_report(made))
+    show(told, folder is not None)
     if folder is not None:
         flags = vars(run) | vars(cube)
         repeated = again("map", path, described.path, flags, options, str(out))
@@ -303,7 +304,8 @@ def _map_photograph(
     if transmitted:
         scene = eqx.tree_at(lambda s: s.light, scene, replace(scene.light, signal="T"))
     made: Any = maps.map(photograph, scene, space=space, noise=noise, **flags, **seen)
-    show(to_json(made) if json else report(made), out is not None)
+    told = {**to_json(made), "scene": {"recipe": described.path}} if json else report(made)
+    show(told, out is not None)
     if out is not None:
         say(f"{write_map(out, made, described.path)}: report, figure and tables written")
     return GOOD if made.converged >= MOST_CONVERGED else UNCLEAR
