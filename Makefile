@@ -18,7 +18,7 @@ QUICK_COMPILE = XLA_FLAGS="--xla_backend_optimization_level=0 --xla_llvm_disable
 # both cores have tests, so a program is compiled by one thread; glibc keeps memory that a compilation returns
 ONE_THREAD := XLA_FLAGS=--xla_cpu_parallel_codegen_split_count=1
 KEEP_MEMORY := MALLOC_TRIM_THRESHOLD_=4000000000 MALLOC_MMAP_THRESHOLD_=4000000000 MALLOC_TOP_PAD_=67108864
-EXACT := tests/hard tests/fitting/test_nist.py
+EXACT := tests/hard tests/fitting/test_nist.py tests/optics/test_elementary.py
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 BROWSER_TESTS := tests/reporting/test_page_in_browser.py $(addprefix tests/explorer/test_,in_browser.py \
