@@ -53,6 +53,16 @@ def test_json_is_one_strict_object_a_line_with_the_contracts_keys(pellicle, spec
     assert {"pellicle", "jax"} <= set(found["versions"])
 
 
+def test_a_misspelt_name_of_a_limit_ends_the_command_before_a_fit(
+    pellicle, spectrum_file, scene, monkeypatch
+):
+    monkeypatch.setattr("pellicle.cli.batch.Batch._codes", lambda *given: pytest.fail("fitted"))
+    words = "--spec", "instrument.scale=0:2", "--spec", "thicknes=1:2"
+    pellicle("fit", spectrum_file(), *scene, *words).refused(
+        2, "--spec thicknes", "did you mean 'thickness'?"
+    )
+
+
 def test_a_figure_for_a_paper(pellicle, spectrum_file, scene, tmp_path):
     file, figure = spectrum_file(), tmp_path / "oxide.pdf"
     ran = pellicle("fit", file, *scene, "--figure", figure, code=0)
@@ -315,7 +325,8 @@ def test_limits_of_a_specification(pellicle, spectrum_file, scene, tmp_path):
     assert found["spec"] == json.loads((out / "result.json").read_text())["spec"] == {"thickness": "pass"}
     ran = pellicle("fit", file, *scene, "--spec", "thickness=310:400", code=6)
     assert "thickness: FAIL (310 to 400 nm; fitted 30" in ran.out
-    pellicle("fit", file, *scene, "--spec", "thicknes=310:400").refused(3, "did you mean 'thickness'")
+    pellicle("fit", file, *scene, "--spec", "width=310:400").refused(3, "the fit has thickness")
+    pellicle("fit", file, *scene, "--spec", "thicknes=310:400").refused(2, "did you mean 'thickness'")
     pellicle("fit", file, *scene, "--spec", "thickness").refused(2, "NAME=LO:HI")
 
 

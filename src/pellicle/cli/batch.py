@@ -91,6 +91,10 @@ class Batch:
             if len(groups) > 1:
                 raise UsageError("--figure is of one fit: give one file or --joint, or --out for all figures")
             figure_path(self.figure, "figure")
+        if self.spec and len(groups[0]) == 1:
+            from pellicle.reporting.specification import check_names, parse_limits
+
+            check_names(parse_limits(self.spec), groups[0][0].scene)
         self.brief = len(groups) > 1 and not self.verbose and not self.inputs.repeats
         folders: list[Path | None] = [None] * len(groups)
         if self.out is not None:

@@ -53,6 +53,21 @@ def verdicts(record: Mapping[str, Any], limits: Limits) -> dict[str, str]:
     return {name: _verdict(known[name], *limits[name]) if decided else UNDECIDED for name in limits}
 
 
+def check_names(limits: Limits, scene: Any) -> None:
+    """Raise UsageError, before a fit, for a limit whose name is close to that of a number of a film."""
+    from pellicle.fitting.film.parameters import fixed_numbers, parameters, tied_numbers
+    from pellicle.scene.film import Scene
+
+    if not isinstance(scene, Scene):
+        return
+    named = [*parameters(scene), *tied_numbers(scene)]
+    known = [*(number.name for number in named), *(name for name, *_ in fixed_numbers(scene))]
+    for name in limits:
+        near = did_you_mean(name, known)
+        if near and name not in known and not name.startswith("instrument."):
+            raise UsageError(f"--spec {name}{near}: the fit has {', '.join(known)}")
+
+
 def _verdict(parameter: Mapping[str, Any], low: float, high: float) -> str:
     value, expanded = parameter["value"], parameter["expanded"]
     if value is None or expanded is None:
