@@ -17,7 +17,7 @@ from pellicle.fitting.reported_layer import principal_indices
 from pellicle.fitting.result import Profile
 from pellicle.materials import material
 from pellicle.reporting.figures import draw_fit as draw
-from pellicle.reporting.figures import of_index, of_part
+from pellicle.reporting.figures import index_panels, of_index, of_part
 from pellicle.reporting.fit_tables import fit_csv, nk_csvs
 from pellicle.reporting.fit_text import report
 from pellicle.reporting.matplotlib_figure import save_figure
@@ -310,3 +310,10 @@ def test_birefringence_has_the_error_of_a_difference():
     np.testing.assert_allclose(found["birefringence"].n_stderr, np.sqrt(4 + 9 - 6) * 1e-3)
     isotropic = pl.Scene(pl.Layer(free[0], 100.0), 1.5)
     assert principal_indices(isotropic, at, covariance, NM[:3]) == {}
+
+
+def test_the_band_of_k_ends_at_zero(fit, with_part):
+    curve = replace(fit.curve, k=np.full(41, 0.01), k_stderr=np.full(41, 0.5))
+    [_, panel] = index_panels(with_part(fit, curve=curve))
+    assert panel.bands[0].low.min() == 0
+    assert panel.bands[0].high.max() == pytest.approx(0.51)

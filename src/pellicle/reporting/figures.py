@@ -333,6 +333,7 @@ def _n_and_k(
             name = which or letter
             lines.append(Line(x, value, name, colour, width=1.2, listed=bool(which), model=True))
             about = f"± error of {name}", colour, 0.25
-            bands.append(Band(x, value - error, value + error, *about, listed=False))
+            low = np.maximum(value - error, 0.0) if letter == "k" else value - error
+            bands.append(Band(x, low, value + error, *about, listed=False))
         panels.append(Panel(letter, lines, bands, 1.3, legend="above" if len(curves) > 1 else ""))
     return panels
