@@ -30,7 +30,9 @@ def read_tiff(path: Path, asked: Asked) -> RawCube:
         import tifffile
 
         with tifffile.TiffFile(path) as file:
-            data, letters = _stack(path, file)
+            shaped = len(file.series) == 1  # else the pages were written one by one
+        with tifffile.TiffFile(path, is_shaped=None if shaped else False) as file:
+            data, letters = _stack(path, file, shaped)
             wavelength, unit, notes = asked.wavelength, asked.unit, []
             if wavelength is None:
                 wavelength, told = _channel_wavelengths(file)
@@ -78,13 +80,9 @@ class CompressedPages:
             return np.asarray(pages[where])
 
 
-def _stack(path: Path, file: Any) -> tuple[MappedFile | CompressedPages, str]:
+def _stack(path: Path, file: Any, shaped: bool) -> tuple[MappedFile | CompressedPages, str]:
     """The numbers of a stack, and a letter for each axis as tifffile names them."""
-    series, shaped = file.series, True
-    if len(series) > 1:  # pages that were written one by one
-        file.is_shaped, shaped = False, False
-        file.__dict__.pop("series", None)
-        series = file.series
+    series = file.series
     first = series[0]
     if len(series) > 1:
         shapes = ", ".join(sorted({" x ".join(map(str, s.shape)) for s in series}))
