@@ -15,7 +15,7 @@ from suite import Case
 import pellicle as pl
 from pellicle.identification import films
 from pellicle.identification.evidence import weigh
-from pellicle.identification.growth import grown
+from pellicle.identification.growth import Growth, grow
 from pellicle.identification.identify import Request, problem_of
 from pellicle.identification.search import polished
 from pellicle.identification.structure import Material, Structure
@@ -32,7 +32,7 @@ def gain(case: Case, data: Any) -> float:
     )
     problem, _ = problem_of([data], request)
     tables, nm = problem.views[0].tables, case.view.nm
-    one = grown(problem, [x for x in names if x in tables], np.inf, layers=1)
+    one = grow(Growth(problem, [x for x in names if x in tables]), layers=1)
     true = []
     for kinds in product((True, False), repeat=len(case.specimen.layers)):
         start, media = [], []

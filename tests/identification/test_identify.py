@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import pellicle as pl
+from pellicle.identification import identify
 from pellicle.identification.free_models import CONDUCTOR, FREE_MODELS, built
+from pellicle.identification.growth import grow
 from pellicle.identification.hypothesis import Outcome
 from tests import by_tmm
 
@@ -98,6 +100,18 @@ def test_a_reflectance_relative_to_silicon_is_at_most_undecided():
     alone = pl.identify(relative, "Si", among=["SiO2"], layers=1, allow=())
     assert (alone.status, alone.hypotheses) == (Outcome.NONE, ())
     assert alone.verdict.startswith("No hypothesis that was tried describes the data")
+
+
+def test_only_likely_mistakes_are_grown(monkeypatch):
+    """Of a reflectance relative to aluminium, one to silicon is not tried."""
+    spectrum = reflectance(("SiO2", 300.0), noise=0.001)
+    mirror = np.abs((1 - index("Al")) / (1 + index("Al"))) ** 2
+    relative = dataclasses.replace(spectrum, values=spectrum.values / mirror)
+    grown = []
+    monkeypatch.setattr(identify, "grow", lambda *given: grown.append(given) or grow(*given))
+    found = pl.identify(relative, "Si", among=["SiO2", "Si3N4"], layers=1)
+    assert found.best.condition == "the reflectance was measured relative to Al"
+    assert len(grown) == 2
 
 
 def test_a_wrong_back_face_is_at_most_undecided():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -86,13 +87,33 @@ class Growth:
     """Attempts at one problem, and their weights so far, the best first."""
 
     problem: Problem
+    names: Sequence[str]
+    """Materials of the catalogue that are tried."""
     deadline: float = np.inf
     """Time of `time.monotonic` after which nothing more is tried."""
     attempts: list[Attempt] = field(default_factory=list)
     weighed: list[Weighed] = field(default_factory=list)
-    order: list[str] = field(default_factory=list)
-    """Materials of the catalogue, the best single film first."""
     columns: dict[int, list[Column]] = field(default_factory=dict)
+
+    @cached_property
+    def ranks(self) -> dict[str, tuple[float, np.ndarray]]:
+        """χ² and the best thicknesses of a film of each material by a scan, the best film first."""
+        grid, found = thickness_grid(self.problem), []
+        for name in self.names:
+            costs = scan(self.scanned, [[x] for x in self.tables(name)], grid[:, None])
+            at = minima(costs, 2)
+            found.append((float(costs[at[0]]), name, grid[at]))
+        return {name: (cost, at) for cost, name, at in sorted(found, key=lambda x: x[0])}
+
+    @property
+    def order(self) -> list[str]:
+        """Materials of the catalogue, the best single film first."""
+        return list(self.ranks)
+
+    @property
+    def least(self) -> float:
+        """χ² of the best film of the catalogue by a scan."""
+        return min((cost for cost, _ in self.ranks.values()), default=np.inf)
 
     @property
     def oxidised(self) -> bool:
@@ -139,12 +160,11 @@ class Growth:
         return [view.tables[name] for view in self.scanned.views]
 
 
-def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int = 2) -> Growth:
-    """Grow structures of the materials `names` and of models, up to `layers` layers."""
-    growth = Growth(problem, deadline)
-    if "SiO2" in problem.views[0].tables:
+def grow(growth: Growth, layers: int = 2) -> Growth:
+    """Grow structures of the materials of the catalogue and of models, up to `layers` layers."""
+    if "SiO2" in growth.problem.views[0].tables:
         growth.add([Material("SiO2", BARE)], [np.array([2.0])])
-    _single_films(growth, names)
+    _single_films(growth)
     growth.add([growth.film("cauchy")], _model_starts(growth, "cauchy", 4))
     if not growth.done(strain=STRAINED):
         for model in ("sellmeier", "cauchy-urbach", CONDUCTOR, "drude", "lorentz", "tauc-lorentz"):
@@ -152,27 +172,18 @@ def grown(problem: Problem, names: Sequence[str], deadline: float, layers: int =
     if not growth.done(_FLEXIBLE):
         _effects(growth)
     enough = growth.done(_FLEXIBLE)
-    if layers > 1 and time.monotonic() < deadline:
+    if layers > 1 and time.monotonic() < growth.deadline:
         pairs.grow(growth, settled=enough)
     if layers > 1 and not growth.done():
         _pair_effects(growth)
-    growth.weighed = weigh(problem, growth.attempts, growth.columns)
+    growth.weighed = weigh(growth.problem, growth.attempts, growth.columns)
     return growth
 
 
-def _single_films(growth: Growth, names: Sequence[str]) -> None:
-    grid = thickness_grid(growth.problem)
-    ranks: dict[str, tuple[float, np.ndarray]] = {}
-    for name in names:
-        costs = scan(growth.scanned, [[x] for x in growth.tables(name)], grid[:, None])
-        at = minima(costs, 2)
-        ranks[name] = float(costs[at[0]]), grid[at]
-    growth.order = sorted(ranks, key=lambda name: ranks[name][0])
-    close = [
-        x for x in growth.order[_TABLES:_MOST_TABLES] if ranks[x][0] < ranks[growth.order[0]][0] + _CLOSE
-    ]
-    for name in [*growth.order[:_TABLES], *close]:
-        growth.add([growth.film(name)], ranks[name][1][:, None])
+def _single_films(growth: Growth) -> None:
+    for i, (name, (cost, at)) in enumerate(growth.ranks.items()):
+        if i < _TABLES or (i < _MOST_TABLES and cost < growth.least + _CLOSE):
+            growth.add([growth.film(name)], at[:, None])
 
 
 def _model_starts(growth: Growth, model: str, keep: int) -> list[np.ndarray]:
