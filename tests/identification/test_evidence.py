@@ -3,9 +3,13 @@
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from pellicle.identification.evidence import System
-from pellicle.identification.problem import Attempt
+import pellicle as pl
+from pellicle.identification.evidence import System, weigh
+from pellicle.identification.problem import Attempt, Problem
+from pellicle.identification.search import polished
+from pellicle.identification.signal_view import SignalView
 from pellicle.identification.structure import Material, Structure
+from tests import by_tmm
 
 
 def test_numbers_stay_within_their_bounds():
@@ -25,3 +29,22 @@ def test_numbers_stay_within_their_bounds():
     np.testing.assert_allclose(solution, expected, atol=1e-6)
     assert solution[2] == lower[2]
     np.testing.assert_allclose(left, data - matrix @ solution)
+
+
+def test_an_index_of_a_curved_shape_is_described():
+    """ψ and Δ of a film whose index is that of a Cauchy film but for a curvature of 0.4 %."""
+    nm = np.linspace(450, 950, 101)
+    t = np.linspace(-1, 1, nm.size)
+    index = (1.9 + 1.5e4 / nm**2) * (1 + 0.004 * (2 * t**2 - 1)) + 0j
+    ncs = by_tmm.ncs(nm, (1.0, index, np.asarray(pl.medium("Si")(nm), complex)), [400.0], 70.0)
+    psi, delta = by_tmm.psi_delta(*ncs.T)
+    noise = 0.05 * np.random.default_rng(1).normal(size=(2, nm.size))
+    values = {"delta": (delta + noise[1]) % 360, "angle": np.full(nm.size, 70.0)}
+    data = pl.Spectrum(nm, psi + noise[0], "psi-delta", **values)
+    view = SignalView(data, pl.Scene(pl.Layer("SiO2", 0.0), "Si"))
+    problem = Problem((view,), 3000.0)
+    film = polished(problem, Structure((Material("cauchy", 3000.0),)), [np.array([400.0, 1.9, 1.5e4])])
+    [found] = weigh(problem, [film], {})
+    assert found.adequate
+    assert found.strain < 2
+    assert abs(found.x[0] - 400) < 2 * found.stderr[0] < 5

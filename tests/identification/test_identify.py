@@ -114,6 +114,15 @@ def test_only_likely_mistakes_are_grown(monkeypatch):
     assert len(grown) == 2
 
 
+def test_other_thicknesses_of_a_film_are_left():
+    """Noise of 0.5 % hides the fringes of PMMA on glass, whose index differs by 0.02."""
+    spectrum = reflectance(("PMMA", 120.0), substrate="BK7", noise=0.005)
+    found = pl.identify(spectrum, "BK7", among=["PMMA"], layers=1)
+    films = [x for x in found.hypotheses if x.name.startswith("PMMA, ")]
+    assert len(films) > 1
+    assert len({x.name for x in found.hypotheses}) == len(found.hypotheses)
+
+
 def test_a_wrong_back_face_is_at_most_undecided():
     """Light from the front face alone, stated to be that of a plate."""
     spectrum = reflectance(("CdS", 80.0), substrate="BK7")

@@ -200,6 +200,13 @@ def hypotheses(growth: Growth, weighed: Sequence[Weighed], condition: str = "") 
     """Structures as hypotheses, with their probabilities beside each other."""
     shares = np.exp([x.ln_z - weighed[0].ln_z for x in weighed]) if weighed else np.zeros(0)
     found = [_hypothesis(growth, x, condition) for x in weighed]
+    names = [x.name for x in found]
+    found = [
+        replace(x, name=f"{x.name}, {' and '.join(f'{y.thickness.value:.3g}' for y in x.layers)} nm")
+        if names.count(x.name) > 1
+        else x
+        for x in found
+    ]
     return [
         replace(x, probability=float(p)) for x, p in zip(found, shares / max(shares.sum(), 1.0), strict=True)
     ]

@@ -133,7 +133,7 @@ def _weighed(problem: Problem, system: System, factor: float, sigma: np.ndarray)
     named = np.array([x.named for x in columns])
     sizes = np.abs(solution[count:]) * named
     remaining = float(np.sqrt(np.mean(left**2)))
-    rest = sizes * np.array([x.name != "dispersion" for x in columns])
+    rest = sizes * np.array([not x.name.endswith("dispersion") for x in columns])
     implausible, otherwise = (float(x @ x) > improbable(int(named.sum())) for x in (sizes, rest))
     large = remaining > LARGE and _too_large(problem, left * sigma)
     worst = int(np.argmax(sizes))
@@ -198,6 +198,7 @@ def _of_view(attempt: Attempt, view: SignalView) -> dict[str, np.ndarray]:
             changed(_index_effect(layer), TABLE_UNCERTAINTY / _PROBE, tilted(i, 1.0), depth)
     slope = 2 * (view.wavelength - view.wavelength[0]) / np.ptp(view.wavelength) - 1
     changed("dispersion", allowed.dispersion / _PROBE, tilted(thickest, slope), depth)
+    changed("curved dispersion", allowed.dispersion / _PROBE, tilted(thickest, 2 * slope**2 - 1), depth)
     if top > 0:
         first = index[top] if depth[top] > 0 or top == SLOTS - 1 else index[top + 1]
         if "roughness" not in structure.effects:

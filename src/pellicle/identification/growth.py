@@ -14,7 +14,7 @@ from pellicle.identification.evidence import NATIVE, Weighed, weigh
 from pellicle.identification.free_models import CONDUCTOR, FREE_MODELS
 from pellicle.identification.hypothesis import EFFECTS
 from pellicle.identification.problem import Attempt, Column, Problem
-from pellicle.identification.search import minima, polished, scan, thickness_grid
+from pellicle.identification.search import minima, rivals, scan, thickness_grid
 from pellicle.identification.structure import OXIDE, Material, Structure
 
 NOISE_LIKE = 1.3
@@ -101,7 +101,7 @@ class Growth:
         grid, found = thickness_grid(self.problem), []
         for name in self.names:
             costs = scan(self.scanned, [[x] for x in self.tables(name)], grid[:, None])
-            at = minima(costs, 2)
+            at = minima(costs, 3)
             found.append((float(costs[at[0]]), name, grid[at]))
         return {name: (cost, at) for cost, name, at in sorted(found, key=lambda x: x[0])}
 
@@ -133,7 +133,7 @@ class Growth:
         if self.attempts and time.monotonic() > self.deadline:
             return
         structure = Structure(tuple(layers), effects)
-        self.attempts.append(polished(self.problem, structure, list(starts)))
+        self.attempts += rivals(self.problem, structure, list(starts))
 
     def film(self, name: str) -> Material:
         return Material(name, self.problem.thickest)
@@ -205,7 +205,7 @@ def _effects(growth: Growth) -> None:
     single = [x for x in growth.weighed if len(x.structure.layers) == 1 and x.attempt.x[0] > BARE]
     tables = [x for x in single if not x.structure.layers[0].modelled]
     cauchy = [x for x in single if x.structure.layers[0].name == "cauchy"]
-    others = [x for x in single if x.structure.layers[0].modelled and x not in cauchy]
+    others = [x for x in single if x.structure.layers[0].modelled and x.structure.layers[0].name != "cauchy"]
     bases = [*tables[:1], *cauchy[:1]]
     if others and (not bases or others[0].ln_z > bases[0].ln_z + 20):
         bases.append(others[0])

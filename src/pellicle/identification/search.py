@@ -17,6 +17,9 @@ _SCANNED = 2
 """Layers of a scan."""
 _ENOUGH, _FAILURES = 1e-4, 4
 """Relative fall of χ² below which a polish ends, and steps without a fall that it takes."""
+_RIVAL = 20.0
+"""χ² above the best up to which another minimum of a structure is a rival: twice what excludes it, and what
+effects of the sample make up for."""
 THICK = 20_000.0
 """Largest thickness (nm) that is tried."""
 
@@ -56,17 +59,35 @@ def minima(costs: np.ndarray, most: int) -> np.ndarray:
 
 
 def polished(problem: Problem, structure: Structure, starts: Sequence[np.ndarray]) -> Attempt:
-    """The best minimum from several starts (numbers,) each: a few steps from all, then more from the best."""
+    """The best minimum from several starts (numbers,) each."""
+    return rivals(problem, structure, starts)[0]
+
+
+def rivals(problem: Problem, structure: Structure, starts: Sequence[np.ndarray]) -> list[Attempt]:
+    """Distinct minima from several starts (numbers,) each, the best and those nearly as good: a few steps
+    from all, then more from these."""
 
     def at(_: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return problem.linearised(structure, x)
 
     x, bounds = np.stack(starts), (structure.lower, structure.upper)
     if len(x) > 1:
-        tried = descended(problem, at, x, bounds, _TRIED)
-        x = tried.x[[np.argmin(tried.cost)]]
-    found = descended(problem, at, x, bounds, ROUNDS)
-    return Attempt(structure, found.x[0], found.values[0], found.slopes[0].T, float(found.cost[0]))
+        x = _distinct(structure, descended(problem, at, x, bounds, _TRIED), 2 * _RIVAL).x
+    found = _distinct(structure, descended(problem, at, x, bounds, ROUNDS), _RIVAL)
+    return [
+        Attempt(structure, x, y, slopes.T, float(cost)) for x, y, slopes, cost in zip(*found, strict=True)
+    ]
+
+
+def _distinct(structure: Structure, found: Descent, most: float) -> Descent:
+    """Rows up to `most` of χ² above the best, the best first, without those of nearly equal thicknesses."""
+    kept: list[int] = []
+    depth = structure.thicknesses(found.x)
+    for i in np.argsort(found.cost):
+        near = [np.all(np.abs(depth[i] - depth[j]) < 3.0 + 0.03 * depth[j]) for j in kept]
+        if not any(near) and (not kept or found.cost[i] < found.cost[kept[0]] + most):
+            kept.append(int(i))
+    return Descent(*(rows[kept] for rows in found))
 
 
 class Descent(NamedTuple):
