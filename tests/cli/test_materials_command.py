@@ -27,7 +27,7 @@ def test_an_unknown_name_suggests(pellicle):
 
 
 def test_an_unknown_name_says_what_else_may_stand_there(pellicle):
-    ran = pellicle("materials", "Ag2S", code=2)
+    ran = pellicle("materials", "NiFe2O4", code=2)
     assert "file of n and k" in ran.err
     assert "cauchy" in ran.err
 
