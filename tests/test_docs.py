@@ -76,6 +76,8 @@ SLOW = (
     "pellicle compare graded.csv --recipe docs/examples/mixture.toml --recipe docs/examples/graded.toml",
     "pellicle fit steel.csv --recipe docs/surfaces/tempered_steel.toml",  # cli/test_brdf_command.py
     "pellicle fit full.csv --recipe docs/surfaces/figure_3_deviated.toml",
+    "pellicle fit coat.csv --recipe docs/surfaces/clear_coat.toml",
+    "pellicle fit published.csv --recipe docs/surfaces/shader_film_published.toml",
     "pellicle sample --recipe fits/brdf/tempered_steel/recipe.toml --out results/steel",  # sampling
     # draw more than one sphere of eight, and in full size
     *each("pellicle chart docs/surfaces/figure_{}.toml", "2_coloured 2_clay 3_parallel 3_deviated"),
