@@ -62,22 +62,22 @@ def register() -> None:
 def _init(film: Any, props: Any) -> None:
     mi.BSDF.__init__(film, props)
     with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
-        if "eta" not in table:
+        if "own_spectra" not in table:
             raise ValueError(f"{props['filename']}: is of another version of pellicle; export the film again")
         film.span = [float(x) for x in table["thickness"]]
         own = float(table["default_thickness"])
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
         film.eta = float(table["eta"])  # 0: it only reflects
-        values = _values(table, "")
-        if film.eta:
-            values = _both_sides(values, _values(table, "_transmitted"), _values(table, "_below"))
-    film.shape, film.table = values.shape, table_texture(values)
+        film.own, film.values = own, _values(table, "", film.eta)
+        film.fine = None if mi.is_rgb else _values(table, "own_", film.eta)
+    film.table = table_texture(film.values)
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
     film.thickness, film.alpha = (
         mi.Float(x) if isinstance(x, float) else x
         for x in (props.get("thickness", own), props.get("alpha", 0.1))
     )
+    _slice(film)
     film.smooth = isinstance(film.alpha, type(mi.Float(0))) and bool(np.all(np.array(film.alpha) == 0))
     film.straight = abs(film.eta - 1) < 1e-3
     varies = any(isinstance(x, mi.Texture) for x in (film.thickness, film.alpha))
@@ -94,23 +94,62 @@ def _init(film: Any, props: Any) -> None:
     film.m_flags = film.m_components[0] | film.m_components[-1]
 
 
-def _values(table: Any, side: str) -> np.ndarray:
-    """Table of a side (thicknesses, cosines, wavelengths, elements), in RGB (thicknesses, cosines, 3)."""
+def _values(table: Any, kind: str, eta: float) -> np.ndarray:
+    """Table of a film (thicknesses, cosines, wavelengths, elements), in RGB (thicknesses, cosines, 3).
+
+    Of the `kind` "own_" it is that of its own thickness and has no such axis.
+    """
+    sides = [_side(table, kind, side) for side in ("", "_transmitted", "_below") if eta or not side]
+    return _both_sides(*sides) if eta else sides[0]
+
+
+def _side(table: Any, kind: str, side: str) -> np.ndarray:
     if mi.is_rgb:
         return table[f"rgb{side}"]
-    values = table[f"spectra{side}"][..., None]
+    values = table[f"{kind}spectra{side}"][..., None]
     if not mi.is_polarized:
         return values
     if f"mueller{side}" not in table:
         raise RuntimeError("this film has no waves of one phase, which polarised variants need")
-    return np.concatenate([values, table[f"mueller{side}"]], axis=-1)
+    return np.concatenate([values, table[f"{kind}mueller{side}"]], axis=-1)
 
 
 def _both_sides(reflected: np.ndarray, passed: np.ndarray, below: np.ndarray) -> np.ndarray:
     """One table for one lookup: rows of light from above, then from below; transmission beside reflection."""
-    total = np.zeros_like(passed[:, 1:])  # all of which is reflected
-    lower = np.concatenate([below, np.concatenate([total, passed], axis=1)], axis=-1)
-    return np.concatenate([np.concatenate([reflected, passed], axis=-1), lower], axis=1)
+    rows = passed.ndim - 3 if not mi.is_rgb else 1  # the axis of the cosines
+    total = np.zeros_like(np.delete(passed, 0, rows))  # all of which is reflected
+    lower = np.concatenate([below, np.concatenate([total, passed], axis=rows)], axis=-1)
+    return np.concatenate([np.concatenate([reflected, passed], axis=-1), lower], axis=rows)
+
+
+def _slice(film: Any) -> None:
+    """Tabulate an even film at its thickness: half of the nodes of a lookup, and finer ones at its own.
+
+    RGB has one lookup for all channels, which gains nothing.
+    """
+    film.plane = None
+    if film.fine is None or isinstance(film.thickness, mi.Texture):
+        return
+    nm = np.ravel(np.array(film.thickness))
+    if len(nm) != 1:
+        return
+    (low, high), last, plane = film.span, len(film.values) - 1, film.fine
+    if abs(nm[0] - film.own) > 1e-5 * film.own:
+        at = np.clip((float(nm[0]) - low) / (high - low), 0, 1) * last
+        row = min(int(at), last - 1)
+        plane = (1 - at + row) * film.values[row] + (at - row) * film.values[row + 1]
+    film.plane = table_texture(plane), (1, *plane.shape)
+
+
+def _grid(film: Any) -> tuple[Any, tuple[int, ...]]:
+    """The table to look up and its shape: that over all thicknesses for gradients."""
+    if film.plane is None or dr.grad_enabled(film.thickness):
+        return film.table, film.values.shape
+    return film.plane
+
+
+def _parameters_changed(film: Any, keys: Any = ()) -> None:
+    _slice(film)
 
 
 def _number(value: Any, si: Any, active: Any) -> Any:
@@ -122,19 +161,21 @@ def _elements(film: Any, si: Any, row: Any, active: Any) -> list[Any]:
 
     They are those of reflection, then of transmission; where light is not polarised m11 alone.
     """
-    nm = film.thickness
+    nm, (table, shape) = film.thickness, _grid(film)
     if isinstance(nm, mi.Texture):
         nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
-    across = (row + 0.5) / film.shape[1]
-    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), film.shape[0])
+    across = (row + 0.5) / shape[1]
+    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), shape[0])
     if mi.is_rgb:
-        rgb = film.table.eval(mi.Point2f(across, down), active)
-        return [mi.Color3f(*rgb[at : at + 3]) for at in range(0, film.shape[2], 3)]
+        rgb = table.eval(mi.Point2f(across, down), active)
+        return [mi.Color3f(*rgb[at : at + 3]) for at in range(0, shape[2], 3)]
     first, last = film.wavelength
-    values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(film.shape[3])]
+    values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(shape[3])]
     for channel in range(len(values[0])):
         share = ((si.wavelengths[channel] if mi.is_spectral else GREEN) - first) / (last - first)
-        found = film.table.eval(mi.Point3f(node(share, film.shape[2]), across, down), active)
+        along = node(share, shape[2])
+        at = mi.Point3f(along, across, down) if shape[0] > 1 else mi.Point2f(along, across)
+        found = table.eval(at, active)
         for value, element in zip(values, found, strict=True):
             value[channel] = element
     return values
@@ -142,11 +183,11 @@ def _elements(film: Any, si: Any, row: Any, active: Any) -> list[Any]:
 
 def _light(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], list[Any]]:
     """Elements of reflection and of transmission at a facet: `cosine` is negative for light from below."""
-    root = dr.sqrt(dr.abs(cosine))
+    root, (_, shape) = dr.sqrt(dr.abs(cosine)), _grid(film)
     if not film.eta:
-        reflected = _elements(film, si, root * (film.shape[1] - 1), active)
+        reflected = _elements(film, si, root * (shape[1] - 1), active)
         return reflected, [dr.zeros(mi.UnpolarizedSpectrum)] * len(reflected)
-    last = film.shape[1] // 3  # the row of the normal from above, and of the critical angle among those below
+    last = shape[1] // 3  # the row of the normal from above, and of the critical angle among those below
     square = 1 - film.eta**2 * (1 - cosine**2)  # of the cosine outside, for light from below
     total = dr.safe_acos(-cosine * film.eta / max(film.eta**2 - 1, 1e-6) ** 0.5)
     outside = dr.select(square > 0, dr.sqrt(dr.safe_sqrt(square)), -2 / dr.pi * total)
@@ -284,6 +325,7 @@ def _film() -> Any:
         pdf = _pdf
         eval_pdf = _eval_pdf
         traverse = _traverse
+        parameters_changed = _parameters_changed
         to_string = _to_string
 
     return PellicleFilm
