@@ -1,4 +1,4 @@
-"""Draw the figures of published systems in docs/figures.
+"""Draw the figures of published systems, and pictures of films, in docs/figures.
 
 The thin conductors of Gerardin, Holzschuch and Martinetto 2019, and the tempered steel and water-like
 films of an account of Belcour and Barla 2017.
@@ -164,6 +164,8 @@ def temper_colours() -> Figure:
 
 
 def main() -> None:
+    import gallery_pictures  # beside this file
+
     FOLDER.mkdir(parents=True, exist_ok=True)
     drawn = {
         "hematite_on_glass": hematite,
@@ -176,6 +178,11 @@ def main() -> None:
         for name, draw in drawn.items():
             draw().savefig(FOLDER / f"{name}.png", dpi=110, metadata={"Software": None})
             print(FOLDER / f"{name}.png")
+    for name, picture in gallery_pictures.PICTURES.items():
+        picture().save(FOLDER / f"{name}.png", optimize=True)
+        print(FOLDER / f"{name}.png")
+    for name, mean in gallery_pictures.differences().items():
+        print(f"{name}: mean ΔE2000 {mean:.1g} from spectra in steps of 1 nm")
 
 
 if __name__ == "__main__":
