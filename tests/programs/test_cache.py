@@ -178,6 +178,25 @@ def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_pr
     assert len(TRACED) == 7
 
 
+ONE = []
+
+
+def joined(plan: int, arrays: list[Any]) -> Sum:
+    ONE.append(len({id(x) for x in arrays}))
+    return Sum(sum(jnp.sum(x) for x in arrays))
+
+
+@pytest.mark.parametrize("cached", [True, False])
+def test_an_array_in_two_places_is_one_argument(cache, new_process, cached):
+    if not cached:
+        jax.config.update("jax_compilation_cache_dir", None)
+    run, x, number = kept(joined), np.arange(3.0), 2.0
+    assert run(1, [x, number, x, number]).total == 10
+    assert run(1, [x, 5.0, x, 6.0]).total == 17  # numbers that are one object are one by chance
+    assert run(1, [x, number, 2 * x, number]).total == 13
+    assert ONE[-2:] == [3, 4]
+
+
 @pytest.mark.parametrize("cached", [True, False])
 def test_programs_of_many_calls_have_no_options(cache, new_process, monkeypatch, cached, refuses):
     """XLA refuses an option that it does not have."""

@@ -1,6 +1,6 @@
 """Coherent groups of layers between incoherent plates, and the intensities of all groups together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -12,7 +12,8 @@ from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.optics import coherent, interface, orders, plate, response
 from pellicle.optics.anisotropy import Principal, each_index, mixes_polarisations, seen_by
 from pellicle.optics.gradient import Gradient, gauss_points
-from pellicle.optics.pair import imag, real
+from pellicle.optics.layer_rows import StackedLayers, stack_numbers
+from pellicle.optics.pair import Pair, imag, is_real, real
 from pellicle.optics.repeats import Repeats
 from pellicle.scene.film import CoherentLayers, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
@@ -24,9 +25,9 @@ class CoherentGroup(NamedTuple):
     """Coherent layers between two thick media: numbers at each wavelength, of the types the plan needs."""
 
     above: Any  # media of optics
-    layers: list[Any]  # of a graded one its `Gradient`
+    layers: Sequence[Any]  # of a graded one its `Gradient`
     below: Any
-    phases: list[Any]
+    phases: Any  # a list, or an array of the layers in rows
     angle: Any  # of incidence in radians; None is normal, `Inside` within a plate
     internal: Any  # internal transmittance of the plate below, None on a half space; may be `PerPolarisation`
     collected: plate.Collection | None  # part of the light from beneath that plate, None for all
@@ -74,14 +75,15 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
             internal = _per_polarisation(partial(_internal, medium, a, plates[i], wavelength), medium)
             part = plates[i].back_collected, plates[i].back_reflections
             collected = plate.Collection(*part) if any(x is not None for x in part) else None
+        layers, phases = _layers_and_phases(plan, group.layers, wavelength)
         smooth = all(face is None for face in group.roughness)
         rough = [0.0 if face is None else 2 * jnp.pi / wavelength * face for face in group.roughness]
         evaluated.append(
             CoherentGroup(
                 above=thick[i],
-                layers=[_layer_index(plan, layer, wavelength) for layer in group.layers],
+                layers=layers,
                 below=thick[i + 1],
-                phases=[2 * jnp.pi / wavelength * layer.thickness for layer in group.layers],
+                phases=phases,
                 angle=angle if i == 0 or angle is None else interface.Inside(a),
                 internal=internal,
                 collected=collected,
@@ -94,6 +96,49 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
             )
         )
     return evaluated
+
+
+def _layers_and_phases(plan: Plan, layers: Sequence[Layer], wavelength: Any) -> tuple[Any, Any]:
+    """Indices and phases of layers; of many homogeneous ones in rows of arrays."""
+    k0 = 2 * jnp.pi / wavelength
+    if len(layers) <= coherent.FEW or plan.on("anisotropy") or plan.on("gradient") or jnp.ndim(k0) != 1:
+        return [_layer_index(plan, x, wavelength) for x in layers], [k0 * x.thickness for x in layers]
+    indices = _index_rows(plan, [layer.material for layer in layers], wavelength)
+    return indices, k0 * stack_numbers([layer.thickness for layer in layers], k0)[:, None]
+
+
+def _index_rows(plan: Plan, materials: Sequence[Any], wavelength: Any) -> StackedLayers:
+    """Indices of materials: those of one kind together, and one whose numbers are the same objects once."""
+    kinds: dict[Any, dict[Any, list[Any]]] = {}
+    places = []
+    for material in materials:
+        leaves, structure = jax.tree.flatten(material)
+        kind, key = (structure, *map(jnp.shape, leaves)), tuple(map(id, leaves))
+        kinds.setdefault(kind, {})[key] = leaves
+        places.append((kind, key))
+    order = {
+        place: row for row, place in enumerate((kind, key) for kind, own in kinds.items() for key in own)
+    }
+    rows = [_index_of_kind(kind[0], [*own.values()], wavelength) for kind, own in kinds.items()]
+    re = jnp.concatenate([real(x) for x in rows])
+    lossless = not plan.on("absorption") or all(map(is_real, rows))
+    distinct = re if lossless else Pair(re, jnp.concatenate([imag(x) + 0.0 * real(x) for x in rows]))
+    return StackedLayers(distinct, tuple(order[place] for place in places))
+
+
+def _index_of_kind(structure: Any, numbers: Sequence[Sequence[Any]], wavelength: Any) -> Any:
+    """Index (materials, wavelengths) of materials of one structure, by the numbers of each."""
+    columns = [*zip(*numbers, strict=True)]
+    same = [all(x is column[0] for x in column) for column in columns]
+    axes = tuple(None if alike else 0 for alike in same)
+    stacks = [x[0] if alike else stack_numbers(x, wavelength) for x, alike in zip(columns, same, strict=True)]
+
+    def index(*leaves: Any) -> Any:
+        return structure.unflatten(leaves).index(wavelength)
+
+    if all(same):
+        return jax.tree.map(lambda x: x[None], index(*stacks))
+    return jax.vmap(index, axes)(*stacks)
 
 
 def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Any:
@@ -140,18 +185,18 @@ def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
         return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
     if plan.on("orders"):
         return _damped_orders(plan, group, polarisation)
-    amplitudes = response_of(plan, group, polarisation)
+    [amplitudes] = responses_of(plan, group, polarisation)
     functions = response.reflectance, response.transmittance, response.reflectance_below
     return _Powers(*(partial(function, amplitudes) for function in functions))
 
 
-def response_of(plan: Plan, group: CoherentGroup, polarisation: str) -> response.Response:
-    """The response of a group to one polarisation."""
-    film = (group.above, group.layers, group.below, group.phases, group.angle, polarisation)
+def responses_of(plan: Plan, group: CoherentGroup, polarisations: str) -> tuple[response.Response, ...]:
+    """The response of a group to each polarisation."""
+    film = (group.above, group.layers, group.below, group.phases, group.angle, polarisations)
     propagating = not plan.on("tunnelling")
     return coherent.responses(
         *film, propagating=propagating, roughness=group.roughness, repeats=group.repeats
-    )[0]
+    )
 
 
 def _damped_orders(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:

@@ -19,15 +19,16 @@ from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.errors import UsageError
 from pellicle.forward_model import mixed_polarisations
-from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, responses_of
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, check_common_range
 from pellicle.optics import ellipsometry, plate
+from pellicle.optics.coherent import FEW
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
-from pellicle.scene.free import free_leaves
+from pellicle.scene.free import Content, free_leaves
 from pellicle.scene.layers import Interface, Layer
 
 Intensities = Callable[[Scene], Any]
@@ -174,7 +175,11 @@ def tabulated(scene: Scene, slope: bool = True) -> Scene:
         substrate = replace(reference.substrate, material=known.substrate.material)
         scene = replace(scene, reference=unchecked(reference, substrate=substrate, layers=tuple(layers)))
     check_common_range(media(scene), wavelength)
-    return eqx.tree_at(media, scene, [_tabulated(m, wavelength, slope) for m in media(scene)])
+    # equal media of many layers are one object, which a program has once; few layers of any media share one
+    keys = [Content(m) if len(scene.layers) > FEW else i for i, m in enumerate(media(scene))]
+    pairs = dict(zip(keys, media(scene), strict=True)).items()
+    known = {key: _tabulated(medium, wavelength, slope) for key, medium in pairs}
+    return eqx.tree_at(media, scene, [known[key] for key in keys])
 
 
 def _tabulated(dispersion: AbstractDispersion, wavelength: np.ndarray, slope: bool) -> AbstractDispersion:
@@ -321,7 +326,7 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
     """Stokes parameters before normalisation."""
     through = plan.kind.transmitted
     if len(groups) == 1:
-        s, p = (response_of(plan, groups[0], polarisation) for polarisation in "sp")
+        s, p = responses_of(plan, groups[0], "sp")
         return ellipsometry.transmitted_stokes(s, p) if through else ellipsometry.stokes(s, p)
     if _birefringent_on_plates(plan):
         if through:
@@ -343,7 +348,7 @@ def _birefringent_on_plates(plan: Plan) -> bool:
 def _cross_product(plan: Plan, groups: list[CoherentGroup], through: bool) -> Any:
     """conj(r_p) r_s of the first group and everything below it, or conj(t_p) t_s through them."""
     group, *below = groups
-    front = ellipsometry.cross_products(response_of(plan, group, "s"), response_of(plan, group, "p"))
+    front = ellipsometry.cross_products(*responses_of(plan, group, "sp"))
     if not below:
         return front.passed if through else front.reflected
     medium, back = (group.internal, group.collected), _cross_product(plan, below, False)

@@ -15,9 +15,7 @@ Source: Born and Wolf, Principles of Optics, section 1.6 (characteristic matrice
 """
 
 from collections.abc import Sequence
-from functools import partial
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -37,8 +35,9 @@ from pellicle.optics.interface import (
     transverse,
     zero_where,
 )
-from pellicle.optics.pair import Number, Pair, abs2, is_real, times_i, to_complex
-from pellicle.optics.repeats import Repeats, matrix_power, places
+from pellicle.optics.layer_rows import LayerRows, StackedLayers, full, layer_rows, repeated
+from pellicle.optics.pair import Number, abs2, is_real, times_i
+from pellicle.optics.repeats import Repeats, matrix_power
 from pellicle.optics.response import Amplitudes, Response
 
 
@@ -46,7 +45,7 @@ def stack(
     ambient: Index,
     layers: Sequence[Index | Gradient],
     substrate: Index,
-    phases: Sequence[Any],
+    phases: Sequence[Any] | jax.Array,
     angle: Any = None,
     polarisations: str = "sp",
     roughness: Sequence[Any] | None = None,
@@ -57,138 +56,61 @@ def stack(
     **Arguments:** as for `coherent.responses`. Every array broadcasts against every other.
     """
     a, q0 = transverse(ambient, angle)
-    rows = _rows((ambient, substrate, a), layers, phases, roughness)
+    rows = layer_rows((ambient, substrate, a), layers, phases, roughness)
     if repeats is not None and repeats.count > 1:
-        rows = _repeated(rows, repeats, layers)
+        rows = repeated(rows, repeats, layers)
     shape, dtype = rows.depth.shape[1:], jnp.promote_types(rows.depth.dtype, jnp.complex64)
 
-    bottom, top, q_top = (_full(number, shape, dtype) for number in (substrate, ambient, q0))
+    bottom, top, q_top = (full(number, shape, dtype) for number in (substrate, ambient, q0))
     q_bottom: Any = stored_by_cpu(normal(bottom, a))
-    uniform: Sequence[Any] = () if is_graded(layers) else layers
-    empty = equal_media(ambient, substrate, *uniform)
-    if is_graded(layers):
-        empty = empty & jnp.all(jnp.stack(rows.points) == top, axis=(0, 1))
+    empty = equal_media(top, bottom) & jnp.all(equal_media(top, *rows.points), axis=0)
     points = jax.tree.map(lambda x: x[::-1], rows.points[::-1])
-    upside_down = _Rows(points, rows.depth[::-1], None, rows.runs[::-1])
+    upside_down = LayerRows(points, rows.depth[::-1], None, rows.runs[::-1])
+    letters = polarisations[:1] if angle is None else polarisations
+    e0, e2 = _weight(top, letters), _weight(bottom, letters)
+    down_faces = up_faces = None
+    if rows.rough is not None:
+        upper, lower = faces(rows.points) if len(rows.points) > 1 else rows.points * 2
+        faces_above: list[Any] = [q_top[None], normal(lower, a)]
+        faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
+        q, q_ = stored_by_cpu((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
+        weight = jnp.concatenate([e0[:, None], _weight(lower, letters)], axis=1)
+        weight_ = jnp.concatenate([_weight(upper, letters), e2[:, None]], axis=1)
+        down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, :, ::-1]
+        up_faces = _rough_faces(q_, weight_, q, weight, rows.rough)
+    # all polarisations at once: the elements of an isotropic layer are the same for s and p
+    (E, H), scale_square = _scaled_fields(upside_down, q_bottom / e2, down_faces, a, letters)
+    (E_, H_), _ = _scaled_fields(rows, q_top / e0, up_faces, a, letters)
+    down, up = q_top * E / e0, q_bottom * E_ / e2
+    denominator = down + H
+    # both directions have the same denominator except for its scale: rescale the second to the first
+    reversed_ = (up - H_) / (up + H_) * denominator
     responses = []
-    for polarisation in polarisations[:1] if angle is None else polarisations:
-        e0, e2 = _weight(top, polarisation), _weight(bottom, polarisation)
-        down_faces = up_faces = None
-        if rows.rough is not None:
-            upper, lower = faces(rows.points) if is_graded(layers) else rows.points * 2
-            faces_above: list[Any] = [q_top[None], normal(lower, a)]
-            faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
-            q, q_ = stored_by_cpu((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
-            weight = jnp.concatenate([e0[None], _weight(lower, polarisation)])
-            weight_ = jnp.concatenate([_weight(upper, polarisation), e2[None]])
-            down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, ::-1]
-            up_faces = _rough_faces(q_, weight_, q, weight, rows.rough)
-        (E, H), scale_square = _scaled_fields(upside_down, q_bottom / e2, down_faces, a, polarisation)
-        (E_, H_), _ = _scaled_fields(rows, q_top / e0, up_faces, a, polarisation)
-        down, up = q_top * E / e0, q_bottom * E_ / e2
-        flux = incident_factor(ambient, q0, polarisation) * normal_flux(bottom, q_bottom, polarisation)
-        denominator = down + H
-        # both directions have the same denominator except for its scale: rescale the second to the first
-        reversed_ = (up - H_) / (up + H_) * denominator
+    for row, letter in enumerate(letters):
+        flux = incident_factor(ambient, q0, letter) * normal_flux(bottom, q_bottom, letter)
         # one by one: what is not used is not computed
         amplitudes = (
-            stored_by_cpu(zero_where(empty, down - H)),
-            stored_by_cpu(reversed_),
-            stored_by_cpu(denominator),
+            stored_by_cpu(zero_where(empty, (down - H)[row])),
+            stored_by_cpu(reversed_[row]),
+            stored_by_cpu(denominator[row]),
         )
         squares = Amplitudes(*(abs2(amplitude) for amplitude in amplitudes))
-        responses.append(Response(*amplitudes, squares, flux / abs2(e0 * e2), scale_square))
+        flux = flux / abs2(e0 * e2)[row]
+        responses.append(Response(*amplitudes, squares, flux, scale_square[row]))
     return tuple(responses)
 
 
-class _Rows(NamedTuple):
-    """Layers of a stack, those of a graded one its slices; each array has the shape (layers, ...)."""
-
-    points: tuple[Any, ...]  # complex or `Principal` index, three at Gauss points where a layer is graded
-    depth: Any  # k₀ times the thickness
-    rough: Any  # k₀σ of each face, one more than layers; None where all are smooth
-    runs: tuple[tuple[int, int], ...] = ()  # (repeats, rows) from the first row on; () is each row once
-
-
-def _rows(
-    media: tuple, layers: Sequence[Index | Gradient], phases: Sequence[Any], roughness: Sequence[Any] | None
-) -> _Rows:
-    """Return the layers in the shape to which all arrays broadcast; `media` are those around them."""
-    uniform = [layer for layer in layers if not isinstance(layer, Gradient)]
-    leaves = jax.tree.leaves((media, uniform, list(phases), roughness))
-    sliced = jax.tree.leaves([layer for layer in layers if isinstance(layer, Gradient)])
-    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in leaves), *(jnp.shape(x)[1:] for x in sliced))
-    dtype = jnp.promote_types(jnp.result_type(*leaves, *sliced), jnp.complex64)
-    counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
-    full = partial(_full, shape=shape, dtype=dtype)
-
-    def joined(blocks: Sequence[Any]) -> Any:
-        return jnp.concatenate(blocks) if blocks else jnp.zeros((0, *shape), dtype)
-
-    def each_slice(number: Number) -> Any:
-        """One complex number for each slice of a graded layer, (slices, ...)."""
-        rows = to_complex(number).astype(dtype)
-        lacking = (1,) * (len(shape) + 1 - rows.ndim)
-        return jnp.broadcast_to(rows.reshape(rows.shape[0], *lacking, *rows.shape[1:]), (len(rows), *shape))
-
-    def of_layers(numbers: Sequence[Any]) -> Any:
-        """One number for each layer, repeated for its slices, (layers, ...)."""
-        blocks = zip((full(x)[None] for x in numbers), counts, strict=True)
-        return joined([block if n == 1 else jnp.repeat(block, n, 0) for block, n in blocks])
-
-    def index_at(point: int) -> Any:
-        if any(isinstance(layer, Principal) for layer in layers):
-            axes = zip(*(x if isinstance(x, Principal) else (x, x, x) for x in layers), strict=True)
-            return Principal(*map(of_layers, axes))
-        return joined([each_slice(x[point]) if isinstance(x, Gradient) else full(x)[None] for x in layers])
-
-    each_phase = [phase if n == 1 else phase / n for phase, n in zip(phases, counts, strict=True)]
-    depth = jnp.real(of_layers(each_phase))
-    points = tuple(map(index_at, range(3 if sliced else 1)))
-    indices = jax.tree.leaves(list(layers), is_leaf=lambda x: isinstance(x, Pair))
-    if sliced and all(map(is_real, indices)):
-        points = tuple(map(jnp.real, points))  # three times as fast
-    if roughness is None:
-        return _Rows(points, depth, None)
-    rough = [full(roughness[0])[None]]
-    for count, face in zip(counts, roughness[1:], strict=True):
-        rough += [jnp.zeros((count - 1, *shape), dtype), full(face)[None]]
-    return _Rows(points, depth, jnp.real(joined(rough)))
-
-
-def _repeated(rows: _Rows, repeats: Repeats, layers: Sequence[Index | Gradient]) -> _Rows:
-    """Return rows of layers with their runs, or written out where they drift or a face is rough.
-
-    The size of a program does not depend on the number of repeats.
-    """
-    counts = [layer.slices if isinstance(layer, Gradient) else 1 for layer in layers]
-    ends = np.cumsum([0, *counts])[np.cumsum([0, *(n for _, n in repeats.runs)])]
-    runs = [(count, range(*pair)) for (count, _), pair in zip(repeats.runs, pairwise(ends), strict=True)]
-    if rows.rough is None and all(x is None for x in repeats.drift):
-        return rows._replace(runs=tuple((count, len(own)) for count, own in runs))
-    order = np.concatenate([np.tile(own, count) for count, own in runs])
-    place = np.concatenate([np.repeat(places(count), len(own)) for count, own in runs])
-    drift = [jnp.broadcast_to(0.0 if x is None else x, rows.depth.shape[1:]) for x in repeats.drift]
-    change = jnp.repeat(jnp.stack(drift), np.array(counts), 0, total_repeat_length=len(rows.depth))
-    factor = 1 + change[order] * place.reshape(-1, *[1] * (change.ndim - 1))
-    rough = None if rows.rough is None else jnp.concatenate([rows.rough[:-1][order], rows.rough[-1:]])
-    points = jax.tree.map(lambda x: x[order], rows.points)
-    return _Rows(points, rows.depth[order] * factor.astype(rows.depth.dtype), rough)
-
-
-def _full(number: Index, shape: tuple[int, ...], dtype: Any) -> Any:
-    if isinstance(number, Principal):
-        return Principal(*(_full(x, shape, dtype) for x in number))
-    return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
-
-
-def _weight(index: Any, polarisation: str) -> Any:
-    """Return the divisor of q in the boundary condition: 1 for s, ε for p."""
-    return jnp.ones_like(index) if polarisation == "s" else tangential_permittivity(index)
+def _weight(index: Any, polarisations: str) -> Any:
+    """Return the divisor of q in the boundary condition, (polarisations, ...): 1 for s, ε for p."""
+    permittivity = tangential_permittivity(index)
+    p = np.array([letter == "p" for letter in polarisations])
+    return jnp.where(p.reshape(-1, *[1] * permittivity.ndim), permittivity, 1)
 
 
 def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: Any) -> Any:
-    """Return the factors (2, faces, ...) of the fields (E, H) on their way up through each rough face.
+    """Return the factors of the fields (E, H) on their way up through rough faces.
+
+    They have the shape (2, polarisations, faces, ...).
 
     Névot and Croce 1980 (Rev. Phys. Appl. 15, 761): r exp(−x) with x = 2 k₀²σ² q q′, and
     t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, with the entire function
@@ -213,17 +135,17 @@ def _expm1_ratio(x: Any) -> Any:
     return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
 
 
-def _scaled_fields(rows: _Rows, admittance: Any, faces: Any, a: Any, polarisation: str) -> Any:
+def _scaled_fields(rows: LayerRows, admittance: Any, faces: Any, a: Any, polarisations: str) -> Any:
     """Return (E, H) at the far face for a unit wave in the last medium, the first row first, and |scale|²."""
     if rows.runs:
-        return _repeated_fields(rows, admittance, a, polarisation)
+        return _repeated_fields(rows, admittance, a, polarisations)
     start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
-    inner = None if faces is None else jnp.moveaxis(faces[:, :-1], 0, 1)
-    ((E, H), scale_square), _ = _through(start, rows, inner, a, polarisation)
-    return ((E, H) if faces is None else (E * faces[0, -1], H * faces[1, -1])), scale_square
+    inner = None if faces is None else jnp.moveaxis(faces[:, :, :-1], 2, 0)
+    ((E, H), scale_square), _ = _through(start, rows, inner, a, polarisations)
+    return ((E, H) if faces is None else (E * faces[0, :, -1], H * faces[1, :, -1])), scale_square
 
 
-def _through(start: Any, rows: _Rows, faces: Any, a: Any, polarisation: str) -> Any:
+def _through(start: Any, rows: LayerRows, faces: Any, a: Any, polarisations: str) -> Any:
     """Scan over rows from ((E, H), |scale|²); E and H may have several columns along a further first axis."""
     columns = start[0][0].ndim - start[1].ndim
 
@@ -233,11 +155,13 @@ def _through(start: Any, rows: _Rows, faces: Any, a: Any, polarisation: str) -> 
         if face is not None:
             E, H = E * face[0], H * face[1]
         if len(points) == 1:
-            square, e = normal_square(points[0], a), _weight(points[0], polarisation)
+            square, e = normal_square(points[0], a), _weight(points[0], polarisations)
             c, f, layer_scale, _ = stored_by_cpu(matrix_elements(square, k))
             E, H = E * c - 1j * f * e * H, H * c - 1j * f * (square / e) * E
         else:
-            alpha, beta, skew, square = coefficients(points, k, a, polarisation)
+            alpha, beta, skew, square = coefficients(
+                points, k, a, [_weight(n, polarisations) for n in points]
+            )
             c, f, layer_scale, _ = stored_by_cpu(matrix_elements(square, k))
             E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
         E, H = stored_by_cpu((E, H))
@@ -249,7 +173,7 @@ def _through(start: Any, rows: _Rows, faces: Any, a: Any, polarisation: str) -> 
     return jax.lax.scan(through_layer, start, (rows.points, rows.depth, faces))
 
 
-def _repeated_fields(rows: _Rows, admittance: Any, a: Any, polarisation: str) -> Any:
+def _repeated_fields(rows: LayerRows, admittance: Any, a: Any, polarisations: str) -> Any:
     """`_scaled_fields` of smooth rows, some of which are repeated: the matrix of a run to the power of its
     repeats, by squaring, divided by its norm at each step."""
     one, zero = jnp.ones_like(admittance), jnp.zeros_like(admittance)
@@ -257,12 +181,12 @@ def _repeated_fields(rows: _Rows, admittance: Any, a: Any, polarisation: str) ->
     first = 0
     for count, length in rows.runs:
         points, depth = jax.tree.map(lambda x: x[first : first + length], (rows.points, rows.depth))  # noqa: B023
-        own, first = _Rows(points, depth, None), first + length
+        own, first = LayerRows(points, depth, None), first + length
         if count == 1:
-            ((E, H), scale_square), _ = _through(((E, H), scale_square), own, None, a, polarisation)
+            ((E, H), scale_square), _ = _through(((E, H), scale_square), own, None, a, polarisations)
             continue
         identity = (jnp.stack([one, zero]), jnp.stack([zero, one])), jnp.ones_like(scale_square)
-        period = _through(identity, own, None, a, polarisation)[0]
+        period = _through(identity, own, None, a, polarisations)[0]
         ((e, h), (e_, h_)), scale = matrix_power(identity, period, count)
         E, H = e * E + h * H, e_ * E + h_ * H
         size = jax.lax.stop_gradient(abs2(E) + abs2(H))
@@ -278,7 +202,7 @@ def few_layers(
     ambient: Index,
     layers: Sequence[Index],
     substrate: Index,
-    phases: Sequence[Any],
+    phases: Sequence[Any] | jax.Array,
     angle: Any = None,
     polarisations: str = "sp",
     propagating: bool = False,
@@ -329,7 +253,7 @@ def responses(
     ambient: Index,
     layers: Sequence[Index | Gradient],
     substrate: Index,
-    phases: Sequence[Any],
+    phases: Sequence[Any] | jax.Array,
     angle: Any = None,
     polarisations: str = "sp",
     *,
@@ -347,7 +271,7 @@ def responses(
       that back). The ambient is real, except for light from within a plate.
     - `layers`: refractive indices from the ambient down, or `Principal` ones. In a real one the wave may be
       evanescent. A graded layer is a `pellicle.optics.gradient.Gradient`.
-    - `phases`: k₀d = 2πd/λ of each layer.
+    - `phases`: k₀d = 2πd/λ of each layer; an array (layers, ...) beside `StackedLayers`.
     - `angle`: of incidence in radians, or `interface.Inside` for light from within a plate. None is
       normal incidence, where s and p are equal and, without a `Principal` medium, only the first is computed.
     - `polarisations`: "s", "p" or "sp".
@@ -364,6 +288,8 @@ def responses(
 
     ```
     """
+    if isinstance(layers, StackedLayers):
+        return stack(ambient, layers, substrate, phases, angle, polarisations, roughness, repeats)
     if mixes_polarisations(ambient, *layers, substrate):
         raise ValueError("s and p mix where an optic axis is tilted: take pl.jones or pl.mueller, or a scene")
     apart = any(isinstance(n, Principal) for n in (ambient, *layers, substrate))

@@ -63,7 +63,9 @@ class InterfaceFields(NamedTuple):
     denominator: Number  # 2 Y₀ U of the incident wave, Y₀ the ambient's admittance
 
 
-def media(ambient: Any, layers: Sequence[Any], substrate: Any, phases: Sequence[Any], angle: Any) -> Media:
+def media(
+    ambient: Any, layers: Sequence[Any], substrate: Any, phases: Sequence[Any] | jax.Array, angle: Any
+) -> Media:
     """Prepare a stack; arguments as for `coherent.responses`, except that no real index is a promise."""
     if any(map(is_anisotropic, (ambient, *layers, substrate))):
         raise ValueError("fields and absorptances of birefringent layers are not computed: give one index")
@@ -75,8 +77,8 @@ def media(ambient: Any, layers: Sequence[Any], substrate: Any, phases: Sequence[
     def full(number: Any) -> Any:
         return jnp.broadcast_to(jnp.asarray(number, dtype), shape)
 
-    def rows(numbers: Sequence[Any]) -> Any:
-        return jnp.stack([full(n) for n in numbers]) if numbers else jnp.zeros((0, *shape), dtype)
+    def rows(numbers: Any) -> Any:
+        return jnp.stack([full(n) for n in numbers]) if len(numbers) else jnp.zeros((0, *shape), dtype)
 
     index = Pair(rows([real(n) for n in layers]), rows([imag(n) for n in layers]))
     bottom = Pair(full(real(substrate)), full(imag(substrate)))
@@ -244,7 +246,7 @@ def absorptances(
     ambient: Medium,
     layers: Sequence[Medium],
     substrate: Medium,
-    phases: Sequence[Any],
+    phases: Sequence[Any] | jax.Array,
     angle: Any = None,
     polarisations: str = "sp",
 ) -> tuple[Any, ...]:

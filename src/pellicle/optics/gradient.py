@@ -68,16 +68,15 @@ class Coefficients(NamedTuple):
     square: Any
 
 
-def coefficients(points: Sequence[Any], depth: Any, a: Any, polarisation: str) -> Coefficients:
+def coefficients(points: Sequence[Any], depth: Any, a: Any, weights: Sequence[Any]) -> Coefficients:
     """Return the coefficients of a slice from its index at three Gauss points, in the order of the steps.
 
-    **Arguments:** `depth`, k₀h of the slice; `a`, the transverse index; "s" or "p".
+    **Arguments:** `depth`, k₀h of the slice; `a`, the transverse index; `weights` at the points, 1 for s and
+    ε for p.
     """
-    squares = [normal_square(n, a) for n in points]
-    if polarisation == "s":
-        first, middle, last = (_Coupling(1.0, Q) for Q in squares)
-    else:
-        first, middle, last = (_Coupling(n * n, Q / (n * n)) for n, Q in zip(points, squares, strict=True))
+    first, middle, last = (
+        _Coupling(e, normal_square(n, a) / e) for n, e in zip(points, weights, strict=True)
+    )
     slope = _combined((math.sqrt(15) / 3, last), (-math.sqrt(15) / 3, first))
     bend = _combined((10 / 3, last), (-20 / 3, middle), (10 / 3, first))
     square = depth * depth
@@ -148,7 +147,9 @@ def stack_response(
             phase = phase / layer.slices
         else:
             points = [np.broadcast_to(_complex(layer), a.shape)[None]] * 3
-        alpha, beta, skew, square = coefficients(points, phase, a, polarisation)
+        alpha, beta, skew, square = coefficients(
+            points, phase, a, [1.0 if polarisation == "s" else n * n for n in points]
+        )
         q = sqrt(square + 0j)
         q = np.where(q == 0, 1e-30, q)
         half = 0.5 * np.expm1(2j * phase * q)

@@ -112,7 +112,8 @@ def pointwise(function: Callable[[Any], Any], numbers: Any) -> Any:
     """Return function(numbers), differentiated by its slopes in those arrays of `numbers` that vary.
 
     **Arguments:** `function` returns a pytree of arrays and acts along all common axes element by element;
-    `numbers` is a pytree of real arrays, which broadcast against each other.
+    `numbers` is a pytree of real arrays, which broadcast against each other. Those of the layers of a stack
+    have rows in front of the one common axis.
     """
     return function(numbers)
 
@@ -127,18 +128,22 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
         value = function(primal[0])
         return value, jax.tree.map(jnp.zeros_like, value)
 
+    grid = jnp.broadcast_shapes(*(jnp.shape(x)[-1:] for x in leaves))
+    in_rows = any(jnp.ndim(leaves[i]) > len(grid) for i in varying)
+
     def value_and_slopes(*leaves: Any) -> Any:
         def of_varying(*numbers: Any) -> Any:
             every = dict(enumerate(leaves)) | dict(zip(varying, numbers, strict=True))
             return function(structure.unflatten(every.values()))
 
         own = [leaves[i] for i in varying]
-        rows = [jnp.stack([jnp.full_like(x, float(row is x)) for row in own]) for x in own]
         with set_xla_metadata(inlineable="true"):
+            if in_rows:
+                return _slopes_in_rows(of_varying, own, grid)
             # traced once, and the slopes in all numbers by one program
             value, push = jax.linearize(of_varying, *own)
             value, push = jax.lax.optimization_barrier((value, push))
-            slopes = slopes_once(jax.vmap(push)(*rows))
+            slopes = slopes_once(jax.vmap(push)(*_one_by_one(own)))
         return value, [jax.tree.map(lambda x, i=i: x[i], slopes) for i in range(len(own))]
 
     # compiled apart: else the slopes are computed again for each parameter
@@ -146,6 +151,29 @@ def _pointwise_slope(function: Callable[[Any], Any], primal: Any, tangent: Any) 
         value, slopes = jax.jit(value_and_slopes)(*leaves)
 
     def change(*slopes: Any) -> Any:
-        return sum(slope * tangents[i] for i, slope in zip(varying, slopes, strict=True))
+        products = ((i, slope * tangents[i]) for i, slope in zip(varying, slopes, strict=True))
+        return sum(x.sum(axis=0) if jnp.ndim(leaves[i]) > len(grid) else x for i, x in products)
 
     return value, jax.tree.map(change, *slopes)
+
+
+def _one_by_one(numbers: Sequence[Any]) -> list[Any]:
+    """Return for each number the rows in which it alone is 1, the others 0."""
+    return [jnp.stack([jnp.full_like(x, float(row is x)) for row in numbers]) for x in numbers]
+
+
+def _slopes_in_rows(function: Callable[..., Any], numbers: Sequence[Any], grid: tuple[int, ...]) -> Any:
+    """Return the value of a function and its slopes in each of `numbers`, some of them (rows, *grid).
+
+    By reverse mode: its work does not grow with the rows.
+    """
+
+    def whole(*every: Any) -> Any:
+        return jax.tree.map(lambda x: jnp.broadcast_to(x, grid), function(*every))
+
+    every = [jnp.broadcast_to(x, (*jnp.shape(x)[: jnp.ndim(x) - len(grid)], *grid)) for x in numbers]
+    value, pull = jax.vjp(whole, *every)
+    value, pull = jax.lax.optimization_barrier((value, pull))
+    outputs, structure = jax.tree.flatten(value)
+    slopes = slopes_once(jax.vmap(lambda *rows: pull(structure.unflatten(rows)))(*_one_by_one(outputs)))
+    return value, [structure.unflatten([x[i] for i in range(len(outputs))]) for x in slopes]

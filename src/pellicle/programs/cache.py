@@ -23,7 +23,7 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_type_hints
+from typing import Any, Literal, NamedTuple, TypeAlias, get_type_hints
 
 import jax
 import numpy as np
@@ -215,6 +215,17 @@ def _loaded(content: bytes, key: bytes) -> Callable[..., Any]:
     return serialize_executable.deserialize_and_load(*program, execution_devices=jax.devices()[:1])
 
 
+class _Places(NamedTuple):
+    """Structure of the arguments of a program, and which of its arrays stands at each leaf."""
+
+    structure: Any
+    order: tuple[int, ...]
+
+    def filled(self, arrays: Sequence[Any]) -> Any:
+        """The arguments."""
+        return jax.tree_util.tree_unflatten(self.structure, [arrays[row] for row in self.order])
+
+
 def kept(function: Program, *, calls: Calls = "some") -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
@@ -225,17 +236,26 @@ def kept(function: Program, *, calls: Calls = "some") -> Program:
 
     @lru_cache(maxsize=1)
     def jitted() -> Program:  # at the first call, which starts JAX's backend anyway
-        return jax.jit(function, static_argnums=0, compiler_options=compiler_options(calls))
+        @wraps(function)
+        def whole(plan: Hashable, places: _Places, *arrays: Any) -> Any:
+            return function(plan, *places.filled(arrays))
+
+        return jax.jit(whole, static_argnums=(0, 1), compiler_options=compiler_options(calls))
 
     @wraps(function)
     def call(plan: Hashable, *arguments: Any) -> Any:
         folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-        if not folder or "://" in folder:  # JAX can cache in a cloud, too
-            return jax.device_get(jitted()(plan, *arguments))
         leaves, structure = jax.tree_util.tree_flatten(arguments)
-        arrays = [np.asarray(leaf) for leaf in leaves]
+        # an array that stands in many places is one argument; that two numbers are one object is chance
+        keys = [id(leaf) if np.ndim(leaf) else -at for at, leaf in enumerate(leaves)]
+        own = dict(zip(keys, leaves, strict=True))
+        rows = {key: row for row, key in enumerate(own)}
+        places = _Places(structure, tuple(rows[key] for key in keys))
+        if not folder or "://" in folder:  # JAX can cache in a cloud, too
+            return jax.device_get(jitted()(plan, places, *own.values()))
+        arrays = [*map(np.asarray, own.values())]
         shapes = tuple((a.shape, a.dtype) for a in arrays)
-        run, output = _load(function, calls, plan, structure, shapes, folder)
+        run, output = _load(function, calls, plan, places, shapes, folder)
         # NumPy's arrays are views of the program's own, and cheaper to work on
         return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
 
@@ -244,17 +264,17 @@ def kept(function: Program, *, calls: Calls = "some") -> Program:
 
 @lru_cache(maxsize=128)
 def _load(
-    function: Program, calls: Calls, plan: Hashable, structure: Any, shapes: tuple, folder: str
+    function: Program, calls: Calls, plan: Hashable, places: _Places, shapes: tuple, folder: str
 ) -> tuple[Program, Any]:
     """The program as a function of flat arrays, and the structure of its results."""
 
     def flat(*arrays: Any) -> list[Any]:
-        return jax.tree_util.tree_leaves(function(plan, *jax.tree_util.tree_unflatten(structure, arrays)))
+        return jax.tree_util.tree_leaves(function(plan, *places.filled(arrays)))
 
     cache = Path(folder)
     from jaxlib.version import __version__ as jaxlib
 
-    about = function.__module__, function.__qualname__, calls, repr(plan), str(structure), str(shapes)
+    about = function.__module__, function.__qualname__, calls, repr(plan), str(places), str(shapes)
     # versions, device and settings that change a program
     settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
     versions = jax.__version__, jaxlib, jax.default_backend(), _hardware(), os.environ.get("XLA_FLAGS", "")

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
-from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, response_of
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, responses_of
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, plate, response
@@ -50,7 +50,7 @@ def absorbed_power(
     plan: Plan, groups: list[CoherentGroup], plates: tuple[Plate, ...], wavelength: Any, polarisation: str
 ) -> AbsorbedPower:
     """Return R, T, and what every layer and plate absorbs. `plates` are those between the groups."""
-    responses = [response_of(plan, group, polarisation) for group in groups]
+    responses = [responses_of(plan, group, polarisation)[0] for group in groups]
     arriving, layers, inner, down, up = jnp.ones_like(wavelength), [], [], [], []
     for i, group in enumerate(groups):
         down.append(arriving)

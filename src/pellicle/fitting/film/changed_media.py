@@ -63,8 +63,12 @@ def with_slope(medium: Any, nm: np.ndarray) -> Any:
             medium,
             is_leaf=lambda part: isinstance(part, Tabulated) or is_free(part),
         )
-    if medium.slope is not None:
-        return medium
+    return medium if medium.slope is not None else _table_with_slope(medium, nm)
+
+
+@remembered
+def _table_with_slope(medium: Tabulated, nm: np.ndarray) -> Tabulated:
+    """The table with its slope. Equal tables of many layers are one object, which a program has once."""
     order, first, inverse = np.unique(nm, return_index=True, return_inverse=True)
 
     def slope(x: Any) -> Any:

@@ -249,13 +249,15 @@ class SpectrumView:
         """The arrays at the wavelengths of positions `take`."""
         size, channels = len(self.scene.light.wavelength), self.channels
 
-        def pick(x):
+        def picked(x):
             if np.ndim(x) not in (1, 3) or len(x) not in (size, size * channels):
                 return x
             taken = x.reshape(size, -1)[take]
             return taken.reshape(-1) if np.ndim(x) == 1 else taken.reshape(-1, *x.shape[1:])
 
-        return jax.tree_util.tree_map(pick, (self.scene, self.data))
+        leaves, structure = jax.tree_util.tree_flatten((self.scene, self.data))
+        own = {id(x): picked(x) for x in leaves}  # what is one object stays one
+        return jax.tree_util.tree_unflatten(structure, [own[id(x)] for x in leaves])
 
     def off_tolerance(self, values: np.ndarray) -> float:
         """Error of the view's plan at `values`, in the unit of its signal."""
