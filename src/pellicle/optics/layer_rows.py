@@ -101,7 +101,9 @@ def layer_rows(
 
     def index_at(point: int) -> Any:
         if isinstance(layers, StackedLayers):
-            return in_rows(layers.distinct)[np.array(layers.order)]
+            # not the rows of the whole shape: XLA would compute those of constants while it compiles
+            order = np.array(layers.order)
+            return in_rows(jax.tree.map(lambda x: x[order], layers.distinct))
         if any(isinstance(layer, Principal) for layer in layers):
             axes = zip(*(x if isinstance(x, Principal) else (x, x, x) for x in layers), strict=True)
             return Principal(*(joined([full(x, shape, dtype)[None] for x in axis]) for axis in axes))
