@@ -70,7 +70,8 @@ def stack(
     e0, e2 = _weight(top, letters), _weight(bottom, letters)
     down_faces = up_faces = None
     if rows.rough is not None:
-        upper, lower = faces(rows.points) if len(rows.points) > 1 else rows.points * 2
+        both: Any = faces(rows.points) if len(rows.points) > 1 else rows.points * 2
+        upper, lower = both
         faces_above: list[Any] = [q_top[None], normal(lower, a)]
         faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
         q, q_ = stored_by_cpu((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
@@ -102,7 +103,7 @@ def stack(
 
 def _weight(index: Any, polarisations: str) -> Any:
     """Return the divisor of q in the boundary condition, (polarisations, ...): 1 for s, ε for p."""
-    permittivity = tangential_permittivity(index)
+    permittivity: Any = tangential_permittivity(index)
     p = np.array([letter == "p" for letter in polarisations])
     return jnp.where(p.reshape(-1, *[1] * permittivity.ndim), permittivity, 1)
 

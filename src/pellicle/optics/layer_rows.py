@@ -19,7 +19,7 @@ from pellicle.optics.pair import Number, Pair, imag, is_real, real, to_complex
 from pellicle.optics.repeats import Repeats, places
 
 
-@Sequence.register
+@Sequence.register  # pyright: ignore[reportAttributeAccessIssue]
 class StackedLayers(eqx.Module):
     """Refractive indices of homogeneous layers, a sequence in which equal ones are stored once.
 
@@ -69,8 +69,8 @@ class LayerRows(NamedTuple):
 
 def layer_rows(
     media: tuple,
-    layers: Sequence[Index | Gradient],
-    phases: Sequence[Any] | jax.Array,
+    layers: Any,  # a sequence of indices and gradients, or `StackedLayers`
+    phases: Any,  # a sequence, or an array (layers, ...)
     roughness: Sequence[Any] | None,
 ) -> LayerRows:
     """Return the layers in the shape to which all arrays broadcast; `media` are those around them."""

@@ -108,7 +108,7 @@ def map_program(
 
     `written` are expressions of options that have no literal.
     """
-    given = {name: repr(x) for name, x in options.items() if name not in _OF_RUN} | written
+    given = {name: repr(x) for name, x in options.items() if name not in _OF_RUN} | dict(written)
     words = "".join(f",\n    {name}={text}" for name, text in given.items())
     return f"""\
 import pellicle as pl
