@@ -156,6 +156,7 @@ def repeated(rows: LayerRows, repeats: Repeats, layers: Sequence[Any]) -> LayerR
 
 
 def full(number: Index, shape: tuple[int, ...], dtype: Any) -> Any:
+    """Return an index as complex arrays of a shape."""
     if isinstance(number, Principal):
         return Principal(*(full(x, shape, dtype) for x in number))
     return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
