@@ -70,10 +70,6 @@ def export(
     return 0
 
 
-MAPS = ("pellicle.cube-map/1", "pellicle.map/1")
-"""Schemas of maps: of a cube, and of a photograph."""
-
-
 def _map_of(film: str) -> Any:
     """The map in a folder of `pellicle map`, of a cube or of a photograph; None for anything else."""
     from pellicle.cli.map import STORE
@@ -104,7 +100,10 @@ def _described(film: str, recipe: str | None) -> Scene | Surface:
         raise DataError(f"{film}: cannot be read ({error.strerror}); check its path") from None
     except ValueError:
         raise DataError(f"{film}: is not JSON; give the result.json of a fit") from None
-    of_map = isinstance(record, dict) and record.get("schema") in MAPS
+    from pellicle.reporting import map_text, photograph_map
+
+    maps = map_text.SCHEMA, photograph_map.SCHEMA
+    of_map = isinstance(record, dict) and record.get("schema") in maps
     if not of_map and not (isinstance(record, dict) and record.get("parameters")):
         raise DataError(f"{film}: has no fitted parameters; give the result.json of one fit")
     from pellicle.rendering.export import with_values
