@@ -20,6 +20,7 @@ from pellicle.errors import UsageError
 if TYPE_CHECKING:
     from pellicle.mapping.map_result import Map
     from pellicle.recipes.read import FilmRecipe
+    from pellicle.reporting.map_summary import MapSummary
     from pellicle.scene.film import Scene
 
 
@@ -86,6 +87,7 @@ def map_cube(
         what = "--lamp-reference needs the recipe of a film, and this one is of a surface"
         options["lamp_reference"] = film_recipe(run.lamp_reference, what).scene()
     start()
+    from pellicle.reporting.map_summary import summarise
     from pellicle.reporting.map_text import cube_json, cube_report
 
     options["recipe"] = Path(described.path).read_text(encoding="utf-8")
@@ -95,12 +97,13 @@ def map_cube(
         return INTERRUPTED
     if made.run is not None and made.run.earlier:
         say(f"{made.run.earlier} pixels are from an earlier run in {folder}; --overwrite fits them again")
-    told = {**cube_json(made), "scene": {"recipe": described.path}} if json else as_flags(cube_report(made))
+    summary, told = summarise(made), {"scene": {"recipe": described.path}}
+    told = {**cube_json(made, summary), **told} if json else as_flags(cube_report(made, summary))
     show(told, folder is not None)
     if folder is not None:
         flags = vars(run) | vars(cube)
         repeated = again("map", path, described.path, flags, options, str(out))
-        _write(folder, made, repeated, described.path)
+        _write(folder, made, summary, repeated, described.path)
     return GOOD if made.decided >= MOST_DECIDED else UNCLEAR
 
 
@@ -183,14 +186,16 @@ def again(
     return [("Command", shlex.join(words)), ("Python", program)]
 
 
-def _write(folder: Path, made: Map, repeated: list[tuple[str, str]], recipe: str) -> None:
+def _write(
+    folder: Path, made: Map, summary: MapSummary, repeated: list[tuple[str, str]], recipe: str
+) -> None:
     from pellicle.files import replacing
     from pellicle.mapping.growth import TIME
     from pellicle.reporting.map_figures import write_cube_map
     from pellicle.reporting.map_sites import SITES
 
     made.to_netcdf(folder / NETCDF, overwrite=True)
-    write_cube_map(folder, made, repeated, recipe)
+    write_cube_map(folder, made, repeated, recipe, summary)
     names = [STORE, NETCDF, *([SITES] if (folder / SITES).exists() else [])]
     if TIME in made.dims:
         try:

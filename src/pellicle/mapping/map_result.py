@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import xarray
 
 CONVERGED = "converged"
+_IN_MEMORY = 256 * 2**20
+"""Bytes up to which the variables of a map are no dask arrays."""
 
 
 class Run(NamedTuple):
@@ -64,10 +66,12 @@ class Map(PlotMixin):
 
     @cached_property
     def dataset(self) -> xarray.Dataset:
-        """All variables as an xarray Dataset of dask arrays, which are read when they are computed."""
+        """All variables as an xarray Dataset, read when they are needed: of a large map as dask arrays."""
         import xarray
 
-        return xarray.open_zarr(self.path, chunks={})
+        arrays = [array for _, array in self._group.arrays()]
+        small = sum(array.nbytes for array in arrays) <= _IN_MEMORY  # dask and its scheduler load for 0.3 s
+        return xarray.open_zarr(self.path, chunks=None if small else {})
 
     def __getitem__(self, name: str) -> xarray.DataArray:
         """A variable by its name, or the best values of a parameter by the parameter's name."""

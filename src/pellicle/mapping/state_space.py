@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy.optimize import minimize
 
 from pellicle.scene.free import FREELY, SHARED, SLOWLY
 
@@ -147,6 +146,8 @@ def _stiffness(series: _Times, states: int, slow: int) -> tuple[float, int, np.n
     start = np.full(slow, every[int(np.argmin([deviance(np.full(slow, value)) for value in every]))])
     simplex = start + np.vstack([np.zeros(slow), 0.7 * np.eye(slow)])
     options = {"initial_simplex": simplex, "xatol": 0.02, "fatol": 0.02, "maxfev": 60 * slow}
+    from scipy.optimize import minimize  # slow to import
+
     best = minimize(deviance, start, method="Nelder-Mead", options=options).x
     best = np.clip(best, every[0] - 4, every[-1] + 4)
     return deviance(best), states, best

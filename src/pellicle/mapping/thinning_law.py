@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pellicle.fitting.noise import correlation_length
 
@@ -116,6 +115,8 @@ def _fitted(
     highest = np.full(len(starts[0]), np.inf)
     if name == SHIFTED:  # a power law with a farther origin is an exponential
         highest[2] = np.log(_FAR * np.ptp(time))
+    from scipy.optimize import least_squares  # slow to import
+
     fits = [least_squares(missed, start, bounds=(-np.inf, highest)) for start in starts]
     best = min(fits, key=lambda fit: fit.cost)
     residual, count = best.fun, int(used.sum())

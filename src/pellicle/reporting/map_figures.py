@@ -288,15 +288,17 @@ def write_cube_map(
     made: Dataset | Map,
     again: Sequence[tuple[str, str]] = (),
     recipe_path: str = "",
+    summary: MapSummary | None = None,
 ) -> Path:
     """Write result.json, report.txt, report.html and figures of a map, and return the folder.
 
     A map of sites or of a line also has sites.csv. Each file appears complete or not at all. `again` is
     what repeats the map beside its recipe, descriptions and texts; the recipe is at `recipe_path`.
+    `summary` is that of the map, if it has been computed.
 
     **Raises:** UsageError where the folder holds files that pellicle did not write, or cannot be written.
     """
-    summary, images = summarise(made), {}
+    summary, images = summarise(made) if summary is None else summary, {}
     texts = {REPORT: cube_report(made, summary)}
     if summary.axes.kind != "image":
         texts[SITES] = sites_csv(made, summary)
