@@ -116,6 +116,29 @@ def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
     assert list(rows(tmp_path)) == ["a", "b"]
 
 
+def test_processes_share_a_batch_that_takes_long(
+    pellicle, spectrum_file, scene, fitted, monkeypatch, tmp_path
+):
+    # where more than nothing is left after two files, the first of which compiles
+    monkeypatch.setattr("pellicle.cli.batch.workers_for", lambda seconds: 2 if seconds > 0 else 1)
+    shared = []
+
+    def in_order(function, tasks, workers):
+        tasks = list(tasks)
+        shared.append((len(tasks), workers))
+        return map(function, tasks)
+
+    monkeypatch.setattr("pellicle.cli.session.in_order", in_order)
+    files = [spectrum_file(f"{name}.csv", 300.0) for name in "abcd"]
+    command = ("fit", *files, *scene, "--json", "--out", tmp_path / "out")
+    first = pellicle(*command)
+    assert (first.code, shared, fitted()) == (0, [(2, 2)], list("abcd"))
+    assert [Path(x["data"]["path"]).stem for x in first.objects] == list("abcd") == list(rows(tmp_path))
+    again = pellicle(*command)
+    assert (again.objects, fitted()) == (first.objects, [])
+    assert "4 of 4 files were not fitted again" in again.err
+
+
 @pytest.fixture
 def small_files():
     """No file may be larger than 20 kB, as on a disk that is nearly full: figures are, reports are not."""

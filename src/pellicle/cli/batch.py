@@ -38,6 +38,7 @@ from pellicle.cli.session import (
     reported,
 )
 from pellicle.errors import UsageError
+from pellicle.programs.threads import workers_for
 
 if TYPE_CHECKING:
     from pellicle.fitting.repeated_measurements import Repeats
@@ -54,7 +55,7 @@ class Batch:
 
     A file that fails does not stop the others. `records` are the JSON records of the results so far, and
     `fits` the fits of repeated measurements. Several files are fitted by as many processes as there are
-    `jobs`.
+    `jobs`; with None by this one, and by several as soon as that saves time.
 
     Results of several files that an earlier run left in the folder `out`, from the same data by the same
     scene, settings and version, are printed and not computed again, unless `refit` is true. `kept` counts
@@ -67,7 +68,7 @@ class Batch:
     sampler: SamplerFlags | None = None
     out: str | None = None
     json: bool = False
-    jobs: int = 1
+    jobs: int | None = None
     refit: bool = False
     spec: list[str] | None = None
     figure: str | None = None
@@ -151,25 +152,33 @@ class Batch:
 
     def _codes(self, groups: list[list[Input]], folders: list[Path | None]) -> Iterator[int]:
         """Fit the groups one by one, or in worker processes, and yield their exit codes in order."""
-        tasks = list(zip(groups, folders, strict=True))
-        if self.jobs == 1 or len(tasks) == 1:
-            left = TimeLeft()
-            for number, task in enumerate(tasks):
-                seconds = left("files", number - self.kept, len(tasks) - self.kept)
-                position = f"file {number + 1} of {len(tasks)}" if len(tasks) > 1 else ""
-                rest = duration(seconds)
-                yield self._fit(*task, f"{position}, {rest} left" if rest else position)
-            return
+        tasks, left, workers = list(zip(groups, folders, strict=True)), TimeLeft(), self.jobs or 1
+        for number, task in enumerate(tasks):
+            seconds = left("files", number - self.kept, len(tasks) - self.kept)
+            if self.jobs is None:
+                workers = workers_for(seconds)
+            if workers > 1 and len(tasks) > 1:
+                yield from self._shared(tasks, number, workers)
+                return
+            position = f"file {number + 1} of {len(tasks)}" if len(tasks) > 1 else ""
+            rest = duration(seconds)
+            yield self._fit(*task, f"{position}, {rest} left" if rest else position)
+
+    def _shared(
+        self, tasks: list[tuple[list[Input], Path | None]], first: int, workers: int
+    ) -> Iterator[int]:
+        """Fit the groups from the `first` on in worker processes, and yield their exit codes in order."""
         from pellicle.cli.session import in_order
 
-        batches = [
-            replace(self, inputs=replace(self.inputs, files=files), records=[], fits=[], later=number > 0)
-            for number, files in enumerate(groups)
-        ]
+        def part(number: int, files: list[Input]) -> Batch:
+            own = replace(self.inputs, files=files)
+            return replace(self, inputs=own, records=[], fits=[], kept=0, later=number > 0)
+
+        parts = [(part(number, files), folder) for number, (files, folder) in enumerate(tasks)][first:]
         with Progress(f"{len(tasks)} files") as progress:
-            progress("fit", 0, len(tasks))
-            results = in_order(_captured, zip(batches, folders, strict=True), self.jobs)
-            for done, (code, one, out, err) in enumerate(results, 1):
+            progress("fit", first, len(tasks))
+            results = in_order(_captured, parts, workers)
+            for done, (code, one, out, err) in enumerate(results, first + 1):
                 progress.clear()
                 with suppress(BrokenPipeError):
                     print(err, end="", file=sys.stderr, flush=True)

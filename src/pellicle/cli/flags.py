@@ -248,7 +248,8 @@ class BatchFlags(Flags):
     out: Annotated[str | None, flag(OUTPUT)] = None
     """Folder for report, figures and tables; an interrupted chain in it is continued."""
     json: Annotated[bool, switch(OUTPUT, "Print one JSON object a line.")] = False
-    jobs: Annotated[int, flag(OUTPUT, "Number of processes that share several files (1).")] = 1
+    jobs: Annotated[int | None, flag(OUTPUT)] = None
+    """Number of processes that share several files; by default more than one where this saves time."""
     refit: Annotated[bool, switch(OUTPUT)] = False
     """Fit all files, also those whose results an earlier run left in --out."""
     spec: Annotated[list[str] | None, switch(OUTPUT, metavar="NAME=LO:HI")] = None
@@ -258,7 +259,7 @@ class BatchFlags(Flags):
 
     def checked(self) -> BatchFlags:
         """These flags. Raises UsageError for an impossible number of processes."""
-        if self.jobs < 1:
+        if self.jobs is not None and self.jobs < 1:
             raise UsageError(f"--jobs must be at least 1, got {self.jobs}")
         if self.spec:
             from pellicle.reporting.specification import parse_limits

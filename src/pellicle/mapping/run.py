@@ -29,13 +29,11 @@ from pellicle.mapping.locks import held
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import PixelModel, bands_off, fit_pixels, prepare
 from pellicle.mapping.store import BYTES, FORMAT, begin
+from pellicle.programs.threads import workers_for
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 
 log = logging.getLogger(__name__)
-
-START = 30.0
-"""Seconds of fits for which worker processes are worth their start: each imports JAX, for 5 to 10 s."""
 
 PREVIEW = 4096
 """Pixels of a preview, of each image, at most."""
@@ -161,8 +159,7 @@ def _fit_blocks(job: Job, workers: int | None, scheduler: str | None, progress: 
         first = fit_block(job, todo.pop(0))
         done, compiling = done + first.pixels, first.compiling
         progress("pixels", done, total)
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        workers = cores if len(todo) * first.seconds > START else 1
+        workers = workers_for(len(todo) * first.seconds)
     used = 1 if scheduler is None and (workers or 1) == 1 else min(workers or len(todo), len(todo))
     for fitted in _fitted(job, todo, used, scheduler, progress):
         done += fitted.pixels

@@ -1,5 +1,6 @@
-"""One thread for each worker process, by the environment that it inherits."""
+"""Worker processes: when they pay, how many, and one thread for each by the environment that it inherits."""
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,6 +8,8 @@ from contextlib import contextmanager
 THREADS = ("NPROC", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Numbers of threads. XLA takes its own from NPROC, which, unlike XLA_FLAGS, does not enter the key of a
 compiled program: workers share their programs with all other runs."""
+WORTH_WORKERS = 30.0
+"""Seconds of work from which worker processes save time: each takes 3 to 10 s to start."""
 _OF_DASK = ("MALLOC_TRIM_THRESHOLD_", "PYTHONHASHSEED", "__DASK_PARENT_PID")
 """Variables that dask sets for its workers in this process, and leaves there."""
 
@@ -24,3 +27,10 @@ def single_threaded() -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def workers_for(seconds: float) -> int:
+    """Number of processes that do `seconds` of work the fastest: 1, or up to one for each core of this
+    process."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(cores, math.ceil(3 * seconds / WORTH_WORKERS)) if seconds > WORTH_WORKERS else 1

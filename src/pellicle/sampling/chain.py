@@ -130,7 +130,7 @@ class ChainFile:
             group.create_dataset("log_prob", data=chain.log_density, maxshape=(None, walkers))
             group.create_dataset("accepted", data=chain.accepted)
         with replacing(self.path, overwrite=True) as draft:
-            draft.write_bytes(image.getbuffer())
+            draft.write_bytes(image.getvalue())
 
 
 LONG_ENOUGH = 50.0
