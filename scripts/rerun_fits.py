@@ -1,8 +1,8 @@
 """Repeat the fits of `fits/` and compare the results with the kept ones.
 
-Run `python scripts/rerun_fits.py [STUDY...]` (default: all). The exit code is 1 if a status has changed
-or a value has moved by more than a tenth of its kept error by noise alone. `--keep` replaces the kept
-results; review the change and give the reason in the commit.
+Run `python scripts/rerun_fits.py [STUDY...]` (default: all). The exit code is 1 if a status has
+changed, a value has moved by more than a tenth of its kept error by noise alone, or an error has changed by
+more than a tenth. `--keep` replaces the kept results; review the change and give the reason in the commit.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ KEPT = ("result.json", "report.txt", "figure.png")
 VOLATILE = ("versions", "seconds")
 """Keys that differ between runs and are not kept."""
 SHARE = 0.1
-"""Allowed change of a value in kept errors by noise alone: rounding differs between machines and versions."""
+"""Allowed change of a value in kept errors by noise alone, and of the errors themselves: rounding differs
+between machines and versions."""
 
 
 def studies(folder: Path = FITS) -> list[Path]:
@@ -56,7 +57,7 @@ def run(study: Path, out: Path) -> dict[str, Any]:
 
 
 def differences(kept: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a description of every change: of the status, and of values beyond SHARE."""
+    """Yield a description of every change: of the status, and of values and errors beyond SHARE."""
     if kept["status"] != new["status"]:
         yield f"status {new['status']}, was {kept['status']}"
     before, now = kept["parameters"], new["parameters"]
@@ -71,9 +72,12 @@ def _change(kept: Mapping[str, Any], new: Mapping[str, Any]) -> str | None:
     if kept["stderr"] is None or new["stderr"] is None:  # infinite: the value is not determined
         same = kept["stderr"] == new["stderr"]
         return None if same else f"has a standard error of {new['stderr']}, had {kept['stderr']}"
-    if abs(new["value"] - kept["value"]) <= SHARE * kept["stderr_noise"]:
-        return None
-    return f"{new['value']:.8g}, was {kept['value']:.8g} ± {kept['stderr_noise']:.2g} by noise alone"
+    if abs(new["value"] - kept["value"]) > SHARE * kept["stderr_noise"]:
+        return f"{new['value']:.8g}, was {kept['value']:.8g} ± {kept['stderr_noise']:.2g} by noise alone"
+    for name, words in (("stderr", "a standard error"), ("stderr_noise", "an error by noise alone")):
+        if abs(new[name] - kept[name]) > SHARE * kept[name]:
+            return f"has {words} of {new[name]:.2g}, had {kept[name]:.2g}"
+    return None
 
 
 def keep(out: Path, study: Path) -> None:

@@ -36,9 +36,10 @@ def test_studies_are_complete_and_quoted_in_the_readme(folder, samples):
         assert result["status"] == "converged" or result["status"] in row
         data = result["data"]
         assert hashlib.sha256((study / data["path"]).read_bytes()).hexdigest() == data["sha256"]
-        (best,) = re.findall(r"(?:thickness:?|at most) ([\d.]+(?: ± \S+)? nm)", result["verdict"])
-        assert best in row
-        assert best in (study / "report.txt").read_text("utf-8")
+        found = re.findall(r"(?:thickness:?|at most) ([\d.]+(?: ± \S+)? nm)", result["verdict"])
+        text = (study / "report.txt").read_text("utf-8")
+        assert found
+        assert all(best in row and best in text for best in found)
 
 
 def test_kept_samples_follow_from_their_recipes(tmp_path):
@@ -58,6 +59,8 @@ def test_changes_are_reported(script):
     assert list(script.differences(kept, near)) == []
     moved = ["status ambiguous, was converged", "d 3.06, was 3 ± 0.5 by noise alone"]
     assert list(script.differences(kept, far)) == moved
+    wider = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": 5.6, "stderr_noise": 0.5}}}
+    assert list(script.differences(kept, wider)) == ["d has a standard error of 5.6, had 5"]
     lost = {"status": "converged", "parameters": {"d": {"value": 3.0, "stderr": None}, "n": {}}}
     assert list(script.differences(kept, lost)) == ["d has a standard error of None, had 5.0", "n is new"]
 
