@@ -127,9 +127,9 @@ def test_the_energy_warning_gives_the_albedo():
     T = 80 / 21 * 1.4 / 2.4**2
     red += np.pi * 0.7 * (1 + 2 * np.cos(4 * np.pi * 1.4 * 71 / 645) * np.sqrt(T * (1 - T)))
     assert float(directional_albedo(model(name), figure, 0.0)[0]) == pytest.approx(red, rel=1e-6)
-    warning = energy_warning(model(name), figure)
+    warning = energy_warning(max_albedo(model(name), figure))
     assert float(warning.split("up to ")[1].split()[0]) >= round(red, 2) > 1
-    assert energy_warning(PUBLISHED, SURFACE | {"specular": 0.01, "diffuse": 0.1}) is None
+    assert energy_warning(max_albedo(PUBLISHED, SURFACE | {"specular": 0.01, "diffuse": 0.1})) is None
 
 
 KEYS = ("thickness", "exponent_reflection", "exponent_transmission", "deviation", "azimuth", "n")

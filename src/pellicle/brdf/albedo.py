@@ -69,18 +69,17 @@ def _narrow(h: Any) -> Any:
 
 def max_albedo(brdf: Callable, parameters: Parameters) -> float:
     """Return the largest directional albedo over `ANGLES` and channels; above 1, energy is created."""
-    return float(np.max(np.asarray(_albedos(brdf, dict(parameters)))))
+    return float(np.max(np.asarray(jax.jit(partial(albedos, brdf))(dict(parameters)))))
 
 
-@partial(jax.jit, static_argnums=0)
-def _albedos(brdf: Callable, parameters: dict[str, Any]) -> Any:
+def albedos(brdf: Callable, parameters: Parameters) -> Float[Array, "angles channels"]:
+    """Return the directional albedo at `ANGLES`."""
     albedo = partial(directional_albedo, brdf, parameters)
     return jax.vmap(albedo)(jnp.asarray(ANGLES))
 
 
-def energy_warning(brdf: Callable, parameters: Parameters) -> str | None:
-    """Return a warning with the largest albedo if the BRDF creates energy, else None."""
-    albedo = max_albedo(brdf, parameters)
+def energy_warning(albedo: float) -> str | None:
+    """Return a warning with the largest albedo, of `max_albedo`, if the BRDF creates energy, else None."""
     if albedo <= 1.005:  # the error of the quadrature, for lobes beside the mirror direction
         return None
     return (

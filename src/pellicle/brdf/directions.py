@@ -15,15 +15,17 @@ from pellicle.optics.pair import sqrt
 Vectors: TypeAlias = Float[Array | np.ndarray, "... 3"]
 
 
-def direction(theta: Any, phi: Any) -> Float[Array, "... 3"]:
+def direction(theta: Any, phi: Any, xp: Any = jnp) -> Float[Array | np.ndarray, "... 3"]:
     """Return the unit vector at polar angle `theta` from the normal and azimuth `phi`, both in degrees.
+
+    `xp` is `jax.numpy` or `numpy`, whose kind of array is returned.
 
     >>> direction(90.0, 0.0).round(6).tolist()
     [1.0, 0.0, 0.0]
     """
-    theta, phi = jnp.broadcast_arrays(jnp.deg2rad(theta), jnp.deg2rad(phi))
-    sine = jnp.sin(theta)
-    return jnp.stack([sine * jnp.cos(phi), sine * jnp.sin(phi), jnp.cos(theta)], axis=-1)
+    theta, phi = xp.broadcast_arrays(xp.deg2rad(theta), xp.deg2rad(phi))
+    sine = xp.sin(theta)
+    return xp.stack([sine * xp.cos(phi), sine * xp.sin(phi), xp.cos(theta)], axis=-1)
 
 
 def dot(a: Vectors, b: Vectors) -> Any:

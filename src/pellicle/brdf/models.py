@@ -61,7 +61,13 @@ class Model(NamedTuple):
         """Return the model with the cheapest evaluation that serves layers of at most `thickest` nm."""
         if self.from_film_colour is None:
             return self
-        return self._replace(evaluate=self.from_film_colour(film_colour.chebyshev(thickest)))
+        return self.by_nodes(film_colour.node_count(thickest))
+
+    def by_nodes(self, count: int) -> Model:
+        """Return the model with the film's colour by `count` nodes (`node_count`), itself for 0 of them."""
+        if self.from_film_colour is None or not count:
+            return self
+        return self._replace(evaluate=self.from_film_colour(film_colour.interpolated(count)))
 
     def without_interference(self) -> Model:
         """Return the model without interference: averaged over the phase, or lobes added as intensities."""

@@ -14,7 +14,6 @@ from typing import Any
 import jax
 import numpy as np
 
-from pellicle.brdf.directions import angle_to_half
 from pellicle.brdf.film_colour import node_count
 from pellicle.brdf.sensor_bands import ERROR
 from pellicle.effects import removal
@@ -180,8 +179,9 @@ def exact(view: SurfaceView) -> Plan:
 
 def largest_angle(view: SurfaceView) -> float:
     """The largest angle of incidence (radians) on a facet that mirrors the light to the eye."""
-    with jax.enable_x64(True):
-        return float(np.max(np.asarray(angle_to_half(view.i, view.o)), initial=0.0))
+    i, o = (np.asarray(side, float) for side in (view.i, view.o))
+    apart, together = (np.linalg.norm(x, axis=-1) for x in (i - o, i + o))
+    return float(np.max(np.arctan2(apart, together), initial=0.0))
 
 
 def _bound(number: Any, side: str) -> float:

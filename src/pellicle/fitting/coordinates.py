@@ -6,7 +6,7 @@ one plane depend on y² alone, the tilt out of that plane: y itself has no slope
 stop on the saddle between the two signs and underestimate the error of what is correlated with y².
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
@@ -37,6 +37,17 @@ class Box(NamedTuple):
     logarithmic: Array
     reach: Array | np.floating = np.float64(0.0)
 
+    def of_first(self, size: int) -> "Box":
+        """The box of the first `size` parameters."""
+        return self._of_each(lambda side: side[..., :size])
+
+    def extended(self, size: int) -> "Box":
+        """The box with fixed parameters at the end, without priors, for `size` of them."""
+        return self._of_each(lambda side: widened(side, size))
+
+    def _of_each(self, change: Callable[[Any], Any]) -> "Box":
+        return self._replace(**{name: change(getattr(self, name)) for name in self._fields[:5]})
+
     def prior_rows(self, values: Any) -> Any:
         """Weighted distances of the values from the means of their priors, (parameters,)."""
         return (values - self.prior_mean) * self.prior_weight
@@ -45,6 +56,12 @@ class Box(NamedTuple):
         """ln of the priors at values of the parameters, up to a constant."""
         logarithm = jnp.log(jnp.where(self.logarithmic > 0, values, 1.0))
         return -0.5 * jnp.sum(self.prior_rows(values) ** 2) - jnp.sum(self.logarithmic * logarithm)
+
+
+def widened(rows: Any, size: int) -> np.ndarray:
+    """Rows (..., n) with zeros at the end, (..., size)."""
+    more = [(0, 0)] * (np.ndim(rows) - 1)
+    return np.pad(rows, [*more, (0, size - np.shape(rows)[-1])])
 
 
 def box(lower: np.ndarray, upper: np.ndarray, priors: Sequence[Prior | None], reach: float = 0.0) -> Box:

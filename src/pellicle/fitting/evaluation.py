@@ -1,19 +1,16 @@
 """Compiled evaluations of a problem: deviances, polished minima, model curves."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.coordinates import Box, Coordinates
-from pellicle.fitting.problem import Explained, Form, Problem
+from pellicle.fitting.coordinates import Box
+from pellicle.fitting.problem import Blocked, Explained, Form, Member, Problem, Static
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.programs.cache import kept
-
-Static = tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]
-"""The static part of a program: coordinates, and of each view its form and the parameters that it takes."""
-
 
 CHUNK = 128
 """Candidates that one call of the compiled program takes."""
@@ -80,38 +77,41 @@ class Polished(NamedTuple):
 
 
 class Until(NamedTuple):
-    """The number of starts that are polished, and until when: see `lanes.least_squares`."""
+    """The number of starts that are polished, until when (see `lanes.minimise`), and of which problem of a
+    family."""
 
     count: Any
     steps: Any
     atol: Any
     coarse: Any
+    member: Any = 0
 
 
 def polished(
-    static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
+    static: tuple[tuple[Member, ...], int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
 ) -> Polished:
     """The local minimum below each start (starts, parameters), in all views together.
 
-    `static` ends with the number of lanes. The bounds of the box are
-    (starts, parameters): where lower and upper meet, a parameter is fixed.
+    `static` has the problems that share the program, of which `until` names one, and the number of lanes. The
+    bounds of the box are (starts, parameters): where lower and upper meet, a parameter is fixed.
     """
-    from pellicle.fitting.lanes import least_squares  # a kept program needs no solver
+    from pellicle.fitting.lanes import minimise  # a kept program needs no solver
 
-    looks, lanes = static
+    family, lanes = static
 
-    def residual(unit, bounds):
+    def equations(unit, bounds):
         own = box._replace(lower=bounds[0], upper=bounds[1])
-        views, values = explained(looks, arrays, own, unit)
-        prior = own.prior_rows(values)
-        deviance = sum(view.deviance for view in views) + jnp.sum(prior**2)
-        return [*(view.residual for view in views), prior], deviance
+        if len(family) == 1:
+            return _equations(family[0].static, arrays, own, unit)
+        branches = [partial(_member_equations, each, arrays) for each in family]
+        return jax.lax.switch(until.member, branches, own, unit)
 
-    solutions = least_squares(
-        residual,
+    solutions = minimise(
+        equations,
         units,
         (box.lower, box.upper),
         until.count,
+        jnp.zeros((), units.dtype),
         lanes=lanes,
         steps=until.steps,
         atol=until.atol,
@@ -121,6 +121,39 @@ def polished(
 
 
 polish = kept(polished)
+
+
+def _member_equations(member: Member, arrays: tuple[Any, ...], box: Box, unit: Any) -> tuple[Any, ...]:
+    """The equations of one problem, with zeros for the parameters that others have more."""
+    more = len(unit) - member.size
+    cost, gradient, hessian, deviance = _equations(
+        member.static, arrays, box.of_first(member.size), unit[: member.size]
+    )
+    return cost, jnp.pad(gradient, (0, more)), jnp.pad(hessian, (0, more)), deviance
+
+
+def _equations(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> tuple[Any, ...]:
+    """Normal equations at one point of the unit cube, and the deviance; see `normal_equations`."""
+    from pellicle.fitting.levenberg_marquardt import normal_equations
+
+    def residual(unit, about):
+        arrays, box = about
+        views, values = explained(static, arrays, box, unit)
+        prior = box.prior_rows(values)
+        deviance = sum(view.deviance for view in views) + jnp.sum(prior**2)
+        return [*(view.residual for view in views), prior], deviance
+
+    form = static[1][0][0] if len(arrays) == 1 else None
+    if not isinstance(form, Blocked):
+        return normal_equations(residual, unit, (arrays, box))
+    blocks = form.blocks(arrays[0])
+
+    def add(k, total):
+        own = box._replace(prior_weight=jnp.where(k == 0, box.prior_weight, 0))
+        return jax.tree.map(jnp.add, total, normal_equations(residual, unit, ((blocks.at(k),), own)))
+
+    zero = jnp.zeros((), unit.dtype)
+    return jax.lax.fori_loop(0, blocks.count, add, (zero, 0 * unit, jnp.zeros((len(unit),) * 2), zero))
 
 
 def scanned(problem: Problem, units: np.ndarray, progress: Progress = quiet) -> np.ndarray:

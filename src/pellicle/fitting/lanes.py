@@ -6,12 +6,13 @@ loop.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from pellicle.fitting.levenberg_marquardt import advance, begin, ended
+from pellicle.fitting.levenberg_marquardt import advance, begin, ended, normal_equations
 
 _LEAST, _SETTLING = 4, 0.1
 """Evaluations before a lane is given up, and the share of the promise before to which that of a step falls in
@@ -30,10 +31,19 @@ class Solutions(NamedTuple):
 
 
 def least_squares(
-    fn: Callable[[Any, Any], tuple[Any, Any]],
+    fn: Callable[[Any, Any], tuple[Any, Any]], starts: Any, args: Any, count: Any, **options: Any
+) -> Solutions:
+    """Minimise ‖fn(y, args)[0]‖², where `fn` returns residuals and an auxiliary output: see `minimise`."""
+    shapes: Any = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
+    return minimise(partial(normal_equations, fn), starts, args, count, shapes[1], **options)
+
+
+def minimise(
+    equations: Callable[[Any, Any], tuple[Any, Any, Any, Any]],
     starts: Any,
     args: Any,
     count: Any,
+    aux: Any,
     *,
     lanes: int,
     steps: Any = 100,
@@ -41,22 +51,22 @@ def least_squares(
     atol: Any = 0.0,
     coarse: Any = 0.0,
 ) -> Solutions:
-    """Minimise ‖fn(y, args)[0]‖² for y in the unit box from each of the first `count` starts.
+    """Minimise a sum of squares for y in the unit box from each of the first `count` starts.
 
-    `fn` returns residuals and an auxiliary output. `starts` (starts, parameters) and the leaves of `args`
-    (starts, ...) have a row for each start. A lane ends where it has settled by `rtol` and `atol`, after
-    `steps` evaluations, or where an undamped step promises less than the share `coarse` of its distance to
-    the best cost of all: it cannot become the best.
+    `equations(y, args)` returns it with its normal equations and an auxiliary output like `aux`, as
+    `normal_equations` does. `starts` (starts, parameters) and the leaves of `args` (starts, ...) have a row
+    for each start. A lane ends where it has settled by `rtol` and `atol`, after `steps` evaluations, or where
+    an undamped step promises less than the share `coarse` of its distance to the best cost of all: it cannot
+    become the best.
     """
     size, bounds = len(starts), (jnp.zeros_like(starts[0]), jnp.ones_like(starts[0]))
-    shapes: Any = jax.eval_shape(lambda: fn(starts[0], jax.tree.map(lambda leaf: leaf[0], args)))
 
     def begun(y):
-        return begin(y, bounds, shapes[1])
+        return begin(y, bounds, aux)
 
     def advanced(y, state, which):
         own = jax.tree.map(lambda leaf: leaf[jnp.minimum(which, size - 1)], args)
-        y, state = advance(fn, y, own, bounds, state)
+        y, state = advance(equations, y, own, bounds, state)
         found = ended(y, state, rtol, atol)
         return y, state, found.ended, ~(found.diverged | found.lost)
 
@@ -88,7 +98,7 @@ def least_squares(
     empty = Solutions(
         jnp.array(starts),
         jnp.full(size, jnp.inf, starts.dtype),
-        jax.tree.map(lambda leaf: jnp.zeros((size, *leaf.shape), leaf.dtype), shapes[1]),
+        jax.tree.map(lambda leaf: jnp.zeros((size, *leaf.shape), leaf.dtype), aux),
         jnp.zeros(size, bool),
         jnp.zeros(size, int),
     )

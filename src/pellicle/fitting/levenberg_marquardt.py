@@ -144,9 +144,9 @@ def begin(y: Any, bounds: Bounds, aux: Any) -> State:
     )
 
 
-def advance(fn: Any, y: Any, args: Any, bounds: Bounds, state: State) -> tuple[Any, State]:
-    """The accepted point and the state after an evaluation of residuals and `aux`, `fn(y, args)`."""
-    cost, gradient, hessian, aux = normal_equations(fn, state.y_eval, args)
+def advance(equations: Any, y: Any, args: Any, bounds: Bounds, state: State) -> tuple[Any, State]:
+    """The accepted point and the state after an evaluation of `equations(y, args)`, as `normal_equations`."""
+    cost, gradient, hessian, aux = equations(state.y_eval, args)
     cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
     accept = state.first | (cost < state.cost)
 

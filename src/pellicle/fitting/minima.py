@@ -8,6 +8,7 @@ from logging import getLogger
 import numpy as np
 
 from pellicle.effects.averaging import rays_of_axes
+from pellicle.fitting.coordinates import widened
 from pellicle.fitting.evaluation import Until, polish
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import Progress, quiet
@@ -20,6 +21,8 @@ STEPS = 100
 """Most steps of one polish."""
 _WORK = 2048
 """Data values that are evaluated in one step of the solver, about: lanes of many points are few."""
+_SHARED_LANES = 2
+"""Lanes of a program that solves several problems, of few points and of many."""
 MOST = 16
 """Most minima that are kept."""
 _MOST_ROUNDS = 50
@@ -72,19 +75,22 @@ def solve(
     if fixed is not None:
         lower[:, fixed[0]] = upper[:, fixed[0]] = fixed[1]
     rows = max(sum(view.rows * rays_of_axes(view.plan) for view in problem.views), 1)
-    lanes = int(np.clip(2 ** int(np.log2(_WORK / rows)), 2, MOST))
-    pieces = []
+    family = problem.solved_together
+    width = max(member.size for member in family)
+    lanes = int(np.clip(2 ** int(np.log2(_WORK / rows)), 2, MOST)) if len(family) == 1 else _SHARED_LANES
+    which, pieces = np.int64(family.index(problem.member)), []
     progress("polish", 0, len(starts))
     for first in range(0, len(starts), SLOTS):
         low, high, units = (_padded(x[first : first + SLOTS]) for x in (lower, upper, starts))
         count = min(SLOTS, len(starts) - first)
-        until = Until(np.int64(count), np.int64(steps), np.float64(atol), np.float64(coarse))
-        own = box._replace(lower=low, upper=high)
-        polished = polish((problem.static, lanes), problem.arrays, own, units, until)
+        until = Until(np.int64(count), np.int64(steps), np.float64(atol), np.float64(coarse), which)
+        own = box._replace(lower=low, upper=high).extended(width)
+        polished = polish((family, lanes), problem.arrays, own, widened(units, width), until)
         log.debug("polish: %d starts in %d lanes, %d evaluations", count, lanes, polished.steps[:count].sum())
         pieces.append([np.asarray(column)[:count] for column in polished[:3]])
         progress("polish", min(first + SLOTS, len(starts)), len(starts))
     units, deviance, converged = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    units = units[:, : len(problem.parameters)]
     return Minima(units, np.where(np.isfinite(deviance), deviance, np.inf), converged)
 
 

@@ -6,8 +6,8 @@ whatever comes after the search takes a `Problem` and depends on neither.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -51,6 +51,13 @@ class Explained(NamedTuple):
     deviance: Array  # −2 ln of the marginal likelihood, up to a constant
 
 
+class Blocks(NamedTuple):
+    """Pieces of one shape of a view's arrays: their number, traced, and the function that returns one."""
+
+    count: Any
+    at: Callable[[Any], Any]
+
+
 @runtime_checkable
 class Form(Hashable, Protocol):
     """The static part of a view: its `repr` says all that a compiled program depends on."""
@@ -58,6 +65,13 @@ class Form(Hashable, Protocol):
     def explain(self, arrays: Any, values: Any, /) -> Explained:
         """The view with parameters at `values` (its parameters,)."""
         ...
+
+
+@runtime_checkable
+class Blocked(Hashable, Protocol):
+    """A form whose points are independent, and evaluated in blocks: one program serves few and many."""
+
+    def blocks(self, arrays: Any, /) -> Blocks: ...
 
 
 @runtime_checkable
@@ -186,13 +200,28 @@ class View(Protocol):
         ...
 
 
+Static: TypeAlias = tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]
+"""Coordinates of a problem, and the form and the parameters of each view: see `Problem.static`."""
+
+
+class Member(NamedTuple):
+    """One of the problems that share a compiled program: its static part and its number of parameters."""
+
+    static: Static
+    size: int
+
+
 class Problem(NamedTuple):
-    """Parameters of one sample and the views that they explain together."""
+    """Parameters of one sample and the views that they explain together.
+
+    A `family` are problems with the same arrays, this one among them, which one program solves.
+    """
 
     views: tuple[Any, ...]
     parameters: tuple[Parameter, ...]
     box: Box
     coordinates: Coordinates = Coordinates()
+    family: tuple[Member, ...] = ()
 
     def values(self, units: Any) -> Any:
         """Parameters in their own units at `units` (..., parameters) of the unit cube."""
@@ -226,9 +255,18 @@ class Problem(NamedTuple):
         return max(spans, key=lambda i: spans[i]) if spans else None
 
     @property
-    def static(self) -> tuple[Coordinates, tuple[tuple[Form, tuple[int, ...]], ...]]:
+    def static(self) -> Static:
         """Static part of a compiled program of all views."""
         return self.coordinates, tuple((view.form, view.takes) for view in self.views)
+
+    @property
+    def member(self) -> Member:
+        return Member(self.static, len(self.parameters))
+
+    @property
+    def solved_together(self) -> tuple[Member, ...]:
+        """The family, or the problem alone where it has been changed since."""
+        return self.family if self.member in self.family else (self.member,)
 
     @property
     def arrays(self) -> tuple[Any, ...]:

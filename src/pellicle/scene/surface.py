@@ -336,7 +336,7 @@ def surface_view(surface: Surface, directions: HasDirections, count: int = VIEW_
         raise UsageError(f"there is nothing to compute: the surface reflects nothing ({zero} 0)")
     rows = spread(len(directions.theta_i), count)
     i, o = (
-        np.asarray(direction(theta[rows], phi[rows]))
+        direction(theta[rows], phi[rows], np)
         for theta, phi in ((directions.theta_i, directions.phi_i), (directions.theta_o, directions.phi_o))
     )
     return SurfaceView(surface.model, numbers, i, o)

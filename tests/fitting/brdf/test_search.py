@@ -3,15 +3,19 @@
 import dataclasses
 import itertools
 
+import jax
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
 import pellicle as pl
 from pellicle.data.brdf_samples import BrdfSamples
+from pellicle.fitting import minima as solver
 from pellicle.fitting.brdf import search as module
-from pellicle.fitting.brdf.problem import make, without_layer
-from pellicle.fitting.brdf.search import SCAN_SAMPLES, Candidates, Effort, candidates, scan, search
+from pellicle.fitting.brdf.problem import incoherent, make, without_layer
+from pellicle.fitting.brdf.search import Candidates, Effort, candidates, scan, search
+from pellicle.fitting.brdf.view import BLOCK
+from pellicle.fitting.evaluation import Polished
 from pellicle.fitting.minima import Minima
 from pellicle.fitting.problem import Problem
 from pellicle.fitting.progress import quiet
@@ -43,7 +47,7 @@ class Programs:
         monkeypatch.setattr(module, "solve", self.solve)
         monkeypatch.setattr(module, "minima", self.minima)
 
-    def scan(self, static, samples, fixed, box, units):
+    def scan(self, family, member, samples, fixed, box, units):
         self.scanned.append(units)
         self.seen.append(samples)
         return Candidates(self.rule(units), np.full((len(units), 1), 0.1))
@@ -52,9 +56,36 @@ class Programs:
         self.short.append(starts)
         return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
 
-    def minima(self, problem, starts, progress, *, most, followed):
+    def minima(self, problem, starts, progress, *, most, followed, coarse):
         self.final.append((starts, most, followed))
         return Minima(starts, self.rule(starts), np.ones(len(starts), bool))
+
+
+def test_a_surface_and_those_that_judge_it_share_two_programs(monkeypatch):
+    """One scan and one polish, of few samples and of all: nine programs took most of a first fit."""
+    seen = set()
+
+    def program(name, static, arguments):
+        shapes = [(np.shape(x), np.result_type(x)) for x in jax.tree.leaves(arguments)]
+        seen.add((name, static, jax.tree.structure(arguments), tuple(shapes)))
+
+    def scanned(family, *arguments):
+        program("scan", family, arguments)
+        units, most = arguments[-1], max(each.size for each in family)
+        return Candidates(1 + np.arange(len(units)), np.full((len(units), most), 0.5))
+
+    def polished(static, *arguments):
+        program("polish", static, arguments)
+        units = arguments[-2]
+        return Polished(units, 1 + units[:, 0], np.ones(len(units), bool), np.ones(len(units), int))
+
+    monkeypatch.setattr(module, "scan", scanned)
+    monkeypatch.setattr(solver, "polish", polished)
+    data = ones(30.0, 0.0, np.linspace(10.0, 60.0, 1000), 180.0)
+    whole = make([data], [""], TILTED, [pl.plan(TILTED, directions=data)], "linear")
+    for problem in (whole, incoherent(whole), without_layer(whole)):
+        search(problem, FEW, quiet)
+    assert sorted(name for name, *_ in seen) == ["polish", "scan"]
 
 
 def distance(units):
@@ -128,12 +159,12 @@ def test_the_scan_sees_samples_of_all_values(grey, monkeypatch, count):
     if count == 1:
         assert chosen is several[0].data
         return
-    assert chosen.values.shape == (SCAN_SAMPLES, 1)
+    assert chosen.values.shape == (BLOCK, 1)
     fitted = [own * 50 + row for own in range(count) for row in range(50) if not 10 <= row < 20]
     seen = np.searchsorted(fitted, np.unique(chosen.values))
     assert set(np.unique(chosen.values)) <= set(fitted)
     assert (seen[0], seen[-1]) == (0, len(fitted) - 1)
-    assert np.diff(seen).max() <= max(1, len(fitted) // SCAN_SAMPLES + 1)
+    assert np.diff(seen).max() <= max(1, len(fitted) // BLOCK + 1)
     assert count == 4 or len(seen) == len(fitted)
 
 
@@ -208,7 +239,7 @@ def test_weights_are_the_nonnegative_least_squares(layered, kind):
     [view] = problem.views
     size = 1 if kind is not without_layer else 3
     units = np.random.default_rng(2).random((12, size))
-    solved = scan((problem.coordinates, view.form), *view.arrays, problem.box, units)
+    solved = scan((problem.member,), 0, *view.arrays, problem.box, units)
     lower, upper = problem.box.lower[size:], problem.box.upper[size:]
     on_zero = 0
     for unit, chi2, weights in zip(units, solved.chi2, np.asarray(solved.weights), strict=True):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
-from pellicle.fitting.brdf.view import SamplesForm, samples_view
+from pellicle.fitting.brdf.view import PLAIN_WEIGHTS, SamplesForm, samples_view
 from pellicle.fitting.coordinates import LEAST_SQUARE, Coordinates, box
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
@@ -59,12 +59,19 @@ def make(
     for each, name, plan in zip(samples, names, plans, strict=True):
         form = SamplesForm(surface.model, "layer", plan.static_key, keys, channels, residual)
         views.append(samples_view(each, name, plan, form, fixed))
-    return Problem(
+    problem = Problem(
         tuple(views),
         tuple(_parameter(number, tilt is not None, folded) for number in free),
         box(lower, upper, [number.free.prior for number in free], float(reach)),
         Coordinates(log if any(log) else (), tilt, folded),
     )
+    return in_family(problem)
+
+
+def in_family(problem: Problem) -> Problem:
+    """The problem of a surface, which shares its programs with those that judge it."""
+    every = problem, incoherent(problem), without_layer(problem)
+    return problem._replace(family=tuple(each.member for each in every))
 
 
 def _parameter(number: FreeNumber, tilted: bool, folded: bool) -> Parameter:
@@ -99,7 +106,7 @@ def in_plane(samples: BrdfSamples, tolerance: float = 0.5) -> bool:
 
 def linear_count(problem: Problem) -> int:
     """Number of weights among the parameters, which come last."""
-    return sum(p.resolution == np.inf for p in problem.parameters)
+    return len(problem.parameters) - problem.views[0].form.nonlinear
 
 
 def restricted(problem: Problem, rows: Sequence[np.ndarray]) -> Problem:
@@ -121,7 +128,7 @@ def without_layer(problem: Problem) -> Problem:
     """Problem of two plain lobes without a layer, which a layer must beat too."""
     count = problem.views[0].data.values.shape[1]
     shapes = {"roughness_1": _ROUGHNESS, "roughness_2": _ROUGHNESS, "normal": _NORMAL}
-    weights = [(key, channel) for key in ("lobe_1", "lobe_2", "diffuse") for channel in range(count)]
+    weights = [(key, channel) for key in PLAIN_WEIGHTS for channel in range(count)]
     parameters = [Parameter(key, key, "", low, low, high) for key, (low, high) in shapes.items()]
     parameters += [
         Parameter(f"{key}_{channel + 1}", key, "", 1.0, 0.0, _STRONGEST, resolution=np.inf)
@@ -131,8 +138,9 @@ def without_layer(problem: Problem) -> Problem:
     channels = (None,) * len(shapes) + tuple(channel for _, channel in weights)
     bounds = np.array([(p.lower, p.upper) for p in parameters])
     bounds = np.where(np.array(log)[:, None], np.log(np.maximum(bounds, 1e-300)), bounds)
-    about = {"fixed": {}, "takes": tuple(range(len(keys)))}
+    # numbers that are fixed stay: two lobes ignore them, and programs are shared by arrays of one structure
+    takes = tuple(range(len(keys)))
     forms = (replace(v.form, kind="two lobes", keys=keys, channels=channels) for v in problem.views)
-    views = tuple(replace(v, form=form, **about) for v, form in zip(problem.views, forms, strict=True))
+    views = tuple(replace(v, form=form, takes=takes) for v, form in zip(problem.views, forms, strict=True))
     whole = box(bounds[:, 0], bounds[:, 1], [None] * len(keys))
-    return Problem(views, tuple(parameters), whole, Coordinates(log))
+    return Problem(views, tuple(parameters), whole, Coordinates(log), problem.family)

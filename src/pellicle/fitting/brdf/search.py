@@ -8,6 +8,7 @@ draws the fringes anew. Of 100 surfaces of ten free numbers (`benchmarks/brdf_re
 
 import itertools
 from dataclasses import replace
+from functools import partial
 from logging import getLogger
 from typing import Any, NamedTuple
 
@@ -16,17 +17,16 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.brdf.problem import linear_count
-from pellicle.fitting.brdf.view import RESIDUALS, Samples, SamplesForm, slope
-from pellicle.fitting.coordinates import Box, Coordinates
+from pellicle.fitting.brdf.view import BLOCK, SLOPES, Samples
+from pellicle.fitting.coordinates import Box, widened
 from pellicle.fitting.minima import Minima, minima, solve
 from pellicle.fitting.positive_definite import solve_positive
-from pellicle.fitting.problem import Problem
+from pellicle.fitting.problem import Member, Problem
 from pellicle.fitting.progress import Progress
 from pellicle.programs.cache import in_chunks, kept
 
 log = getLogger(__name__)
 
-SCAN_SAMPLES = 150
 _CHUNK = 512
 _SHORT = 25
 """Steps of a short polish."""
@@ -35,6 +35,8 @@ _ROUNDS, _PARENTS = 4, 16
 _BETTER = 0.99
 """The last round is one that leaves more than this share of the best χ²."""
 _FRINGES = ("thickness", "n")
+_COARSE = 1e-3
+"""For fits of which the best minimum alone counts."""
 _APART = 2.0
 """Starts are so far apart (nm): nearer ones fall into one minimum."""
 _DISPERSION = 0.1
@@ -42,14 +44,17 @@ _DISPERSION = 0.1
 
 
 class Effort(NamedTuple):
-    """Numbers of candidates, of those polished for a few steps, and of those polished to the end."""
+    """Numbers of candidates, of those polished for a few steps, and of those polished to the end.
+
+    A polish ends where it promises less than the share `coarse` of its distance to the best of all."""
 
     candidates: int
     short: int
     starts: int
+    coarse: float = 0.0
 
 
-THOROUGH, SMOOTH, FEW = Effort(4096, 64, 8), Effort(8192, 0, 16), Effort(512, 0, 8)
+THOROUGH, SMOOTH, FEW = Effort(4096, 64, 8), Effort(8192, 0, 16, _COARSE), Effort(512, 0, 8, _COARSE)
 """For a layer; for one without interference, whose misfit has no fringes; for three numbers."""
 
 
@@ -73,22 +78,27 @@ def search(problem: Problem, effort: Effort, progress: Progress) -> Minima:
             if done:
                 break
     starts = _best(problem, units, chi2, effort.starts)
-    return minima(problem, starts, progress, most=effort.starts, followed=0)
+    return minima(problem, starts, progress, most=effort.starts, followed=0, coarse=effort.coarse)
 
 
 def _scan(few: Problem, units: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
     """Candidates with their weights beside them, and their χ²."""
     [view] = few.views
+    family = few.solved_together
+    width = max(_form(member).nonlinear for member in family)
+    most = max(member.size for member in family)
+    which, samples = np.int64(family.index(few.member)), view.data.first_block()
     done = itertools.count(0, _CHUNK)
     progress("scan", next(done), len(units))
 
     def chunk(part: np.ndarray) -> Candidates:
-        result = jax.device_get(scan((few.coordinates, view.form), *view.arrays, few.box, part))
+        result = scan(family, which, samples, view.fixed, few.box.extended(most), part)
         progress("scan", min(next(done), len(units)), len(units))
         return result
 
-    scanned = in_chunks(chunk, units, _CHUNK)
-    return np.hstack([units, scanned.weights]), scanned.chi2
+    scanned = in_chunks(chunk, widened(units, width), _CHUNK)
+    count = len(few.parameters) - units.shape[1]
+    return np.hstack([units, scanned.weights[:, :count]]), scanned.chi2
 
 
 def _short(
@@ -120,19 +130,24 @@ def candidates(problem: Problem, count: int, seed: int = 0) -> np.ndarray:
 
 
 def _thinned(problem: Problem) -> Problem:
-    """The problem with one view of `SCAN_SAMPLES` samples, spread evenly over the values of all views; where
+    """The problem with one view of `BLOCK` samples, spread evenly over the values of all views; where
     there are fewer, some are repeated. One view with no more, padding included, stays: it needs no program
     of its own."""
-    if len(problem.views) == 1 and len(problem.views[0].data.values) <= SCAN_SAMPLES:
+    if len(problem.views) == 1 and len(problem.views[0].data.values) <= BLOCK:
         return problem
+    [first, *others] = problem.views
     columns = zip(*(view.data[:5] for view in problem.views), strict=True)
     every = Samples(*map(np.concatenate, columns))
     weighted = np.flatnonzero(np.any(every.weight > 0, axis=1))
     order = weighted[np.argsort(every.values[weighted].mean(axis=1), kind="stable")]
-    chosen = np.sort(order[np.linspace(0, len(weighted) - 1, SCAN_SAMPLES).round().astype(int)])
+    chosen = np.sort(order[np.linspace(0, len(weighted) - 1, BLOCK).round().astype(int)])
+    if not others:  # the others follow without weight, so that the program is that of all samples
+        left = np.setdiff1d(np.arange(len(every.values)), chosen)[: len(every.values) - len(chosen)]
+        every.weight[left], chosen = 0.0, np.concatenate([chosen, left])
     picked = Samples(*(column[chosen] for column in every[:5]))
-    view = replace(problem.views[0], data=picked, rows=len(chosen), stated=picked.weight)
-    return problem._replace(views=(view,))
+    view = replace(first, data=picked, rows=BLOCK, stated=picked.weight)
+    family = tuple(m._replace(static=(m.static[0], m.static[1][:1])) for m in problem.family)
+    return problem._replace(views=(view,), family=family)
 
 
 def _best(problem: Problem, units: np.ndarray, chi2: np.ndarray, most: int) -> np.ndarray:
@@ -157,30 +172,41 @@ class Candidates(NamedTuple):
     weights: Any
 
 
+def _form(member: Member) -> Any:
+    return member.static[1][0][0]
+
+
 @kept
 def scan(
-    static: tuple[Coordinates, SamplesForm], samples: Samples, fixed: dict[str, Any], box: Box, units: Any
+    family: tuple[Member, ...], member: Any, samples: Samples, fixed: dict[str, Any], box: Box, units: Any
 ) -> Candidates:
-    """χ² and weights of candidates `units` (candidates, nonlinear parameters) in the unit cube."""
-    coordinates, form = static
+    """χ² and weights of candidates `units` (candidates, nonlinear parameters) in the unit cube.
 
-    def one(unit):
-        if len(unit) == len(form.keys):
-            values = coordinates.values(box, unit)
-            return Candidates(form.explain((samples, fixed), values).deviance, jnp.zeros(0))
-        return solve_weights(static, samples, fixed, box, unit)
+    Those of one `member` of the family, with columns and weights that others have more at the end.
+    """
+    most = max(each.size - _form(each).nonlinear for each in family)
 
-    return jax.vmap(one)(units)
+    def of(each, units):
+        own, count = box.of_first(each.size), _form(each).nonlinear
+
+        def one(unit):
+            if count == each.size:
+                values = each.static[0].values(own, unit)
+                return Candidates(_form(each).explain((samples, fixed), values).deviance, jnp.zeros(most))
+            found = solve_weights(each, samples, fixed, own, unit)
+            return found._replace(weights=jnp.pad(found.weights, (0, most - len(found.weights))))
+
+        return jax.vmap(one)(units[:, :count])
+
+    return jax.lax.switch(member, [partial(of, each) for each in family], units)
 
 
-def solve_weights(
-    static: tuple[Coordinates, SamplesForm], samples: Samples, fixed: dict[str, Any], box: Box, unit: Any
-) -> Candidates:
+def solve_weights(member: Member, samples: Samples, fixed: dict[str, Any], box: Box, unit: Any) -> Candidates:
     """The best weights, in the unit cube, for nonlinear parameters at `unit`, and χ² with them.
 
     They are exact where residuals are linear in them; else residuals are linearised at the data.
     """
-    coordinates, form = static
+    coordinates, form = member.static[0], _form(member)
     first = len(unit)
     size = len(form.keys) - first
     by_channel = form.channels[first] is not None
@@ -195,9 +221,7 @@ def solve_weights(
     # a BRDF is affine in its weights: what does not depend on them is evaluated once, here and for χ²
     nothing, *each = jax.vmap(at)(jnp.concatenate([jnp.zeros((1, count)), jnp.eye(count)]))
     columns = jnp.stack(each) - nothing
-    change = samples.weight * slope(
-        RESIDUALS[form.residual], samples.values, samples.i[:, 2:3], samples.floor
-    )
+    change = samples.weight * SLOPES[form.residual](samples.values, samples.i[:, 2:3], samples.floor)
     weighted = columns * change
     normal = jnp.einsum("knc,lnc->ckl", weighted, weighted)
     right = jnp.einsum("knc,nc->ck", weighted, (samples.values - nothing) * change)

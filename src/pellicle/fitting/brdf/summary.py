@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.brdf.albedo import energy_warning
+from pellicle.brdf.albedo import albedos, energy_warning
+from pellicle.brdf.film_colour import node_count
+from pellicle.brdf.models import model
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.fitting.brdf.problem import in_plane
 from pellicle.fitting.brdf.systematic_effects import systematic_effects
@@ -25,6 +27,7 @@ from pellicle.fitting.reweighting import RankedMinima
 from pellicle.fitting.status import RIVAL, expanded, limits_in_words
 from pellicle.fitting.tied_numbers import TiedNumber
 from pellicle.materials import materials_in
+from pellicle.programs.cache import kept
 from pellicle.scene.layers import medium
 from pellicle.scene.surface import Surface
 
@@ -207,6 +210,18 @@ def model_warnings(surface: Surface) -> list[str]:
     return [f'if {surface.model} does not explain the samples, try model = "{name}", which {why}']
 
 
+class Albedo(NamedTuple):
+    """Directional albedo, (angles, channels)."""
+
+    value: Any
+
+
+@partial(kept, calls="few")
+def _albedo(static: tuple[str, int], numbers: dict[str, Any]) -> Albedo:
+    name, nodes = static
+    return Albedo(albedos(model(name).by_nodes(nodes), numbers))
+
+
 def number_warnings(
     surface: Surface, parameters: Mapping[str, Estimate], fitted: Mapping[str, Any]
 ) -> list[str]:
@@ -224,11 +239,9 @@ def number_warnings(
         messages.append("the model's lobes are not normalised: specular is a weight and no albedo")
     media = [medium(value) for value in (surface.film, surface.base) if value is not None]
     messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
-    brdf = surface.brdf
-    if surface.sensor is not None:
-        # over bands the colour of every direction of the quadrature would be an integral of its own
-        brdf = brdf.for_thickness_up_to(float(fitted["thickness"]))
-    energy = energy_warning(brdf, fitted)
+    # over bands the colour of every direction of the quadrature would be an integral of its own
+    nodes = node_count(float(fitted["thickness"])) if surface.sensor is not None else 0
+    energy = energy_warning(float(np.max(_albedo((surface.model, nodes), dict(fitted)).value)))
     return [*messages, energy] if energy else messages
 
 

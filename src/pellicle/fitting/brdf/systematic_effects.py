@@ -63,4 +63,4 @@ def _turned(samples: Samples, side: str, degrees: float) -> Samples:
     """The samples with the directions on one side, "i" or "o", further from the normal."""
     x, y, z = np.moveaxis(np.asarray(getattr(samples, side)), -1, 0)
     polar = np.rad2deg(np.arctan2(np.hypot(x, y), z)) + degrees
-    return samples._replace(**{side: np.asarray(direction(polar, np.rad2deg(np.arctan2(y, x))))})
+    return samples._replace(**{side: direction(polar, np.rad2deg(np.arctan2(y, x)), np)})

@@ -17,14 +17,19 @@ from pellicle.data.brdf_samples import DARKEST, BrdfSamples
 from pellicle.effects.surface_plan import evaluation, exact
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.noise import correlation_length
-from pellicle.fitting.problem import Explained, Noise, NoiseGroup
+from pellicle.fitting.problem import Blocks, Explained, Noise, NoiseGroup
 from pellicle.forward_model.plan import Plan
 from pellicle.forward_model.surface_signal import build
+from pellicle.optics.pair import namespace
 from pellicle.programs.cache import kept
 from pellicle.scene.surface import SurfaceView
 
-_ROUND = 128
-"""Samples are padded to a multiple of this, so that files of nearly one length share a program."""
+BLOCK = 150
+"""Samples are padded to a multiple of this, so that files of nearly one length share a program, and a search
+looks at so many. A polish evaluates them in blocks of this size: one program serves few samples and all."""
+
+PLAIN_WEIGHTS = ("lobe_1", "lobe_2", "diffuse")
+"""Weights of two lobes without a layer."""
 
 
 class Samples(NamedTuple):
@@ -36,6 +41,13 @@ class Samples(NamedTuple):
     weight: Array  # of the transformed residual, (samples, channels)
     floor: Array  # 1/sr, (samples, 1)
     independent_fraction: Array | np.floating = np.float64(1.0)  # effective points per point
+    blocks: Array | np.integer = np.int64(1)  # of `BLOCK` samples; those after them have no weight
+
+    def first_block(self) -> Samples:
+        """The first `BLOCK` samples."""
+        if len(self.values) <= BLOCK:
+            return self
+        return self._replace(**{name: getattr(self, name)[:BLOCK] for name in self._fields[:5]})
 
 
 Arrays = tuple[Samples, dict[str, Any]]
@@ -58,6 +70,13 @@ class SamplesForm:
     residual: str
 
     @property
+    def nonlinear(self) -> int:
+        """Number of free numbers before the weights of lobes, which come last."""
+        own = [p.key for p in model(self.model).parameters if p.linear]
+        weights = PLAIN_WEIGHTS if self.kind == "two lobes" else own
+        return sum(key not in weights for key in self.keys)
+
+    @property
     def evaluate(self) -> Evaluate:
         """(numbers, i, o) → (samples, channels) in 1/sr."""
         if self.kind == "two lobes":
@@ -78,7 +97,7 @@ class SamplesForm:
         """Weighted residuals (samples, channels) of a BRDF's values: measured less computed."""
         transform, about = RESIDUALS[self.residual], (samples.i[:, 2:3], samples.floor)
         difference = transform(samples.values, *about) - transform(rho, *about)
-        return jnp.where(samples.weight > 0, difference, 0.0) * samples.weight
+        return namespace(difference).where(samples.weight > 0, difference, 0.0) * samples.weight
 
     def explain(self, arrays: Arrays, values: Any, /) -> Explained:
         """The samples with the free numbers of the surface at `values`."""
@@ -86,6 +105,16 @@ class SamplesForm:
         rho = self.evaluate(self.numbers(values, fixed), samples.i, samples.o)
         residual = self.compare(samples, rho).reshape(-1) * jnp.sqrt(samples.independent_fraction)
         return Explained(rho, residual, jnp.sum(residual**2))
+
+    def blocks(self, arrays: Arrays, /) -> Blocks:
+        """The samples, `BLOCK` at a time."""
+        samples, fixed = arrays
+
+        def at(k):
+            columns = (jax.lax.dynamic_slice_in_dim(x, k * BLOCK, BLOCK) for x in samples[:5])
+            return samples._replace(**dict(zip(Samples._fields, columns, strict=False))), fixed
+
+        return Blocks(samples.blocks, at)
 
 
 class Local(NamedTuple):
@@ -165,10 +194,10 @@ class SamplesView:
         """
         if self.relative is None:
             return 1.0
-        samples, transform = self.data, RESIDUALS[self.form.residual]
-        pair = (jnp.maximum(rho, samples.floor) for rho in (samples.values, jnp.asarray(at.model)))
-        measured, computed = (slope(transform, x, samples.i[:, 2:3], samples.floor) * x for x in pair)
-        ratio = np.asarray(measured) / np.asarray(computed)
+        samples, slope = self.data, SLOPES[self.form.residual]
+        pair = (np.maximum(rho, samples.floor) for rho in (samples.values, np.asarray(at.model)))
+        measured, computed = (slope(x, samples.i[:, 2:3], samples.floor) * x for x in pair)
+        ratio = measured / computed
         return np.where(np.array(self.relative) > 0, ratio, 1.0)[: self.rows]
 
     def by_local_noise(self, values: Any) -> SamplesView:
@@ -234,9 +263,9 @@ class SamplesView:
 
     def slope_of_compared(self, at: Local) -> np.ndarray:
         """Weighted ∂ compared number / ∂ BRDF (rows, channels) at the model."""
-        samples, transform = self.data, RESIDUALS[self.form.residual]
-        rise = slope(transform, jnp.asarray(at.model), samples.i[:, 2:3], samples.floor)
-        return (np.asarray(rise) * np.asarray(samples.weight))[: self.rows]
+        samples = self.data
+        rise = SLOPES[self.form.residual](np.asarray(at.model), samples.i[:, 2:3], samples.floor)
+        return (rise * samples.weight)[: self.rows]
 
     def rms(self, at: Local) -> float:
         """rms of the residuals, in the unit of the residual; in standard deviations where σ is given."""
@@ -245,7 +274,7 @@ class SamplesView:
     def span(self) -> float:
         """The range of the compared data, in the residuals' unit."""
         stated = self.data._replace(weight=self.stated)
-        values = np.asarray(self.form.compare(stated, 0.0 * self.data.values))[: self.rows]
+        values = self.form.compare(stated, 0.0 * self.data.values)[: self.rows]
         return float(np.max(np.ptp(values, axis=0)))
 
 
@@ -254,20 +283,20 @@ def samples_view(
 ) -> SamplesView:
     """The view of a file's samples; weights are 1/σ where σ is known, else 1 for every transformed value."""
     size, known = len(samples), samples.values
-    extra = -size % _ROUND
+    extra = -size % BLOCK
 
-    def pad(x: np.ndarray, edge: Any) -> np.ndarray:
+    def pad(x: Array, edge: Any) -> np.ndarray:
         return np.concatenate([x, np.broadcast_to(edge, (extra, *np.shape(x)[1:]))])
 
-    i = np.asarray(direction(samples.theta_i, samples.phi_i))
-    o = np.asarray(direction(samples.theta_o, samples.phi_o))
+    i = direction(samples.theta_i, samples.phi_i, np)
+    o = direction(samples.theta_o, samples.phi_o, np)
     floor = np.full((size + extra, 1), DARKEST * max(float(np.median(known)), 1e-9))
     weight = np.ones_like(known)
     if samples.sigma is not None:
-        rise = slope(RESIDUALS[form.residual], jnp.asarray(known), jnp.asarray(i[:, 2:3]), floor[:size])
-        weight = 1 / (np.asarray(rise) * samples.sigma)
+        weight = 1 / (SLOPES[form.residual](known, i[:, 2:3], floor[:size]) * samples.sigma)
     up, weight = np.array([0.0, 0.0, 1.0]), pad(weight, 0.0)
-    numbers = Samples(pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor)
+    columns = pad(i, up), pad(o, up), pad(known, np.median(known)), weight, floor
+    numbers = Samples(*columns, blocks=np.int64(len(weight) // BLOCK))
     # weights that suit the eye are not those of the noise, which grows with the signal
     noise = Noise(given=samples.sigma is not None, correlated=True, uneven=samples.sigma is None)
     takes, relative = tuple(range(len(form.keys))), samples.relative
@@ -280,9 +309,17 @@ Transform = Callable[[Any, Any, Any], Any]
 RESIDUALS: dict[str, Transform] = {
     "linear": lambda rho, cosine, floor: rho,
     "cosine": lambda rho, cosine, floor: rho * cosine,
-    "log": lambda rho, cosine, floor: jnp.log1p(rho * cosine),
-    "cube-root": lambda rho, cosine, floor: jnp.cbrt(rho + floor),
+    "log": lambda rho, cosine, floor: namespace(rho).log1p(rho * cosine),
+    "cube-root": lambda rho, cosine, floor: namespace(rho).cbrt(rho + floor),
 }
+
+SLOPES: dict[str, Transform] = {
+    "linear": lambda rho, cosine, floor: namespace(rho).ones_like(rho),
+    "cosine": lambda rho, cosine, floor: namespace(rho).ones_like(rho) * cosine,
+    "log": lambda rho, cosine, floor: cosine / (1 + rho * cosine),
+    "cube-root": lambda rho, cosine, floor: 1 / (3 * namespace(rho).cbrt(rho + floor) ** 2),
+}
+"""d `RESIDUALS`/dρ."""
 
 INVERSES: dict[str, Transform] = {
     "linear": lambda compared, cosine, floor: compared,
@@ -291,8 +328,3 @@ INVERSES: dict[str, Transform] = {
     "cube-root": lambda compared, cosine, floor: compared**3 - floor,
 }
 """(number that is compared, cos θ_i, floor) → ρ."""
-
-
-def slope(transform: Transform, rho: Any, cosine: Any, floor: Any) -> Any:
-    """d transform/dρ at each value."""
-    return jax.jvp(lambda x: transform(x, cosine, floor), (rho,), (jnp.ones_like(rho),))[1]

@@ -19,6 +19,7 @@ from pellicle.fitting.evaluation import Static, Until, explained, polished
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.minima import MOST, STEPS
+from pellicle.fitting.problem import Member
 from pellicle.scene.film import Scene
 
 
@@ -166,7 +167,7 @@ def solve(problem: Prepared, starts: ArrayLike, *, steps: int = STEPS) -> Soluti
     units = jnp.clip((starts - box.lower) / (box.upper - box.lower), 0.0, 1.0)
     lower, upper = (jnp.broadcast_to(side, starts.shape) for side in (box.lower, box.upper))
     until = Until(len(starts), steps, 0.0, 0.0)
-    static = problem._static, min(len(starts), MOST)
+    static = (Member(problem._static, len(problem.names)),), min(len(starts), MOST)
     minimum = polished(static, problem._arrays, box._replace(lower=lower, upper=upper), units, until)
     values = problem._static[0].values(box, minimum.units)
     return Solution(values, minimum.deviance, minimum.converged, minimum.steps)
