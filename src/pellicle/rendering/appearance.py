@@ -12,7 +12,7 @@ from pellicle.colour.spaces import srgb_matrix
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.optics.pair import parts
 from pellicle.scene.film import Light, Scene
-from pellicle.scene.free import insert, start_values
+from pellicle.scene.free import free_leaves, insert, start_values
 from pellicle.scene.instrument import Instrument
 from pellicle.scene.layers import Interface, Layer, Plate
 from pellicle.simulation.colours import BANDS, interference_colours, interference_spectra, varied_layer
@@ -35,9 +35,9 @@ class Appearance:
     (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
     perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
     without a layer at normal incidence. `scene` is the film in reflection, whose layer is named `FILM`.
-    `roughness` is the GGX α of its facets. `coherent` is True for even layers with smooth faces, whose light
-    has one phase. `notes` are sentences on what else its colours
-    contain, `lacking` on what no format's formula has.
+    `roughness` is the GGX α of its facets. `index_free` is True where the index of the layer has free
+    numbers, `coherent` for even layers with smooth faces, whose light has one phase. `notes` are sentences
+    on what else its colours contain, `lacking` on what no format's formula has.
     """
 
     thickness: Float[np.ndarray, " thicknesses"]
@@ -48,6 +48,7 @@ class Appearance:
     scene: Scene
     roughness: float = 0.0
     coherent: bool = True
+    index_free: bool = False
     notes: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
 
@@ -76,11 +77,13 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     no data between 380 and 730 nm.
     """
     position = varied_layer(scene, layer)
+    film: Any = scene.layers[position]
+    index_free = bool(free_leaves(film.material))
     scene = insert(scene, start_values(scene))
     # without what belongs to the measurement, not to the sample
     of_sample = Light(), Instrument(thickness_spread=scene.instrument.thickness_spread)
     scene = eqx.tree_at(lambda s: (s.light, s.instrument), scene, of_sample)
-    film: Any = scene.layers[position]
+    film = scene.layers[position]
     nm = np.unique(np.asarray(film.thickness if thickness is None else thickness, float))
     # without the others' names, so that it is found by its own
     named = tuple(replace(x, name=FILM if i == position else None) for i, x in enumerate(scene.layers))
@@ -90,7 +93,7 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     bare = srgb_matrix(sensor().white) @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights)
     own, base = (_index(medium, CHANNELS) for medium in (film.material, scene.substrate.material))
     xyz, left_out = np.swapaxes(np.asarray(colour.xyz), 0, 1), _left_out(scene, film)
-    return Appearance(nm, xyz, own, base, np.clip(bare, 0.0, 1.0), scene, **left_out)
+    return Appearance(nm, xyz, own, base, np.clip(bare, 0.0, 1.0), scene, index_free=index_free, **left_out)
 
 
 def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:

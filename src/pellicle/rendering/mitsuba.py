@@ -24,6 +24,7 @@ from pellicle.colour.spaces import srgb_matrix
 from pellicle.data.brdf_samples import angles, vectors
 from pellicle.data.formats.rgl import write_tensors
 from pellicle.data.rgl_tables import ISOTROPIC, Brdf, TableSize, tabulate
+from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.files import replacing, write_text
 from pellicle.optics.pair import to_complex
@@ -134,6 +135,8 @@ _OWN_COSINES = 128
 (4e-4); of a soap film, which is dark near its minima, within 0.014 (1.4e-4). Twice as fine a table takes a
 fifth more time, as it exceeds the caches."""
 _FINE = np.linspace(0.0, 1.0, 1001)
+INDEX_STEP = 0.1
+"""Difference of index of the two films between which the lookup of a film of free index interpolates."""
 
 
 @dataclass(frozen=True)
@@ -145,12 +148,16 @@ class Lookup:
     wavelengths first, then `WAVELENGTHS`; elements m11 and, for coherent layers, m12, m33 and m34 of the
     Mueller matrix. Cosines are those outside the base, whose root runs from 0 to 1; that of "_below" from −1,
     where −2/π · arcsin √((a² − 1)/(η² − 1)), of the transverse index a, stands for totally reflected
-    light: its phase is smooth at both ends. `fine` has the same at the film's own thickness and
-    `OWN_WAVELENGTHS`, in finer steps. `thickness` is the range and `own` the film's own one, in nm;
+    light: its phase is smooth at both ends. `changed` has the same of a film whose index is larger by
+    `INDEX_STEP`, where that of the scene's film has free numbers; `index` is the real part of the film's own
+    at `WAVELENGTHS`. `fine` has the same at the film's own thickness and `OWN_WAVELENGTHS`, in finer steps.
+    `thickness` is the range and `own` the film's own one, in nm;
     `eta` the relative index of a transparent base at 550 nm, or 0.
     """
 
     sides: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
+    changed: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
+    index: Float[np.ndarray, " index_wavelengths"]
     fine: dict[str, Float[np.ndarray, "own_cosines own_wavelengths elements"]]
     thickness: tuple[float, float]
     own: float
@@ -168,12 +175,14 @@ class Lookup:
             arrays[f"own_spectra{side}"] = values[..., 0].astype(np.float32)
             if values.shape[-1] > 1:
                 arrays[f"own_mueller{side}"] = values[..., 1:].astype(np.float32)
-        for side, values in self.sides.items():
-            rgb, spectra = _colours(values[..., 0])
-            arrays |= {f"rgb{side}": rgb.astype(np.float32), f"spectra{side}": spectra.astype(np.float32)}
-            if values.shape[-1] > 1:
-                polarised = values[:, :, -len(WAVELENGTHS) :, 1:]
-                arrays[f"mueller{side}"] = polarised.astype(np.float16)  # of 1: within 2.5e-4
+        arrays |= {"index": self.index, "index_step": np.array(INDEX_STEP)} if self.changed else {}
+        for kind, sides in (("", self.sides), ("changed_", self.changed)):
+            for side, values in sides.items():
+                colours = zip(("rgb", "spectra"), _colours(values[..., 0]), strict=True)
+                arrays |= {f"{kind}{name}{side}": x.astype(np.float32) for name, x in colours}
+                if values.shape[-1] > 1:
+                    polarised = values[:, :, -len(WAVELENGTHS) :, 1:]
+                    arrays[f"{kind}mueller{side}"] = polarised.astype(np.float16)  # of 1: within 2.5e-4
         return arrays
 
 
@@ -183,18 +192,31 @@ def lookup(look: Appearance) -> Lookup:
     span = (0.0, 1.25 * own if own > 0 else 1.0)
     nm = np.linspace(*span, int(np.clip(np.ceil(span[1] / _STEP), _FEWEST, _MOST)))
     sides, eta = _sides(look, nm, _COSINES, WAVELENGTHS)
+    changed: dict[str, np.ndarray] = {}
+    if look.index_free and look.coherent:
+        changed, _ = _sides(look, nm, _COSINES, WAVELENGTHS, INDEX_STEP)
+    [film] = [layer for layer in look.scene.layers if layer.name == FILM]
+    n = np.real(to_complex(known_index(film.material, WAVELENGTHS)))
+    index = np.broadcast_to(np.asarray(n, float), WAVELENGTHS.shape)
     fine, _ = _sides(look, np.array([own]), _OWN_COSINES, OWN_WAVELENGTHS)
-    return Lookup(sides, {side: x[0, :, -len(OWN_WAVELENGTHS) :] for side, x in fine.items()}, span, own, eta)
+    at_own = {side: x[0, :, -len(OWN_WAVELENGTHS) :] for side, x in fine.items()}
+    return Lookup(sides, changed, index, at_own, span, own, eta)
 
 
 def _sides(
-    look: Appearance, nm: np.ndarray, cosines: int, wavelength: np.ndarray
+    look: Appearance, nm: np.ndarray, cosines: int, wavelength: np.ndarray, step: float = 0.0
 ) -> tuple[dict[str, np.ndarray], float]:
-    """`sides` and `eta` of a lookup at thicknesses, so many cosines, and `_wavelengths`."""
+    """`sides` and `eta` of a lookup at thicknesses, so many cosines, and `_wavelengths`.
+
+    The index of the film is larger by a `step`.
+    """
     cosine, every = np.linspace(0.0, 1.0, cosines) ** 2, _wavelengths(wavelength)
     if not look.coherent:
         return {"": _reflectances(look, nm, cosine, wavelength)[..., None]}, 0.0
     films = stack(look.scene, FILM, eye=Sensor(every, np.empty(0)))
+    layers: list[Any] = list(films.layers)
+    layers[films.varied] += step
+    films = films._replace(layers=tuple(layers))
     n0, n2 = (np.real(to_complex(medium)) for medium in (films.ambient, films.substrate))
     above, eta = (float(np.interp(550.0, wavelength, x[-len(wavelength) :])) for x in (n0, n2 / n0))
     both = mueller_elements(films, nm[:, None], above * np.sqrt(1 - cosine**2))

@@ -15,8 +15,9 @@ Parameters of the plugin:
 - `thickness` in nm: a number, or a texture whose values from 0 to 1 run from `thickness_min` to
   `thickness_max`; the table's own thickness by default.
 - `alpha`: roughness of GGX, a number or a texture; the number 0 for a mirror.
+- `index_change`: added to the index of the film, a number or a texture; where the table has two films.
 
-`thickness` and `alpha` are differentiable. In RGB variants the table has linear sRGB under D65, in spectral
+All three are differentiable. In RGB variants the table has linear sRGB under D65, in spectral
 ones the film at each wavelength, in monochromatic ones that at 550 nm; polarised variants get the Mueller
 matrices of its waves.
 
@@ -41,7 +42,7 @@ GREEN = 550.0
 
 def table_texture(table: np.ndarray) -> Any:
     """Return a texture of a table whose last axis has the channels, linear between nodes."""
-    kind = mi.Texture2f if table.ndim == 3 else mi.Texture3f
+    kind = {2: mi.Texture1f, 3: mi.Texture2f, 4: mi.Texture3f}[table.ndim]
     return kind(
         mi.TensorXf(np.ascontiguousarray(table, np.float32)),
         filter_mode=dr.FilterMode.Linear,
@@ -70,17 +71,22 @@ def _init(film: Any, props: Any) -> None:
         film.eta = float(table["eta"])  # 0: it only reflects
         film.own, film.values = own, _values(table, "", film.eta)
         film.fine = None if mi.is_rgb else _values(table, "own_", film.eta)
+        film.step, film.changed = 0.0, None
+        if f"changed_{'rgb' if mi.is_rgb else 'spectra'}" in table:
+            film.step = float(table["index_step"])
+            film.changed = table_texture(_values(table, "changed_", film.eta))
+            film.index = table_texture(table["index"][:, None])
     film.table = table_texture(film.values)
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
-    film.thickness, film.alpha = (
+    film.thickness, film.alpha, film.index_change = (
         mi.Float(x) if isinstance(x, float) else x
-        for x in (props.get("thickness", own), props.get("alpha", 0.1))
+        for x in (props.get("thickness", own), props.get("alpha", 0.1), props.get("index_change", 0.0))
     )
     _slice(film)
     film.smooth = isinstance(film.alpha, type(mi.Float(0))) and bool(np.all(np.array(film.alpha) == 0))
     film.straight = abs(film.eta - 1) < 1e-3
-    varies = any(isinstance(x, mi.Texture) for x in (film.thickness, film.alpha))
+    varies = any(isinstance(x, mi.Texture) for x in (film.thickness, film.alpha, film.index_change))
     flags, varying = mi.BSDFFlags, mi.BSDFFlags.SpatiallyVarying if varies else 0
     sides = flags.FrontSide | flags.BackSide if film.eta else flags.FrontSide
     film.reflects = flags.DeltaReflection if film.smooth else flags.GlossyReflection
@@ -105,7 +111,7 @@ def _values(table: Any, kind: str, eta: float) -> np.ndarray:
 
 def _side(table: Any, kind: str, side: str) -> np.ndarray:
     if mi.is_rgb:
-        return table[f"rgb{side}"]
+        return table[f"{kind}rgb{side}"]
     values = table[f"{kind}spectra{side}"][..., None]
     if not mi.is_polarized:
         return values
@@ -127,7 +133,10 @@ def _slice(film: Any) -> None:
 
     RGB has one lookup for all channels, which gains nothing.
     """
-    film.plane = None
+    film.plane, change = None, film.index_change
+    film.moved = isinstance(change, mi.Texture) or bool(np.any(np.array(change) != 0))
+    if film.moved and film.changed is None:
+        raise RuntimeError("the table has one index: export a recipe in which that of the film is free")
     if film.fine is None or isinstance(film.thickness, mi.Texture):
         return
     nm = np.ravel(np.array(film.thickness))
@@ -142,10 +151,15 @@ def _slice(film: Any) -> None:
 
 
 def _grid(film: Any) -> tuple[Any, tuple[int, ...]]:
-    """The table to look up and its shape: that over all thicknesses for gradients."""
-    if film.plane is None or dr.grad_enabled(film.thickness):
+    """The table to look up and its shape: that over all thicknesses for gradients and another index."""
+    if film.plane is None or _moved(film) or dr.grad_enabled(film.thickness):
         return film.table, film.values.shape
     return film.plane
+
+
+def _moved(film: Any) -> bool:
+    """True where the index of the film is not that of the table, or its gradient is asked for."""
+    return film.moved or (film.changed is not None and dr.grad_enabled(film.index_change))
 
 
 def _parameters_changed(film: Any, keys: Any = ()) -> None:
@@ -156,25 +170,50 @@ def _number(value: Any, si: Any, active: Any) -> Any:
     return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
 
 
-def _elements(film: Any, si: Any, row: Any, active: Any) -> list[Any]:
+def _elements(film: Any, si: Any, row: Any, square: Any, active: Any) -> list[Any]:
     """Elements of the film's Mueller matrices at a row of its table, a spectrum each.
 
-    They are those of reflection, then of transmission; where light is not polarised m11 alone.
+    They are those of reflection, then of transmission; where light is not polarised m11 alone. `square` is
+    that of the transverse index n sin θ. Another index is that between the films of two indices, each at the
+    thickness that gives its waves the same phase: what is left to interpolate changes slowly.
     """
     nm, (table, shape) = film.thickness, _grid(film)
     if isinstance(nm, mi.Texture):
         nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
-    across = (row + 0.5) / shape[1]
-    down = node((nm - film.span[0]) / (film.span[1] - film.span[0]), shape[0])
+    if not _moved(film):
+        return _found(film, table, shape, si, row, lambda _: nm, active)
+    change = _number(film.index_change, si, active)
+
+    def path(n: Any) -> Any:
+        return dr.sqrt(dr.maximum(n**2 - square, 1e-2))
+
+    own, other = (
+        _found(film, each, shape, si, row, lambda n, k=k: nm * path(n + change) / path(n + k), active)
+        for each, k in ((table, 0.0), (film.changed, film.step))
+    )
+    share = change / film.step
+    return [a + share * (b - a) for a, b in zip(own, other, strict=True)]
+
+
+def _found(
+    film: Any, table: Any, shape: tuple[int, ...], si: Any, row: Any, thickness: Any, active: Any
+) -> list[Any]:
+    """Elements at a row of a table of this shape; `thickness` (nm) is a function of the film's index."""
+    (low, high), (first, last), across = film.span, film.wavelength, (row + 0.5) / shape[1]
+
+    def down(share: Any) -> Any:
+        """Coordinate of the thickness at a share of the range of wavelengths."""
+        n = film.index.eval(mi.Point1f(node(share, film.index.shape[0])))[0] if _moved(film) else None
+        return node((thickness(n) - low) / (high - low), shape[0])
+
     if mi.is_rgb:
-        rgb = table.eval(mi.Point2f(across, down), active)
+        rgb = table.eval(mi.Point2f(across, down(mi.Float((GREEN - first) / (last - first)))), active)
         return [mi.Color3f(*rgb[at : at + 3]) for at in range(0, shape[2], 3)]
-    first, last = film.wavelength
     values = [dr.zeros(mi.UnpolarizedSpectrum) for _ in range(shape[3])]
     for channel in range(len(values[0])):
-        share = ((si.wavelengths[channel] if mi.is_spectral else GREEN) - first) / (last - first)
+        share = ((si.wavelengths[channel] if mi.is_spectral else mi.Float(GREEN)) - first) / (last - first)
         along = node(share, shape[2])
-        at = mi.Point3f(along, across, down) if shape[0] > 1 else mi.Point2f(along, across)
+        at = mi.Point3f(along, across, down(share)) if shape[0] > 1 else mi.Point2f(along, across)
         found = table.eval(at, active)
         for value, element in zip(values, found, strict=True):
             value[channel] = element
@@ -185,14 +224,14 @@ def _light(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], lis
     """Elements of reflection and of transmission at a facet: `cosine` is negative for light from below."""
     root, (_, shape) = dr.sqrt(dr.abs(cosine)), _grid(film)
     if not film.eta:
-        reflected = _elements(film, si, root * (shape[1] - 1), active)
+        reflected = _elements(film, si, root * (shape[1] - 1), 1 - cosine**2, active)
         return reflected, [dr.zeros(mi.UnpolarizedSpectrum)] * len(reflected)
     last = shape[1] // 3  # the row of the normal from above, and of the critical angle among those below
     square = 1 - film.eta**2 * (1 - cosine**2)  # of the cosine outside, for light from below
     total = dr.safe_acos(-cosine * film.eta / max(film.eta**2 - 1, 1e-6) ** 0.5)
     outside = dr.select(square > 0, dr.sqrt(dr.safe_sqrt(square)), -2 / dr.pi * total)
     row = dr.select(cosine < 0, 2 * last + 1 + last * outside, last * root)
-    elements = _elements(film, si, row, active)
+    elements = _elements(film, si, row, (1 - cosine**2) * dr.select(cosine < 0, film.eta**2, 1), active)
     half = len(elements) // 2
     return elements[:half], elements[half:]
 
@@ -305,7 +344,7 @@ def _eval_pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
 
 
 def _traverse(film: Any, callback: Any) -> None:
-    for name in ("thickness", "alpha"):
+    for name in ("thickness", "alpha", *(["index_change"] if film.changed is not None else [])):
         value = getattr(film, name)
         if isinstance(value, mi.Texture) or dr.is_jit_v(mi.Float):
             callback.put(name, value, mi.ParamFlags.Differentiable)
