@@ -153,3 +153,18 @@ def test_usd_has_the_nodes_and_a_preview(folder, looks):
     assert preview.GetIdAttr().Get() == "UsdPreviewSurface"
     record = json.loads(material.GetPrim().GetCustomDataByKey("pellicle"))
     assert record["physical"]["thickness_nm"] == [400, 400]
+
+
+@pytest.mark.parametrize("name", ["oil", "steel"])
+def test_usd_passes_the_validators_of_its_library(tmp_path, looks, name):
+    """Those of usdchecker; packages of pip lack the registry of MaterialX's nodes, and only that is said."""
+    from pxr import Usd
+
+    validation = pytest.importorskip("pxr.UsdValidation")
+    write("usd", looks[name], tmp_path / "film.usda")
+    validators = validation.ValidationRegistry().GetOrLoadAllValidators()
+    assert len(validators) > 10
+    found = validation.ValidationContext(validators).Validate(Usd.Stage.Open(str(tmp_path / "film.usda")))
+    unknown = [x.GetMessage() for x in found if x.GetName() == "MissingShaderIdInRegistry"]
+    assert all("'ND_" in message for message in unknown)
+    assert [x.GetMessage() for x in found if x.GetName() != "MissingShaderIdInRegistry"] == []
