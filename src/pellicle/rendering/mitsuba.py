@@ -31,6 +31,7 @@ from pellicle.optics.pair import to_complex
 from pellicle.rendering.appearance import FILM, Appearance
 from pellicle.rendering.targets import Material, Target
 from pellicle.rendering.textures import share_of_range, write_grey_image
+from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
 from pellicle.simulation.colours import BANDS
@@ -195,7 +196,7 @@ def lookup(look: Appearance) -> Lookup:
     changed: dict[str, np.ndarray] = {}
     if look.index_free and look.coherent:
         changed, _ = _sides(look, nm, _COSINES, WAVELENGTHS, INDEX_STEP)
-    [film] = [layer for layer in look.scene.layers if layer.name == FILM]
+    [film] = [x for x in look.scene.layers if isinstance(x, Layer) and x.name == FILM]
     n = np.real(to_complex(known_index(film.material, WAVELENGTHS)))
     index = np.broadcast_to(np.asarray(n, float), WAVELENGTHS.shape)
     fine, _ = _sides(look, np.array([own]), _OWN_COSINES, OWN_WAVELENGTHS)
