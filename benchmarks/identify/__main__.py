@@ -23,7 +23,19 @@ import decisions
 import nested
 import numpy as np
 import real
-from scoring import Answer, described, failures, films, goals, score, table, truth_of, write_csv
+from scoring import (
+    Answer,
+    best_film,
+    described,
+    failures,
+    films,
+    goals,
+    reliability,
+    score,
+    table,
+    truth_of,
+    write_csv,
+)
 from specimens import Specimen, clean, measured
 from suite import HELD_OUT, SEED, Case, cases
 
@@ -56,6 +68,7 @@ def answer(case: Case, seed: int) -> Answer:
         verdict, status = found.verdict, str(found.status)
         outcome, layers = score(case, found)
     seconds = time.perf_counter() - began
+    sure = best_film(case, found) if found is not None and found.hypotheses else (np.nan, False)
     close = found is not None and bool(found.hypotheses) and found.hypotheses[0].remaining < NOISE_LIKE
     return Answer(
         *(case.name, case.group, status, outcome, layers, len(films(case)), close, truth_of(case)),
@@ -63,6 +76,8 @@ def answer(case: Case, seed: int) -> Answer:
         verdict=verdict,
         seconds=seconds,
         gain=nested.gain(case, data) if case.group == "there" else np.nan,
+        probability=sure[0],
+        best_right=sure[1],
     )
 
 
@@ -93,6 +108,7 @@ def main() -> None:
             write_csv(answers, asked.out)
     if answers:
         print("\n" + table(answers) + "\n\n" + "\n".join(goals(answers)) + "\n\n" + failures(answers))
+        print("\n" + reliability(answers))
         print(f"median {np.median([x.seconds for x in answers]):.1f} s")
 
 

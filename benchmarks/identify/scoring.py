@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -38,6 +39,9 @@ class Answer:
     seconds: float
     gain: float
     """ln Z of two true layers less that of the best one film, where it was computed."""
+    probability: float = np.nan
+    """Probability of the best film under all its names, and of what it matches of the truth."""
+    best_right: bool = False
 
 
 def truth_of(case: Case) -> str:
@@ -104,6 +108,36 @@ def score(case: Case, found: Any) -> tuple[str, bool]:
     if status == "identified":
         return ("right" if right[:1] == [True] else "wrong"), layers
     return ("listed" if any(right) else "missed" if status == "undecided" else "silent"), layers
+
+
+def best_film(case: Case, found: Any) -> tuple[float, bool]:
+    """Probability of the best hypothesis and of others with its layers, and whether one is the truth."""
+    best, *others = found.hypotheses
+    alike = [best, *(x for x in others if _one_film(best, x))]
+    return sum(x.probability for x in alike), any(matches(case, x) for x in alike)
+
+
+def _one_film(a: Any, b: Any) -> bool:
+    pairs = list(zip(thick(a), thick(b), strict=False))
+    return len(thick(a)) == len(thick(b)) and all(
+        abs(np.mean(x.n) / np.mean(y.n) - 1) < 2 * SAME_INDEX
+        and abs(x.thickness.value - y.thickness.value)
+        < ERRORS * np.hypot(*(min(z.thickness.stderr, 0.1 * z.thickness.value) for z in (x, y)))
+        for x, y in pairs
+    )
+
+
+def reliability(answers: Sequence[Answer]) -> str:
+    """Stated probabilities of the best film against the share of them that is right, in Markdown."""
+    edges = [0.0, 0.5, 0.8, 0.95, 0.99, 1.0 + 1e-9]
+    known = [x for x in answers if np.isfinite(x.probability) and not x.group.startswith("wrong ")]
+    lines = ["| probability of the best film | cases | mean | right |", "|---|---|---|---|"]
+    for low, high in pairwise(edges):
+        own = [x for x in known if low <= x.probability < high]
+        if own:
+            mean, right = np.mean([x.probability for x in own]), np.mean([x.best_right for x in own])
+            lines.append(f"| {low:g} to {min(high, 1):g} | {len(own)} | {mean:.2f} | {right:.2f} |")
+    return "\n".join(lines)
 
 
 def described(found: Any) -> str:

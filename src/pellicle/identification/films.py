@@ -14,7 +14,7 @@ from pellicle.scene.layers import medium
 
 FAMILIES = {
     "oxide": [
-        *("SiO2", "alumina", "Y2O3", "SiO", "MgO", "HfO2", "ZrO2", "Ta2O5", "Nb2O5", "TiO2", "ZnO"),
+        *("SiO2", "alumina", "Y2O3", "SiO", "MgO", "HfO2", "ZrO2", "Ta2O5", "Nb2O5", "TiO2", "ZnO", "Sc2O3"),
         *("TiO2/Devore-o", "TiO2/Devore-e", "ITO", "Fe2O3", "Cu2O", "CuO"),
     ],
     "nitride": ["Si3N4", "AlN", "TiN"],
