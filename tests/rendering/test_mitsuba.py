@@ -293,7 +293,7 @@ def test_polarised_light_is_that_of_the_waves(tabulated, degrees, transmitted):
         expected = mi.mueller.rotate_mueller_basis(
             expected, -source, axis, basis(-source), seen, axis, basis(seen)
         )
-        np.testing.assert_allclose(matrix, np.array(expected)[..., 0], atol=1e-3)
+        np.testing.assert_allclose(matrix, np.array(expected)[..., 0], atol=1e-5)
 
 
 @pytest.mark.slow
@@ -356,32 +356,6 @@ def test_a_table_of_another_version_is_refused(tmp_path):
         RuntimeError, match=r"old\.npz: is of another version of pellicle; export the film again"
     ):
         mi.load_dict({"type": "pellicle_film", "filename": str(tmp_path / "old.npz")})
-
-
-@pytest.mark.slow
-def test_an_even_film_has_a_finer_table_at_its_own_thickness(tmp_path):
-    """A number is looked up at its own thickness, and another number as a texture of it is."""
-    film = pl.Scene(pl.Layer(2.0, 1000.0), 1.5)
-    np.savez(tmp_path / "film.npz", **lookup(appearance(film)).arrays())
-    mi.set_variant("scalar_spectral")
-    mitsuba_plugin.register()
-    si, wavelengths = mi.SurfaceInteraction3f(), [421.3, 487.6, 552.2, 618.9]
-    si.wi, si.wavelengths = mi.Vector3f(0, 0.6, 0.8), wavelengths
-
-    def reflected(thickness):
-        plugin = {"type": "pellicle_film", "filename": str(tmp_path / "film.npz"), "alpha": 0.0}
-        bsdf = mi.load_dict(plugin | thickness)
-        sampled, weight = bsdf.sample(mi.BSDFContext(), si, 0.0, [0.5, 0.5])
-        return np.ravel(weight) * sampled.pdf
-
-    def image(nm):
-        texture = {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(np.ones((2, 2, 1), np.float32))}
-        return {"thickness": texture, "thickness_max": nm}
-
-    exact = [airy(np.array([nm]), 1000.0, 2.0, 1.5, 0.8)[0] for nm in wavelengths]
-    np.testing.assert_allclose(reflected({}), exact, atol=1.4e-3)  # steps of 2 nm
-    assert np.max(np.abs(reflected(image(1000.0)) - exact)) > 3e-3  # of 5 nm
-    np.testing.assert_allclose(reflected({"thickness": 731.0}), reflected(image(731.0)), rtol=1e-4)
 
 
 def test_a_film_of_less_index_than_its_base_has_numbers_everywhere():

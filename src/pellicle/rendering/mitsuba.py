@@ -126,9 +126,8 @@ ANISOTROPIC = TableSize(33, 24, 32)
 _STEP, _FEWEST, _MOST = 0.4, 64, 512
 """Step (nm) between the thicknesses of a lookup, and bounds of their number."""
 _COSINES = 64
-"""Even steps of √cos θ: elements of the Mueller matrix are within 4e-4 for films of 43 nm on steel and of
-150 nm on glass, in even steps of cos θ within 2e-3. A film of 1 µm is within 0.04 (mean 0.002), limited by
-`WAVELENGTHS`."""
+"""Even steps of √cos θ: films of 43 nm on steel and of 150 nm on glass are within 4e-4, in even steps of cos
+θ within 2e-3. A film of 1 µm is within 0.04 (mean 0.002), limited by `WAVELENGTHS`."""
 OWN_WAVELENGTHS = np.arange(380.0, 731.0, 2.0)
 """Wavelengths (nm) at the film's own thickness."""
 _OWN_COSINES = 128
@@ -152,13 +151,15 @@ class Lookup:
     light: its phase is smooth at both ends. `changed` has the same of a film whose index is larger by
     `INDEX_STEP`, where that of the scene's film has free numbers; `index` is the real part of the film's own
     at `WAVELENGTHS`. `fine` has the same at the film's own thickness and `OWN_WAVELENGTHS`, in finer steps.
-    `thickness` is the range and `own` the film's own one, in nm;
-    `eta` the relative index of a transparent base at 550 nm, or 0.
+    `thickness` is the range and `own` the film's own one, in nm; `eta` the relative index of a transparent
+    base at 550 nm, or 0. `media` are the indices of a film of one layer, see `_media`, of which `sides` and
+    `changed` have the sensor's wavelengths alone: its waves are computed by Airy's formula.
     """
 
     sides: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
     changed: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
     index: Float[np.ndarray, " index_wavelengths"]
+    media: Float[np.ndarray, "own_wavelengths 5"] | None
     fine: dict[str, Float[np.ndarray, "own_cosines own_wavelengths elements"]]
     thickness: tuple[float, float]
     own: float
@@ -172,15 +173,19 @@ class Lookup:
         """
         arrays: dict[str, Any] = {"wavelength": WAVELENGTHS, "thickness": np.array(self.thickness)}
         arrays |= {"default_thickness": np.array(self.own), "eta": np.array(self.eta)}
+        arrays |= {} if self.media is None else {"media": self.media}
         for side, values in self.fine.items():
             arrays[f"own_spectra{side}"] = values[..., 0].astype(np.float32)
-            if values.shape[-1] > 1:
+            if values.shape[-1] > 1 and self.media is None:
                 arrays[f"own_mueller{side}"] = values[..., 1:].astype(np.float32)
         arrays |= {"index": self.index, "index_step": np.array(INDEX_STEP)} if self.changed else {}
         for kind, sides in (("", self.sides), ("changed_", self.changed)):
             for side, values in sides.items():
-                colours = zip(("rgb", "spectra"), _colours(values[..., 0]), strict=True)
-                arrays |= {f"{kind}{name}{side}": x.astype(np.float32) for name, x in colours}
+                rgb, spectra = _colours(values[..., 0])
+                arrays[f"{kind}rgb{side}"] = rgb.astype(np.float32)
+                if self.media is not None:
+                    continue
+                arrays[f"{kind}spectra{side}"] = spectra.astype(np.float32)
                 if values.shape[-1] > 1:
                     polarised = values[:, :, -len(WAVELENGTHS) :, 1:]
                     arrays[f"{kind}mueller{side}"] = polarised.astype(np.float16)  # of 1: within 2.5e-4
@@ -192,16 +197,36 @@ def lookup(look: Appearance) -> Lookup:
     own = float(look.thickness[-1])
     span = (0.0, 1.25 * own if own > 0 else 1.0)
     nm = np.linspace(*span, int(np.clip(np.ceil(span[1] / _STEP), _FEWEST, _MOST)))
-    sides, eta = _sides(look, nm, _COSINES, WAVELENGTHS)
+    media = _media(look)
+    wavelength = WAVELENGTHS if media is None else np.empty(0)
+    sides, eta = _sides(look, nm, _COSINES, wavelength)
     changed: dict[str, np.ndarray] = {}
     if look.index_free and look.coherent:
-        changed, _ = _sides(look, nm, _COSINES, WAVELENGTHS, INDEX_STEP)
+        changed, _ = _sides(look, nm, _COSINES, wavelength, INDEX_STEP)
     [film] = [x for x in look.scene.layers if isinstance(x, Layer) and x.name == FILM]
     n = np.real(to_complex(known_index(film.material, WAVELENGTHS)))
     index = np.broadcast_to(np.asarray(n, float), WAVELENGTHS.shape)
     fine, _ = _sides(look, np.array([own]), _OWN_COSINES, OWN_WAVELENGTHS)
     at_own = {side: x[0, :, -len(OWN_WAVELENGTHS) :] for side, x in fine.items()}
-    return Lookup(sides, changed, index, at_own, span, own, eta)
+    return Lookup(sides, changed, index, media, at_own, span, own, eta)
+
+
+def _media(look: Appearance) -> np.ndarray | None:
+    """Indices of a film of one layer at `OWN_WAVELENGTHS`, None of other films.
+
+    They are n of the ambient medium, n and k of the film and of the base.
+    """
+    if not look.coherent or len(look.scene.layers) > 1:
+        return None
+    layer = look.scene.layers[0]
+    assert isinstance(layer, Layer)
+    found = [look.scene.ambient, layer.material, look.scene.substrate.material]
+    n0, film, base = (
+        to_complex(known_index(x, OWN_WAVELENGTHS)) * np.ones(len(OWN_WAVELENGTHS)) for x in found
+    )
+    if np.any(np.imag(n0)):
+        return None
+    return np.stack([np.real(n0), *(part(x) for x in (film, base) for part in (np.real, np.imag))], axis=1)
 
 
 def _sides(
@@ -219,7 +244,8 @@ def _sides(
     layers[films.varied] += step
     films = films._replace(layers=tuple(layers))
     n0, n2 = (np.real(to_complex(medium)) for medium in (films.ambient, films.substrate))
-    above, eta = (float(np.interp(550.0, wavelength, x[-len(wavelength) :])) for x in (n0, n2 / n0))
+    bands = len(every) - len(wavelength)
+    above, eta = (float(np.interp(550.0, every[:bands], x[:bands])) for x in (n0, n2 / n0))
     both = mueller_elements(films, nm[:, None], above * np.sqrt(1 - cosine**2))
     both = np.moveaxis(both, 1, -1)
     if look.metallic or eta < 1:

@@ -15,11 +15,13 @@ Parameters of the plugin:
 - `thickness` in nm: a number, or a texture whose values from 0 to 1 run from `thickness_min` to
   `thickness_max`; the table's own thickness by default.
 - `alpha`: roughness of GGX, a number or a texture; the number 0 for a mirror.
-- `index_change`: added to the index of the film, a number or a texture; where the table has two films.
+- `index_change`: added to the index of the film, a number or a texture; in RGB variants, and of several
+  layers, where the table has two films.
 
-All three are differentiable. In RGB variants the table has linear sRGB under D65, in spectral
-ones the film at each wavelength, in monochromatic ones that at 550 nm; polarised variants get the Mueller
-matrices of its waves.
+All three are differentiable. In RGB variants the table has linear sRGB under D65, in spectral ones the film
+at each wavelength, in monochromatic ones that at 550 nm; polarised variants get the Mueller matrices of its
+waves. A film of one layer is computed by Airy's formula where light is polarised, and where thickness or
+index are not those of the table or have gradients, but for RGB.
 
 A film on a transparent base transmits from both sides as the built-in `roughdielectric` does, with the same
 medium on both sides (a bubble) straight on. Others reflect on the front side only, as `roughconductor` does;
@@ -69,14 +71,19 @@ def _init(film: Any, props: Any) -> None:
         own = float(table["default_thickness"])
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
         film.eta = float(table["eta"])  # 0: it only reflects
-        film.own, film.values = own, _values(table, "", film.eta)
-        film.fine = None if mi.is_rgb else _values(table, "own_", film.eta)
-        film.step, film.changed = 0.0, None
+        film.own, film.step, film.changed, film.fine, film.media = own, 0.0, None, None, None
+        film.table = film.values = None
+        if "media" in table and not mi.is_rgb:
+            film.media = table_texture(table["media"])
+        else:
+            film.values = _values(table, "", film.eta)
+            film.table = table_texture(film.values)
+        if not mi.is_rgb and not (mi.is_polarized and film.media is not None):
+            film.fine = _values(table, "own_", film.eta)
         if f"changed_{'rgb' if mi.is_rgb else 'spectra'}" in table:
             film.step = float(table["index_step"])
             film.changed = table_texture(_values(table, "changed_", film.eta))
             film.index = table_texture(table["index"][:, None])
-    film.table = table_texture(film.values)
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
     film.thickness, film.alpha, film.index_change = (
@@ -135,15 +142,18 @@ def _slice(film: Any) -> None:
     """
     film.plane, change = None, film.index_change
     film.moved = isinstance(change, mi.Texture) or bool(np.any(np.array(change) != 0))
-    if film.moved and film.changed is None:
+    if film.moved and not _has_index(film):
         raise RuntimeError("the table has one index: export a recipe in which that of the film is free")
     if film.fine is None or isinstance(film.thickness, mi.Texture):
         return
     nm = np.ravel(np.array(film.thickness))
     if len(nm) != 1:
         return
-    (low, high), last, plane = film.span, len(film.values) - 1, film.fine
+    (low, high), plane = film.span, film.fine
     if abs(nm[0] - film.own) > 1e-5 * film.own:
+        if film.media is not None:
+            return
+        last = len(film.values) - 1
         at = np.clip((float(nm[0]) - low) / (high - low), 0, 1) * last
         row = min(int(at), last - 1)
         plane = (1 - at + row) * film.values[row] + (at - row) * film.values[row + 1]
@@ -159,7 +169,12 @@ def _grid(film: Any) -> tuple[Any, tuple[int, ...]]:
 
 def _moved(film: Any) -> bool:
     """True where the index of the film is not that of the table, or its gradient is asked for."""
-    return film.moved or (film.changed is not None and dr.grad_enabled(film.index_change))
+    return film.moved or (_has_index(film) and dr.grad_enabled(film.index_change))
+
+
+def _has_index(film: Any) -> bool:
+    """True where the index of the film can change."""
+    return film.changed is not None or film.media is not None
 
 
 def _parameters_changed(film: Any, keys: Any = ()) -> None:
@@ -170,6 +185,64 @@ def _number(value: Any, si: Any, active: Any) -> Any:
     return value.eval_1(si, active) if isinstance(value, mi.Texture) else value
 
 
+def _thickness(film: Any, si: Any, active: Any) -> Any:
+    """Thickness of the film in nm."""
+    if not isinstance(film.thickness, mi.Texture):
+        return film.thickness
+    return film.low + (film.high - film.low) * film.thickness.eval_1(si, active)
+
+
+def _waves(film: Any, nm: Any, cosine: Any, thickness: Any, change: Any, active: Any) -> Any:
+    """Amplitudes (s, p) of reflection and of transmission by Airy's formula, at a wavelength `nm` in vacuum.
+
+    With ε = n² and q = √(ε − n₀² sin²θ) those of a face are (q − q′)/(q + q′) for s, and for p
+    (ε′ q − ε q′)/(ε′ q + ε q′).
+    """
+    number, (first, last) = mi.Complex2f, film.wavelength
+    at = mi.Point1f(node((nm - first) / (last - first), film.media.shape[0]))
+    n0, n, k, base_n, base_k = film.media.eval(at, active)
+    square = n0**2 * (1 - cosine**2) * (dr.select(cosine < 0, film.eta**2, 1) if film.eta else 1)
+    above, layer, below = (
+        (x, dr.sqrt(x - square))
+        for x in (number(n0**2, 0), number(n + change, k) ** 2, number(base_n, base_k) ** 2)
+    )
+    if film.eta:  # light from below meets them in the other order
+        turned = [dr.select(cosine < 0, b, a) for a, b in zip(above, below, strict=True)]
+        above, below = turned, [dr.select(cosine < 0, a, b) for a, b in zip(above, below, strict=True)]
+    (e0, q0), (e1, q1), (e2, q2) = above, layer, below
+    half = q1 * (2 * dr.pi * thickness / nm)
+    root = number(dr.cos(dr.real(half)), dr.sin(dr.real(half))) * dr.exp(-dr.imag(half))
+    turn, flux = 4 * q1 * root, dr.safe_sqrt(dr.real(q0) * dr.real(q2))
+    faces = (
+        ((q0 - q1, q0 + q1), (q1 - q2, q1 + q2), flux),
+        ((e1 * q0 - e0 * q1, e1 * q0 + e0 * q1), (e2 * q1 - e1 * q2, e2 * q1 + e1 * q2), None),
+    )
+    reflected, passed = [], []
+    for (r0, t0), (r1, t1), own in faces:
+        whole = t0 * t1 + r0 * r1 * root**2
+        reflected.append((r0 * t1 + t0 * r1 * root**2) / whole)
+        own = e1 * (flux * dr.safe_sqrt(dr.real(e0) * dr.real(e2))) if own is None else own
+        passed.append(turn * own / whole)
+    return reflected, passed
+
+
+def _by_airy(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], list[Any]]:
+    """Elements of reflection and of transmission of a film of one layer: see `_light`."""
+    thickness, change = _thickness(film, si, active), _number(film.index_change, si, active)
+    count = 4 if mi.is_polarized else 1
+    kinds = [[dr.zeros(mi.UnpolarizedSpectrum) for _ in range(count)] for _ in range(2)]
+    for channel in range(len(kinds[0][0])):
+        nm = si.wavelengths[channel] if mi.is_spectral else mi.Float(GREEN)
+        waves = _waves(film, nm, cosine, thickness, change, active)
+        for elements, (s, p) in zip(kinds[: 2 if film.eta else 1], waves, strict=False):
+            a, b = dr.squared_norm(s), dr.squared_norm(p)
+            both = s * dr.conj(p)
+            values = (a + b) / 2, (a - b) / 2, dr.real(both), dr.imag(both)
+            for element, value in zip(elements, values, strict=False):
+                element[channel] = value
+    return kinds[0], kinds[1]
+
+
 def _elements(film: Any, si: Any, row: Any, square: Any, active: Any) -> list[Any]:
     """Elements of the film's Mueller matrices at a row of its table, a spectrum each.
 
@@ -177,9 +250,7 @@ def _elements(film: Any, si: Any, row: Any, square: Any, active: Any) -> list[An
     that of the transverse index n sin θ. Another index is that between the films of two indices, each at the
     thickness that gives its waves the same phase: what is left to interpolate changes slowly.
     """
-    nm, (table, shape) = film.thickness, _grid(film)
-    if isinstance(nm, mi.Texture):
-        nm = film.low + (film.high - film.low) * nm.eval_1(si, active)
+    nm, (table, shape) = _thickness(film, si, active), _grid(film)
     if not _moved(film):
         return _found(film, table, shape, si, row, lambda _: nm, active)
     change = _number(film.index_change, si, active)
@@ -222,6 +293,9 @@ def _found(
 
 def _light(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], list[Any]]:
     """Elements of reflection and of transmission at a facet: `cosine` is negative for light from below."""
+    own = film.plane is not None and not _moved(film) and not dr.grad_enabled(film.thickness)
+    if film.media is not None and not own:
+        return _by_airy(film, si, cosine, active)
     root, (_, shape) = dr.sqrt(dr.abs(cosine)), _grid(film)
     if not film.eta:
         reflected = _elements(film, si, root * (shape[1] - 1), 1 - cosine**2, active)
@@ -344,7 +418,7 @@ def _eval_pdf(film: Any, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
 
 
 def _traverse(film: Any, callback: Any) -> None:
-    for name in ("thickness", "alpha", *(["index_change"] if film.changed is not None else [])):
+    for name in ("thickness", "alpha", *(["index_change"] if _has_index(film) else [])):
         value = getattr(film, name)
         if isinstance(value, mi.Texture) or dr.is_jit_v(mi.Float):
             callback.put(name, value, mi.ParamFlags.Differentiable)
