@@ -218,8 +218,7 @@ def _media(look: Appearance) -> np.ndarray | None:
     """
     if not look.coherent or len(look.scene.layers) > 1:
         return None
-    layer = look.scene.layers[0]
-    assert isinstance(layer, Layer)
+    [layer] = [x for x in look.scene.layers if isinstance(x, Layer)]
     found = [look.scene.ambient, layer.material, look.scene.substrate.material]
     n0, film, base = (
         to_complex(known_index(x, OWN_WAVELENGTHS)) * np.ones(len(OWN_WAVELENGTHS)) for x in found
