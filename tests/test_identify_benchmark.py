@@ -116,3 +116,27 @@ def test_shares_of_a_run(bench):
     assert bench.scoring.goals(made)[0] == "confidently wrong: 1 of 3 (33 %); goal 3 %"
     assert "| all | 3 | 1 | 1 | 1 | 0 | 0 | 1.0 |" in bench.scoring.table(made)
     assert bench.scoring.failures(made).startswith("- 1: truth")
+
+
+def test_probabilities_of_one_film_under_several_names_add_up(bench):
+    case = next(x for x in bench.suite.cases(1) if x.group == "clean")
+    other, same, best = (trivial(case, "undecided", by).hypotheses[0] for by in (40.0, 1.0, 0.0))
+    for hypothesis, probability in ((best, 0.5), (same, 0.3), (other, 0.2)):
+        hypothesis.probability = probability
+    found = SimpleNamespace(hypotheses=[best, same, other])
+    assert bench.scoring.best_film(case, found) == (pytest.approx(0.8), True)
+    found.hypotheses = [other, best, same]
+    assert bench.scoring.best_film(case, found) == (pytest.approx(0.2), False)
+
+
+def test_reliability_counts_samples_with_films_that_are_stated_rightly(bench):
+    about = ("undecided", "listed", True, 1, True, "", "", "", 1.0, np.nan)
+    rows = [
+        ("clean", 0.96, True),
+        ("clean", 0.98, False),
+        ("wrong substrate", 0.97, False),
+        ("there", 0.3, True),
+    ]
+    made = [bench.scoring.Answer(f"{i}", own[0], *about, *own[1:]) for i, own in enumerate(rows)]
+    lines = bench.scoring.reliability(made).splitlines()
+    assert lines[2:] == ["| 0 to 0.5 | 1 | 0.30 | 1.00 |", "| 0.95 to 0.99 | 2 | 0.97 | 0.50 |"]
