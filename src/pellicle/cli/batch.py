@@ -38,7 +38,7 @@ from pellicle.cli.session import (
     reported,
 )
 from pellicle.errors import UsageError
-from pellicle.programs.threads import workers_for
+from pellicle.programs.workers import workers_for
 
 if TYPE_CHECKING:
     from pellicle.fitting.repeated_measurements import Repeats

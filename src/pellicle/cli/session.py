@@ -20,7 +20,7 @@ from warnings import filterwarnings
 
 from pellicle.cli.messages import as_flags, say, show
 from pellicle.errors import UsageError
-from pellicle.programs.threads import single_threaded
+from pellicle.programs.workers import single_threaded
 
 GOOD, WRONG_USAGE, BAD_DATA, UNCLEAR, TOO_SHORT, OFF_SPEC, INTERRUPTED = 0, 2, 3, 4, 5, 6, 130
 """Exit codes: one answer, wrong flags, bad file or full disk, another status, chain too short, a limit of

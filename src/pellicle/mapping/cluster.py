@@ -29,7 +29,7 @@ from distributed.scheduler import KilledWorker
 from pellicle.data.cube import Cube
 from pellicle.errors import DataError, UsageError
 from pellicle.mapping.block_fit import Fitted, Job, fit_block
-from pellicle.programs.threads import single_threaded
+from pellicle.programs.workers import single_threaded
 
 log = logging.getLogger(__name__)
 

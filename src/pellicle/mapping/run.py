@@ -29,7 +29,7 @@ from pellicle.mapping.locks import held
 from pellicle.mapping.map_result import Map, Run
 from pellicle.mapping.pixels import PixelModel, bands_off, fit_pixels, prepare
 from pellicle.mapping.store import BYTES, FORMAT, begin
-from pellicle.programs.threads import workers_for
+from pellicle.programs.workers import workers_for
 from pellicle.scene.film import Scene
 from pellicle.scene.instrument import Drift
 

@@ -11,7 +11,6 @@ Loading machine code takes some milliseconds: nothing is traced, lowered or comp
 written them. A file begins with a digest of its content and of the key under which it was kept.
 """
 
-import gc
 import hashlib
 import logging
 import os
@@ -164,23 +163,6 @@ def load(path: Path, key: bytes) -> Program | None:
         return None
 
 
-@contextmanager
-def collector_paused() -> Iterator[None]:
-    """A block without Python's garbage collector.
-
-    Tracing makes millions of objects, nearly all of which live until it ends: the collector searches them in
-    vain, which takes 7 to 10 % of the processor time of a first fit.
-    """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-@collector_paused()
 def make(
     path: Path,
     key: bytes,
@@ -270,8 +252,7 @@ def kept(function: Program, *, calls: Calls = "some") -> Program:
         rows = {key: row for row, key in enumerate(own)}
         places = _Places(structure, tuple(rows[key] for key in keys))
         if not folder or "://" in folder:  # JAX can cache in a cloud, too
-            with collector_paused():
-                return jax.device_get(jitted()(plan, places, *own.values()))
+            return jax.device_get(jitted()(plan, places, *own.values()))
         arrays = [*map(np.asarray, own.values())]
         shapes = tuple((a.shape, a.dtype) for a in arrays)
         run, output = _load(function, calls, plan, places, shapes, folder)

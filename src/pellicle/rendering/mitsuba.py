@@ -149,17 +149,17 @@ class Lookup:
     Mueller matrix. Cosines are those outside the base, whose root runs from 0 to 1; that of "_below" from −1,
     where −2/π · arcsin √((a² − 1)/(η² − 1)), of the transverse index a, stands for totally reflected
     light: its phase is smooth at both ends. `changed` has the same of a film whose index is larger by
-    `INDEX_STEP`, where that of the scene's film has free numbers; `index` is the real part of the film's own
-    at `WAVELENGTHS`. `fine` has the same at the film's own thickness and `OWN_WAVELENGTHS`, in finer steps.
-    `thickness` is the range and `own` the film's own one, in nm; `eta` the relative index of a transparent
-    base at 550 nm, or 0. `media` are the indices of a film of one layer, see `_media`, of which `sides` and
-    `changed` have the sensor's wavelengths alone: its waves are computed by Airy's formula.
+    `INDEX_STEP`, where that of the scene's film has free numbers. `fine` has the same at the film's own
+    thickness and `OWN_WAVELENGTHS`, in finer steps. `thickness` is the range and `own` the film's own one, in
+    nm; `eta` the relative index of a transparent base at 550 nm, or 0. `media` are n of the ambient medium, n
+    and k of the film and of the base at `OWN_WAVELENGTHS`. Of a film that is `alone`, `sides` and `changed`
+    have the sensor's wavelengths only: its waves are computed by Airy's formula from `media`.
     """
 
     sides: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
     changed: dict[str, Float[np.ndarray, "thicknesses cosines wavelengths elements"]]
-    index: Float[np.ndarray, " index_wavelengths"]
-    media: Float[np.ndarray, "own_wavelengths 5"] | None
+    media: Float[np.ndarray, "own_wavelengths 5"]
+    alone: bool
     fine: dict[str, Float[np.ndarray, "own_cosines own_wavelengths elements"]]
     thickness: tuple[float, float]
     own: float
@@ -173,17 +173,16 @@ class Lookup:
         """
         arrays: dict[str, Any] = {"wavelength": WAVELENGTHS, "thickness": np.array(self.thickness)}
         arrays |= {"default_thickness": np.array(self.own), "eta": np.array(self.eta)}
-        arrays |= {} if self.media is None else {"media": self.media}
+        arrays |= {"media": self.media, "alone": np.array(self.alone), "index_step": np.array(INDEX_STEP)}
         for side, values in self.fine.items():
             arrays[f"own_spectra{side}"] = values[..., 0].astype(np.float32)
-            if values.shape[-1] > 1 and self.media is None:
+            if values.shape[-1] > 1 and not self.alone:
                 arrays[f"own_mueller{side}"] = values[..., 1:].astype(np.float32)
-        arrays |= {"index": self.index, "index_step": np.array(INDEX_STEP)} if self.changed else {}
         for kind, sides in (("", self.sides), ("changed_", self.changed)):
             for side, values in sides.items():
                 rgb, spectra = _colours(values[..., 0])
                 arrays[f"{kind}rgb{side}"] = rgb.astype(np.float32)
-                if self.media is not None:
+                if self.alone:
                     continue
                 arrays[f"{kind}spectra{side}"] = spectra.astype(np.float32)
                 if values.shape[-1] > 1:
@@ -198,33 +197,24 @@ def lookup(look: Appearance) -> Lookup:
     span = (0.0, 1.25 * own if own > 0 else 1.0)
     nm = np.linspace(*span, int(np.clip(np.ceil(span[1] / _STEP), _FEWEST, _MOST)))
     media = _media(look)
-    wavelength = WAVELENGTHS if media is None else np.empty(0)
+    alone = look.coherent and len(look.scene.layers) == 1
+    wavelength = np.empty(0) if alone else WAVELENGTHS
     sides, eta = _sides(look, nm, _COSINES, wavelength)
     changed: dict[str, np.ndarray] = {}
     if look.index_free and look.coherent:
         changed, _ = _sides(look, nm, _COSINES, wavelength, INDEX_STEP)
-    [film] = [x for x in look.scene.layers if isinstance(x, Layer) and x.name == FILM]
-    n = np.real(to_complex(known_index(film.material, WAVELENGTHS)))
-    index = np.broadcast_to(np.asarray(n, float), WAVELENGTHS.shape)
     fine, _ = _sides(look, np.array([own]), _OWN_COSINES, OWN_WAVELENGTHS)
     at_own = {side: x[0, :, -len(OWN_WAVELENGTHS) :] for side, x in fine.items()}
-    return Lookup(sides, changed, index, media, at_own, span, own, eta)
+    return Lookup(sides, changed, media, alone, at_own, span, own, eta)
 
 
-def _media(look: Appearance) -> np.ndarray | None:
-    """Indices of a film of one layer at `OWN_WAVELENGTHS`, None of other films.
-
-    They are n of the ambient medium, n and k of the film and of the base.
-    """
-    if not look.coherent or len(look.scene.layers) > 1:
-        return None
-    [layer] = [x for x in look.scene.layers if isinstance(x, Layer)]
+def _media(look: Appearance) -> np.ndarray:
+    """Indices of the film and of the media around it: see `Lookup`."""
+    [layer] = [x for x in look.scene.layers if isinstance(x, Layer) and x.name == FILM]
     found = [look.scene.ambient, layer.material, look.scene.substrate.material]
     n0, film, base = (
         to_complex(known_index(x, OWN_WAVELENGTHS)) * np.ones(len(OWN_WAVELENGTHS)) for x in found
     )
-    if np.any(np.imag(n0)):
-        return None
     return np.stack([np.real(n0), *(part(x) for x in (film, base) for part in (np.real, np.imag))], axis=1)
 
 

@@ -65,15 +65,15 @@ def register() -> None:
 def _init(film: Any, props: Any) -> None:
     mi.BSDF.__init__(film, props)
     with np.load(str(mi.file_resolver().resolve(props["filename"]))) as table:
-        if "own_spectra" not in table:
+        if "alone" not in table:
             raise ValueError(f"{props['filename']}: is of another version of pellicle; export the film again")
         film.span = [float(x) for x in table["thickness"]]
         own = float(table["default_thickness"])
         film.wavelength = [float(x) for x in table["wavelength"][[0, -1]]]
         film.eta = float(table["eta"])  # 0: it only reflects
-        film.own, film.step, film.changed, film.fine, film.media = own, 0.0, None, None, None
-        film.table = film.values = None
-        if "media" in table and not mi.is_rgb:
+        film.own, film.step, film.changed, film.fine = own, float(table["index_step"]), None, None
+        film.table = film.values = film.media = None
+        if table["alone"] and not mi.is_rgb:
             film.media = table_texture(table["media"])
         else:
             film.values = _values(table, "", film.eta)
@@ -81,9 +81,8 @@ def _init(film: Any, props: Any) -> None:
         if not mi.is_rgb and not (mi.is_polarized and film.media is not None):
             film.fine = _values(table, "own_", film.eta)
         if f"changed_{'rgb' if mi.is_rgb else 'spectra'}" in table:
-            film.step = float(table["index_step"])
             film.changed = table_texture(_values(table, "changed_", film.eta))
-            film.index = table_texture(table["index"][:, None])
+            film.index = table_texture(table["media"][:, 1:2])
     film.low = float(props.get("thickness_min", 0.0))
     film.high = float(props.get("thickness_max", film.span[1]))
     film.thickness, film.alpha, film.index_change = (

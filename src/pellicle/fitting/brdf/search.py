@@ -46,7 +46,8 @@ _DISPERSION = 0.1
 class Effort(NamedTuple):
     """Numbers of candidates, of those polished for a few steps, and of those polished to the end.
 
-    A polish ends where it promises less than the share `coarse` of its distance to the best of all."""
+    A polish ends where it promises less than the share `coarse` of its distance to the best of all.
+    """
 
     candidates: int
     short: int
@@ -173,6 +174,7 @@ class Candidates(NamedTuple):
 
 
 def _form(member: Member) -> Any:
+    """The form of its one view."""
     return member.static[1][0][0]
 
 
