@@ -16,7 +16,7 @@ import pellicle as pl
 from pellicle.identification import films
 from pellicle.identification.evidence import weigh
 from pellicle.identification.growth import Growth, grow
-from pellicle.identification.identify import Request, problem_of
+from pellicle.identification.request import Request, problem_of
 from pellicle.identification.search import polished
 from pellicle.identification.structure import Material, Structure
 

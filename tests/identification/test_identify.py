@@ -179,6 +179,24 @@ def test_data_beyond_most_tables_are_left_out():
     assert found.data[0].wavelength.min() > 430
 
 
+def test_a_film_whose_table_ends_within_the_data_bars_a_free_index():
+    """Tantala from 300 nm on, whose table begins at 350 nm, by a Cauchy index near that of the table."""
+    nm = np.linspace(300, 900, 140)
+    known = nm[nm > 350]
+    slope, mean = np.polyfit(known**-2.0, np.real(np.asarray(pl.medium("Ta2O5")(known))), 1)
+    indices = 1.0, mean + slope / nm**2 + 0j, np.asarray(pl.medium("Si")(nm), complex)
+    values = by_tmm.films("s", nm, indices, [150.0])
+    random = np.random.default_rng(1)
+    # one R would leave an index that is like that of no film in doubt
+    twice = [pl.Spectrum(nm, values + 0.002 * random.normal(size=nm.size), "R") for _ in range(2)]
+    found = pl.identify(twice, "Si", among=["SiO2", "Si3N4", "Ta2O5"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert "Ta2O5 was not tried on all data, as its table goes from 350 to 1800 nm." in found.verdict
+    assert abs(found.best.layers[0].thickness.value - 150) < 3 * found.best.layers[0].thickness.stderr < 10
+    others = pl.identify(twice, "Si", among=["SiO2", "Si3N4", "ZnO"], layers=1)
+    assert others.status is Outcome.IDENTIFIED
+
+
 def test_time_that_ends_is_said():
     found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si", budget=0)
     assert found.verdict.endswith("The budget of 0 s ended before all was tried.")

@@ -11,7 +11,8 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.errors import UsageError
 from pellicle.identification import films
 from pellicle.identification.hypothesis import Identification
-from pellicle.identification.identify import Request, identified
+from pellicle.identification.identify import identified
+from pellicle.identification.request import Request
 from pellicle.scene.film import Light
 from pellicle.scene.layers import MediumLike, Substrate, medium
 

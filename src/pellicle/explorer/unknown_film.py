@@ -11,7 +11,8 @@ from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.status import describe
 from pellicle.identification import films
 from pellicle.identification.hypothesis import Identification, Outcome
-from pellicle.identification.identify import Request, identified
+from pellicle.identification.identify import identified
+from pellicle.identification.request import Request
 from pellicle.reporting.identification import report
 from pellicle.reporting.json_record import taken
 from pellicle.scene.film import Light, Scene

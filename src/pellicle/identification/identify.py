@@ -4,44 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from pellicle.data.options import CONDITIONS
 from pellicle.data.spectrum import Spectrum, within
-from pellicle.errors import DataError, UsageError
-from pellicle.fitting.film.fringes import fringes
 from pellicle.fitting.film.other_readings import conventions
-from pellicle.identification import conclusion, films, words
+from pellicle.identification import conclusion, words
 from pellicle.identification.evidence import Weighed, weigh
 from pellicle.identification.growth import Growth, grow, needed
 from pellicle.identification.hypothesis import EFFECTS, ROUGH, Identification, NotTried, Outcome
 from pellicle.identification.problem import Problem
-from pellicle.identification.search import THICK, polished
-from pellicle.identification.signal_view import (
-    MOST_POINTS,
-    SCANNED_POINTS,
-    SignalView,
-    check_signal,
-    compared_points,
-)
+from pellicle.identification.request import FEWEST, Request, check, problem_of
+from pellicle.identification.search import polished
+from pellicle.identification.signal_view import SignalView
 from pellicle.identification.structure import OXIDE
-from pellicle.materials import Material, check_common_range
+from pellicle.materials import Material
 from pellicle.scene.common_range import covered
-from pellicle.scene.film import Light, Scene
-from pellicle.scene.layers import Layer, Substrate, medium
+from pellicle.scene.layers import medium
 
-FEWEST = 20
-"""Points below which a spectrum cannot tell structures apart."""
-_USUAL, _FRINGED = 3000.0, 8000.0
-"""Largest thickness (nm) that is tried, unless fringes have an optical path of at least the second."""
 _MOST_TABLES = 0.7
 """Share of the tables that cover a part of the data which is compared alone: films of a spectrometer's whole
 range, from 190 nm, are those of 15 of 35 materials."""
 _SHAPE = "the index of the film has a shape that no model has"
 _UNUSUAL = "structures that need unusual errors are excluded"
+_PARTLY = "a film that could not be tried on all data describes them as well"
 GLASSES = ("BK7", "fused silica", "SF10/HOYA")
 _GLASSY, _ANOTHER = 1.9, 0.02
 """Index below which a substrate may be another glass, and relative difference of the index of another."""
@@ -55,23 +43,6 @@ and number of mistakes that are. Of 12 mistakes that explained data 11 had less 
 scan is coarse; each was the least of those that were possible."""
 _FAVOURED = 1.0
 """Δ ln Z from which a glass that was not stated is favoured, if it has another film."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """Options of an identification: substrate, light, materials, seconds, and mistakes to look for."""
-
-    substrate: Substrate
-    ambient: Any
-    light: Light
-    names: tuple[str, ...]
-    layers: int = 2
-    conditions: tuple[str, ...] = CONDITIONS
-    budget: float = np.inf
-
-    def around(self) -> Scene:
-        """The scene of the bare substrate."""
-        return Scene(Layer(medium("SiO2"), 0.0), self.substrate, ambient=self.ambient, light=self.light)
 
 
 def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> Identification:
@@ -111,7 +82,10 @@ def _identified(
         better = _better_face(growth.problem, kept[0], spectra, request)
         if not doubt and not better:
             better = _better_glass(growth, kept, spectra, request)
-        doubt = doubt or ("another sample describes the data better" if better else "")
+        why = "another sample describes the data better"
+        if not doubt and not better:
+            better, why = _partly_known(kept[0], left_out, spectra, request), _PARTLY
+        doubt = doubt or (why if better else "")
         found = _record(growth, kept, doubt, "", left_out, request, began)
         return replace(found, verdict=f"{found.verdict} {better}") if better else found
     for condition, own, again, rest in _likely_mistakes(spectra, request, growth):
@@ -202,47 +176,6 @@ def _untried(growth: Growth, request: Request, condition: str) -> list[NotTried]
         ("more than two layers", "two are the most that are tried", two),
     )
     return [NotTried(name, reason) for name, reason, holds in rows if holds]
-
-
-def check(spectrum: Spectrum, request: Request) -> None:
-    """Raise where a spectrum cannot be identified."""
-    check_signal(spectrum)
-    name = spectrum.path or "the data"
-    if len(spectrum) < FEWEST:
-        raise DataError(
-            f"{name}: {len(spectrum)} points are too few to tell films apart: give at least {FEWEST}"
-        )
-    if not np.ptp(spectrum.values):
-        raise DataError(f"{name}: all values are {spectrum.values[0]:g}, so there is nothing to identify")
-    oblique = spectrum.angle is not None or np.any(np.asarray(request.light.angle) > 0)
-    if spectrum.signal == "psi-delta" and not oblique:
-        raise UsageError(f"{name}: psi and delta need the `angle` of incidence, and the data do not state it")
-
-
-def problem_of(spectra: Sequence[Spectrum], request: Request) -> tuple[Problem, list[NotTried]]:
-    """The problem of spectra, and materials that do not cover them."""
-    around = request.around()
-    paths = [_optical_path(x) for x in spectra]
-    thickest = THICK if max(paths) > _FRINGED else _USUAL
-    finest = max(*paths, 2 * _USUAL) if max(paths) > _FRINGED else max(*paths, 2000.0)
-
-    def views(most: int) -> tuple[SignalView, ...]:
-        return tuple(SignalView(compared_points(x, finest, most), around) for x in spectra)
-
-    fine, coarse = views(MOST_POINTS), views(SCANNED_POINTS)
-    for view in fine:
-        check_common_range([request.substrate.material], view.spectrum.wavelength)
-    # of both grids at once: means of neighbours may lie beyond the ends of a table
-    left_out = films.tabulated((*fine, *coarse), request.names)
-    return Problem(fine, thickest, Problem(coarse, thickest)), left_out
-
-
-def _optical_path(spectrum: Spectrum) -> float:
-    """Optical path (nm) of the fringes of a spectrum, 0 where it has none or several angles."""
-    if spectrum.angle is not None and np.ptp(spectrum.angle) > 0:
-        return 0.0
-    found = fringes(2 / spectrum.wavelength, spectrum.values)
-    return 0.0 if found is None else 2 * found.thickness
 
 
 _Statement = tuple[str, tuple[Sequence[Spectrum], Request]]
@@ -357,6 +290,42 @@ def _better_glass(
                 f" {kept[0].structure.name}, {depth:.4g} ± {error:.2g} nm thick."
             )
     return ""
+
+
+def _partly_known(
+    best: Weighed, left_out: Sequence[NotTried], spectra: Sequence[Spectrum], request: Request
+) -> str:
+    """Sentence on the best of the films whose tables end within the data, if it describes the data as well as
+    the best structure where it is known, else empty. Against tables that describe all data it must have more
+    evidence by `conclusion.DECIDED`.
+
+    Scandia in T from 190 nm was identified as Si3N4, by a free index: the table of Sc2O3 ends at 230 nm.
+    """
+    own = [x.name for x in best.structure.layers if not x.modelled]
+    least = conclusion.DECIDED * (1 if len(own) == len(best.structure.layers) else -1)
+    found = []
+    for known in [x for x in (medium(x.material) for x in left_out) if isinstance(x, Material)]:
+        low, high = known.wavelength_range
+        part = [within(x, (low, high), "a table ends there") for x in spectra]
+        problem, missing = problem_of(part, replace(request, names=(known.name, *own)))
+        if missing:
+            continue
+        again = Growth(problem, [known.name])
+        again.add([again.film(known.name)], again.ranks[known.name][1][:, None])
+        if not any(x.adequate for x in weigh(problem, again.attempts, {})):
+            continue
+        stated = polished(problem, best.structure, [best.attempt.x])
+        weighed = weigh(problem, [stated, *again.attempts], {})
+        rival = next(x for x in weighed if x.attempt is not stated)
+        gain = rival.ln_z - next(x.ln_z for x in weighed if x.attempt is stated)
+        if gain > least and rival.adequate and rival.remaining < conclusion.NOISY:
+            depth, error = conclusion.thickest(rival)
+            sentence = (
+                f"{known.name} was not tried on all data, as its table goes from {low:g} to {high:g} nm."
+                f" There it describes them as well (Δ ln Z {gain:.1f}), {depth:.4g} ± {error:.2g} nm thick."
+            )
+            found.append((gain, sentence))
+    return max(found, default=(0.0, ""))[1]
 
 
 def _at_another_angle(
