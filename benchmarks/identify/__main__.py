@@ -30,6 +30,8 @@ from scoring import (
     failures,
     films,
     goals,
+    reason,
+    reasons,
     reliability,
     score,
     table,
@@ -78,6 +80,7 @@ def answer(case: Case, seed: int) -> Answer:
         gain=nested.gain(case, data) if case.group == "there" else np.nan,
         probability=sure[0],
         best_right=sure[1],
+        reason="" if found is None else reason(case, found, outcome),
     )
 
 
@@ -108,7 +111,7 @@ def main() -> None:
             write_csv(answers, asked.out)
     if answers:
         print("\n" + table(answers) + "\n\n" + "\n".join(goals(answers)) + "\n\n" + failures(answers))
-        print("\n" + reliability(answers))
+        print("\n" + reasons(answers) + "\n\n" + reliability(answers))
         print(f"median {np.median([x.seconds for x in answers]):.1f} s")
 
 

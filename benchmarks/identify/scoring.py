@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
@@ -18,6 +20,8 @@ LEAST = 10.0
 """Layers thinner than this (nm) count as faces: native oxides, roughness, contamination."""
 SAME_INDEX, SAME_DEPTH, ERRORS = 0.025, 0.03, 3.0
 """Relative difference of the mean index and of the thickness, or its standard errors, of one layer."""
+FILMS = ("one film", "clean", "two layers", "there", "not there")
+"""Groups of samples with films, of which all is stated rightly."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,8 @@ class Answer:
     probability: float = np.nan
     """Probability of the best film under all its names, and of what it matches of the truth."""
     best_right: bool = False
+    reason: str = ""
+    """Reason for which the answer is not right, empty where it is."""
 
 
 def truth_of(case: Case) -> str:
@@ -117,6 +123,41 @@ def best_film(case: Case, found: Any) -> tuple[float, bool]:
     return sum(x.probability for x in alike), any(matches(case, x) for x in alike)
 
 
+def reason(case: Case, found: Any, outcome: str) -> str:
+    """Reason for which an identification is not right, without its numbers; empty where it is."""
+    right = [matches(case, x) for x in found.hypotheses]
+    if outcome in ("right", "wrong") or not right:
+        return {"right": "", "wrong": "identified, wrongly"}.get(outcome, "nothing describes the data")
+    if found.hypotheses[0].condition:
+        return "described with a mistake, unusual errors or an odd index alone"
+    if "do not decide between" not in found.verdict:
+        why = found.verdict.partition("is not certain, as ")[2].partition(":")[0]
+        return f"one answer: {re.sub(r'[0-9.]+', '…', why)}"
+    if any(right) and not all(right):
+        # odds of 20 to 1, with which one film is identified
+        best, other = (
+            max(x.ln_z for x, y in zip(found.hypotheses, right, strict=True) if y == z) for z in (True, False)
+        )
+        return (
+            "several films: the data favour the truth"
+            if best > other + 3
+            else "several films: another is as probable as the truth"
+        )
+    return (
+        "several films, all of them the truth" if all(right) else "several films: the truth is none of them"
+    )
+
+
+def reasons(answers: Sequence[Answer]) -> str:
+    """Numbers of samples with films that are not answered rightly, by reason and by signal, in Markdown."""
+    lines = ["| not right, as | R or T | ψ and Δ |", "|---|---|---|"]
+    missed = [x for x in answers if x.reason and x.group in FILMS]
+    for why, _ in Counter(x.reason for x in missed).most_common():
+        own = ["psi-delta" in x.name for x in missed if x.reason == why]
+        lines.append(f"| {why} | {len(own) - sum(own)} | {sum(own)} |")
+    return "\n".join(lines)
+
+
 def _one_film(a: Any, b: Any) -> bool:
     pairs = list(zip(thick(a), thick(b), strict=False))
     return len(thick(a)) == len(thick(b)) and all(
@@ -175,7 +216,7 @@ def goals(answers: Sequence[Answer]) -> list[str]:
         hits = sum(map(wanted, every))
         return f"{hits} of {len(every)} ({100 * hits / max(len(every), 1):.0f} %)"
 
-    films = [x for x in answers if x.group in ("one film", "clean", "two layers", "there", "not there")]
+    films = [x for x in answers if x.group in FILMS]
     # a layer of its neighbour's index is none to be found, nor one that the data do not need
     there = [x for x in answers if x.group == "there" and x.films > 1]
     strong = [x for x in there if x.gain > STRONG]
