@@ -42,7 +42,8 @@ def test_a_map_gives_its_thickness_and_medians(tmp_path):
     np.testing.assert_array_equal(film.thickness[0], NM[0])
     assert film.values == pytest.approx({"thickness": 27.5, "n": 2.9275})
     assert film.notes[0].startswith("33 % of the map has no thickness of its own")
-    assert film.notes[1].startswith("n is 2.927, the median of the map")
+    assert film.medians["n"].startswith("n is 2.927, the median of the map")
+    assert film.others["n"][0, 0] == pytest.approx(2.92)
 
 
 def test_maps_without_a_texture_are_refused(tmp_path, refuses):

@@ -227,7 +227,8 @@ def export(
     - `numbers`: the set that the renderer draws, "effective" or "physical".
     - `thickness_map`: thicknesses in nm over the object, (rows, columns) from the upper left; the path of
       a `.npy` file or a grey image of them; or what `pellicle.map` returns. Pixels without a thickness take
-      the nearest. Other free parameters of `scene` take the medians of a cube's map. Not for "usd".
+      the nearest. Free parameters of the base become textures of it, but in "mitsuba"; the others of `scene`
+      take the medians of a cube's map. Not for "usd".
     - `roughness_map`: roughness of the facets over the object, GGX α from 0 to 1, as an array or the path of
       a `.npy` file or a grey image (white is 1); not for "usd".
     - `layer`: name of the layer whose thickness it is (the free one, or else the first).

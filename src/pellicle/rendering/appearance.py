@@ -34,17 +34,18 @@ class Appearance:
     `thickness` (thicknesses,) is in nm: one, or several where it varies over the object. `xyz`
     (thicknesses, angles, 3) are the colours at `ANGLES` under D65 for the CIE 1931 observer, Y = 1 for a
     perfect reflector. `layer` and `base` are n + ik at `CHANNELS`, `bare` the linear sRGB of the substrate
-    without a layer at normal incidence. `scene` is the film in reflection, whose layer is named `FILM`.
-    `roughness` is the GGX α of its facets. `index_free` is True where the index of the layer has free
-    numbers, `coherent` for even layers with smooth faces, whose light has one phase. `notes` are sentences
-    on what else its colours contain, `lacking` on what no format's formula has.
+    without a layer at normal incidence; of a base with a texture they have its axes in front. `scene` is the
+    film in reflection, whose layer is named `FILM`. `roughness` is the GGX α of its facets. `index_free` is
+    True where the index of the layer has free numbers, `coherent` for even layers with smooth faces, whose
+    light has one phase. `notes` are sentences on what else its colours contain, `lacking` on what no format's
+    formula has.
     """
 
     thickness: Float[np.ndarray, " thicknesses"]
     xyz: Float[np.ndarray, "thicknesses angles 3"]
     layer: np.ndarray
     base: np.ndarray
-    bare: Float[np.ndarray, "3"]
+    bare: Float[np.ndarray, "*texels 3"]
     scene: Scene
     roughness: float = 0.0
     coherent: bool = True
@@ -89,14 +90,20 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     named = tuple(replace(x, name=FILM if i == position else None) for i, x in enumerate(scene.layers))
     scene = replace(scene, layers=named)
     colour, bands = interference_colours(scene, nm, ANGLES, FILM), integration_bands(BANDS)
-    n0, n2 = (_index(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
-    bare = srgb_matrix(sensor().white) @ (np.abs((n0 - n2) / (n0 + n2)) ** 2 @ bands.weights)
-    own, base = (_index(medium, CHANNELS) for medium in (film.material, scene.substrate.material))
+    n0, n2 = (index_of(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
+    own, base = (index_of(medium, CHANNELS) for medium in (film.material, scene.substrate.material))
     xyz, left_out = np.swapaxes(np.asarray(colour.xyz), 0, 1), _left_out(scene, film)
-    return Appearance(nm, xyz, own, base, np.clip(bare, 0.0, 1.0), scene, index_free=index_free, **left_out)
+    return Appearance(nm, xyz, own, base, bare_colour(n0, n2), scene, index_free=index_free, **left_out)
 
 
-def _index(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
+def bare_colour(above: np.ndarray, base: np.ndarray) -> Float[np.ndarray, "... 3"]:
+    """Linear sRGB of a bare face between indices (..., wavelengths) of colours, at normal incidence."""
+    reflectance = np.abs((above - base) / (above + base)) ** 2
+    xyz = reflectance @ integration_bands(BANDS).weights
+    return np.clip(xyz @ srgb_matrix(sensor().white).T, 0.0, 1.0)
+
+
+def index_of(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
     """n + ik at wavelengths in nm."""
     re, im = parts(known_index(medium, wavelength))
     return np.broadcast_to(re + (0j if im is None else 1j * np.asarray(im)), wavelength.shape)
@@ -114,8 +121,8 @@ def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
         "interfaces with a roughness in nm are part of its colours": rough,
         "the spread of its thickness is part of its colours": uneven,
     }
-    absorbs = np.max(np.imag(_index(film.material, CHANNELS))) > 0
-    immersed = np.max(np.abs(_index(scene.ambient, CHANNELS) - 1.0)) > 1e-3
+    absorbs = np.max(np.imag(index_of(film.material, CHANNELS))) > 0
+    immersed = np.max(np.abs(index_of(scene.ambient, CHANNELS) - 1.0)) > 1e-3
     lacking = {
         f"the film has {coherent} layers: formats have one": coherent > 1,
         "the layer absorbs: formats have none that does": absorbs,

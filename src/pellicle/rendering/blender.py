@@ -2,7 +2,8 @@
 
 A metal or semiconductor is a Metallic BSDF with n + ik per channel, whose film needs Blender 5.0; a
 transparent base is a Principled BSDF that transmits, with a film since Blender 4.2. Thicknesses are in nm; a
-map of them is a grey image of 16 bits. The film is drawn by Cycles; EEVEE leaves it out.
+map of them is a grey image of 16 bits, one of n or k of a base an image of three channels of 8 bits. The film
+is drawn by Cycles; EEVEE leaves it out.
 
 `cycles_formula` is the film colour of Cycles 5: Airy's series with the Fourier transforms of red, green and
 blue. Interference of Belcour and Barla with three orders, Fresnel's equations for s and p, and one index n +
@@ -37,7 +38,7 @@ from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers
 from pellicle.rendering.gltf import XYZ_TO_REC709
 from pellicle.rendering.targets import Material, Target
-from pellicle.rendering.textures import share_of_range, write_grey_image
+from pellicle.rendering.textures import share_of_range, write_image
 
 ORDERS = 3
 _POINTS = 1022
@@ -98,7 +99,7 @@ def film(index: Any, base: Pair, thickness: Any, cosine: Any) -> Float[Array, ".
 
 def _colour(numbers: Numbers, thickness: Any, cosine: Any) -> Float[Array, "... 3"]:
     """Linear sRGB of a film on a metal, or on a dielectric, whose base has no extinction."""
-    n = jnp.broadcast_to(jnp.asarray(numbers["base_ior"]), 3)
+    n = jnp.asarray(numbers["base_ior"]) * jnp.ones(3)
     k = jnp.asarray(numbers.get("base_extinction", jnp.zeros(3)))
     return film(jnp.asarray(numbers["ior"]), Pair(n, k), *jnp.broadcast_arrays(thickness, cosine))
 
@@ -114,7 +115,7 @@ DIELECTRIC = Formula(
     "film of Cycles 5 on a dielectric",
     (_FILM, Key("base_ior", 1.0, 4.0)),
     _colour,
-    lambda look: {"ior": look.index, "base_ior": look.base[1].real},
+    lambda look: {"ior": look.index, "base_ior": np.real(look.base[..., 1])},
 )
 
 
@@ -138,10 +139,12 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     write_text(script, script_text(material, path.stem))
     if material.thickness_map is not None:
         image = path.with_name(f"{path.stem}_thickness.png")
-        written.append(write_grey_image(image, share_of_range(material.thickness_map)))
+        written.append(write_image(image, share_of_range(material.thickness_map)))
     if material.roughness_map is not None:
         image = path.with_name(f"{path.stem}_roughness.png")
-        written.append(write_grey_image(image, np.sqrt(material.roughness_map)))
+        written.append(write_image(image, np.sqrt(material.roughness_map)))
+    for key, values in material.base_images.items():
+        written.append(write_image(path.with_name(f"{path.stem}_{key}.png"), share_of_range(values)))
     if path != script:
         written.insert(0, _save(script, path))
     return tuple(written)
@@ -160,6 +163,7 @@ def script_text(material: Material, stem: str) -> str:
         "ROUGHNESS": float(np.sqrt(material.look.roughness)),  # Blender squares it to GGX's α
         "THICKNESS_MAP": None if material.thickness_map is None else f"{stem}_thickness.png",
         "ROUGHNESS_MAP": None if material.roughness_map is None else f"{stem}_roughness.png",
+        "BASE_MAPS": {key: f"{stem}_{key}.png" for key in material.base_images},
     }
     body = [f"{key} = {pformat(value, width=100, sort_dicts=False)}" for key, value in constants.items()]
     template = files("pellicle.rendering").joinpath("blender_script.txt").read_text("utf-8")

@@ -19,10 +19,17 @@ from pellicle.errors import DataError, UsageError
 from pellicle.files import write_text
 from pellicle.fitting.film.parameters import parameters
 from pellicle.fitting.result import Fit
-from pellicle.rendering.appearance import appearance
+from pellicle.rendering.appearance import Appearance, appearance
+from pellicle.rendering.base_texture import (
+    Base,
+    base_at_texels,
+    base_parameters,
+    base_texture,
+    compared_texels,
+)
 from pellicle.rendering.formula import effective, physical
 from pellicle.rendering.targets import SETS, Material, Solved, target
-from pellicle.rendering.textures import mapped_film, roughness_image
+from pellicle.rendering.textures import MappedFilm, mapped_film, roughness_image
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free, free_leaves, insert
 from pellicle.scene.layers import Layer
@@ -76,27 +83,72 @@ def export(
             f"{chosen.title} takes no textures of thickness or roughness: choose another target, or export"
             " the recipe alone"
         )
-    nodes, values, notes, nm = None, {}, (), None
-    if thickness_map is not None:
-        nm, values, notes = mapped_film(thickness_map, layer)
-        nodes = np.unique(np.quantile(nm, np.linspace(0.0, 1.0, _NODES)))
+    mapped = None if thickness_map is None else mapped_film(thickness_map, layer)
     rough = None if roughness_map is None else roughness_image(roughness_map)
-    film = film_of(with_values(scene, values) if values and not isinstance(scene, Fit) else scene)
-    look = appearance(film.scene, nodes, layer)
+    look, base, texels = _look(scene, mapped, layer, textured=chosen.formula is not None)
     lacking = () if chosen.formula is None else look.lacking  # tables have the colours of any film
-    look = replace(look, roughness=film.roughness, notes=(*lacking, *look.notes, *film.notes, *notes))
-    solved = None
+    look = replace(look, notes=(*lacking, *look.notes))
+    solved, texture = None, None
     if chosen.formula is not None:
         formula = chosen.formula(look)
+        if base is not None:
+            texture = base_texture(formula, look, base, texels)
+            formula = texture.over(formula)
         try:
             solved = Solved(formula, physical(formula, look), effective(formula, look), numbers)
         except ImportError as missing:  # colour-science
             raise UsageError(str(missing)) from None
-    material = Material(out.stem, look, solved, nm, rough)
+    material = Material(out.stem, look, solved, None if mapped is None else mapped.thickness, rough, texture)
     files = chosen.write(out, material)
     text = json.dumps({"target": to} | material.record(), ensure_ascii=False, indent=1, allow_nan=False)
     write_text(record, text + "\n")
     return Export(to, chosen.title, (*files, record), material)
+
+
+def _look(
+    scene: Scene | Surface | Fit, mapped: MappedFilm | None, layer: str | None, textured: bool
+) -> tuple[Appearance, Base | None, np.ndarray]:
+    """Colours of a film at its thickness, or at texels of a map, with its notes.
+
+    Where the parameters of the base differ over the map, and it can be `textured`, also the base, and the
+    texels at which the colours are.
+    """
+    if mapped is None:
+        return _with_notes(film_of(scene), None, layer), None, np.empty(0, int)
+    medians = {} if isinstance(scene, Fit) else dict(mapped.medians)  # a fit has values of its own
+    base, texels, images = None, np.empty(0, int), dict[str, np.ndarray]()
+    films = scene if isinstance(scene, Fit) or not mapped.values else with_values(scene, mapped.values)
+    nm = np.unique(np.quantile(mapped.thickness, np.linspace(0.0, 1.0, _NODES)))
+    names = base_parameters(films, mapped.others) if textured and isinstance(films, Scene) else []
+    if isinstance(films, Scene) and names:
+        images = {name: mapped.others[name] for name in names}
+        texels = compared_texels([mapped.thickness, *images.values()])
+        nm, base = np.ravel(mapped.thickness)[texels], base_at_texels(films, images)
+    look = _with_notes(film_of(films), nm, layer)
+    if base is not None and not isinstance(scene, Fit):
+        at = [
+            mapped.values | {name: float(np.ravel(image)[i]) for name, image in images.items()}
+            for i in texels
+        ]
+        films = [film_of(with_values(scene, values)).scene for values in at]
+        xyz = [appearance(each, x, layer).xyz[0] for each, x in zip(films, nm, strict=True)]
+        look = replace(look, thickness=nm, xyz=np.stack(xyz))
+        medians |= {name: _textured(name, image, mapped.values[name]) for name, image in images.items()}
+        mapped = mapped._replace(notes=(*mapped.notes, *filter(None, [base.note])))
+    return replace(look, notes=(*look.notes, *mapped.notes, *medians.values())), base, texels
+
+
+def _textured(name: str, image: np.ndarray, median: float) -> str:
+    """A sentence on a parameter of a base with a texture."""
+    return (
+        f"{name} is a texture, {image.min():.4g} to {image.max():.4g}; the numbers of the base are those of"
+        f" its median, {median:.4g}"
+    )
+
+
+def _with_notes(film: "Film", thickness: np.ndarray | None, layer: str | None) -> Appearance:
+    look = appearance(film.scene, thickness, layer)
+    return replace(look, roughness=film.roughness, notes=(*look.notes, *film.notes))
 
 
 _SAMPLE = ("layers", "substrate", "ambient")

@@ -2,7 +2,8 @@
 
 A metal or semiconductor is a metallic material whose base colour is the base's reflectance; a transparent
 base is a transmitting dielectric with `KHR_materials_ior` and `KHR_materials_specular`. Thicknesses are in
-nm; a map of them is in the green channel of a texture. Both sets of numbers are in the material's `extras`.
+nm; a map of them is in the green channel of a texture, one of the base in that of the base colour, or of the
+specular colour. Both sets of numbers are in the material's `extras`.
 
 The film colour is the approximation of Belcour and Barla that the extension publishes. Fresnel's equations
 are replaced by Schlick's at both faces, polarisation and the base's extinction are left out. three.js and
@@ -14,18 +15,18 @@ Source: Khronos, KHR_materials_iridescence, "Implementation Notes" (2022).
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
+from pellicle.colour import srgb
 from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import Formula, Key, Numbers, series
 from pellicle.rendering.targets import Material, Target
-from pellicle.rendering.textures import share_of_range
+from pellicle.rendering.textures import png, share_of_range
 
 XYZ_TO_REC709 = np.array(
     [
@@ -89,7 +90,8 @@ def physical(look: Appearance) -> Numbers:
     """Index of the layer at 550 nm, and the reflectance of the base at normal incidence."""
     base = look.bare
     if not look.metallic:
-        base = np.full(3, ((look.base[1].real - 1) / (look.base[1].real + 1)) ** 2)
+        n = np.real(look.base[..., 1:2])
+        base = ((n - 1) / (n + 1)) ** 2 * np.ones(3)
     return {"ior": look.index, "base": base, "factor": 1.0}
 
 
@@ -160,8 +162,8 @@ def extensions(material: Material) -> dict[str, dict[str, Any]]:
     if look.metallic:
         return {"KHR_materials_iridescence": iridescence}
     base = np.asarray(solution.numbers["base"])
-    brightest = float(np.max(base))
-    tint = base / brightest if brightest > 0 else np.ones(3)
+    brightest = float(np.max(material.base_images.get("base", base)))
+    tint = base / brightest if brightest > 0 and not material.base_images else np.ones(3)
     return {
         "KHR_materials_iridescence": iridescence,
         "KHR_materials_ior": {"ior": float(base_index(brightest)) if brightest > 0 else 1.0},
@@ -172,20 +174,31 @@ def extensions(material: Material) -> dict[str, dict[str, Any]]:
 
 def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> bytes:
     """Add the material, and return the images of its textures for the buffer."""
-    look, added = material.look, extensions(material)
-    colour = np.asarray(material.drawn.chosen.numbers["base"]).tolist() if look.metallic else [1.0] * 3
+    look, added, base = material.look, extensions(material), material.base_images.get("base")
+    uniform = look.metallic and base is None
+    colour = np.asarray(material.drawn.chosen.numbers["base"]).tolist() if uniform else [1.0] * 3
     roughness = float(np.sqrt(look.roughness))  # glTF squares it to GGX's α
     pbr = gltf.PbrMetallicRoughness(
         baseColorFactor=[*colour, 1.0], metallicFactor=float(look.metallic), roughnessFactor=roughness
     )
     images = b""
     if material.thickness_map is not None:
-        images = _add_texture(model, gltf, share_of_range(material.thickness_map), 0.0, offset)
+        green = np.multiply.outer(share_of_range(material.thickness_map), [0, 1, 0])
+        images = _add_texture(model, gltf, green, offset)
         texture = {"index": len(model.textures) - 1}
         added["KHR_materials_iridescence"]["iridescenceThicknessTexture"] = texture
+    if base is not None:  # both textures of colours are coded as sRGB
+        pixels = np.asarray(srgb(base if look.metallic else base / base.max()))
+        images += _add_texture(model, gltf, pixels, offset + len(images))
+        texture = {"index": len(model.textures) - 1}
+        if look.metallic:
+            pbr.baseColorTexture = gltf.TextureInfo(**texture)
+        else:
+            added["KHR_materials_specular"]["specularColorTexture"] = texture
     if material.roughness_map is not None:
         share = np.sqrt(material.roughness_map)
-        images += _add_texture(model, gltf, share, float(look.metallic), offset + len(images))
+        pixels = np.stack([0 * share, share, np.full_like(share, look.metallic)], axis=-1)
+        images += _add_texture(model, gltf, pixels, offset + len(images))
         pbr.metallicRoughnessTexture = gltf.TextureInfo(index=len(model.textures) - 1)
         pbr.roughnessFactor = 1.0
     model.extensionsUsed = list(added)
@@ -194,15 +207,9 @@ def _add_material(model: Any, gltf: Any, material: Material, offset: int) -> byt
     return images
 
 
-def _add_texture(model: Any, gltf: Any, green: np.ndarray, blue: float, offset: int) -> bytes:
-    """Add a texture of values from 0 to 1 in its green channel, and return its image."""
-    from PIL import Image  # a requirement of Matplotlib
-
-    pixels = np.zeros((*green.shape, 3), np.uint8)
-    pixels[..., 1], pixels[..., 2] = np.round(255 * green), np.round(255 * blue)
-    file = BytesIO()
-    Image.fromarray(pixels).save(file, format="PNG")
-    image = file.getvalue()
+def _add_texture(model: Any, gltf: Any, pixels: Any, offset: int) -> bytes:
+    """Add a texture of values (rows, columns, 3) from 0 to 1, and return its image."""
+    image = png(pixels)
     model.bufferViews.append(gltf.BufferView(buffer=0, byteOffset=offset, byteLength=len(image)))
     model.images.append(gltf.Image(bufferView=len(model.bufferViews) - 1, mimeType="image/png"))
     model.samplers = [gltf.Sampler(magFilter=9729, minFilter=9987, wrapS=10497, wrapT=33071)]

@@ -1,9 +1,10 @@
 """MaterialX 1.39 and OpenPBR 1.1: a film on a conductor or a dielectric, and as a Standard Surface.
 
-Thicknesses are in nm. A metal has its n and k per channel, which Standard Surface writes as the colours of
-O. Gulbrandsen (2014, JCGT 3(4), 64), of which MaterialX computes n and k again. Both sets of numbers are in
-the attribute `pellicle` of the material. OpenPBR has a document of its own, of `open_pbr_surface`: its metals
-have no complex index, but a reflectance at normal incidence and near 82 degrees.
+Thicknesses are in nm; images of numbers run from their least to their largest value. A metal has its n and k
+per channel, which Standard Surface writes as the colours of O. Gulbrandsen (2014, JCGT 3(4), 64), of which
+MaterialX computes n and k again. Both sets of numbers are in the attribute `pellicle` of the material.
+OpenPBR has a document of its own, of `open_pbr_surface`: its metals have no complex index, but a reflectance
+at normal incidence and near 82 degrees.
 
 The film colour is Belcour and Barla's formula, with polarisation and a complex base per channel. It is
 `mx_fresnel_airy` of MaterialX 1.39's hardware shaders, which OpenPBR and Standard Surface share. The wave of
@@ -13,22 +14,28 @@ becomes RGB by a matrix of CIE RGB; renderers take the result as their linear wo
 Source: MaterialX 1.39.5, libraries/pbrlib/genglsl/lib/mx_microfacet_specular.glsl.
 """
 
-import json
 from functools import partial
-from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.files import replacing
 from pellicle.rendering.appearance import Appearance
 from pellicle.rendering.formula import ColourError, Formula, Key, Numbers, series
 from pellicle.rendering.formula import error as colour_error
+from pellicle.rendering.materialx_document import (
+    add_material,
+    colour3,
+    connect_range,
+    connect_roughness,
+    connect_thickness,
+    floats,
+    new_document,
+    save,
+    set_inputs,
+)
 from pellicle.rendering.targets import Material, Target
-from pellicle.rendering.textures import share_of_range, write_grey_image
 
 XYZ_TO_RGB = np.array(
     [
@@ -114,7 +121,7 @@ def conductor(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
 
 def dielectric(numbers: Numbers, thickness: Any, cosine: Any) -> Any:
     """Linear RGB of `dielectric_bsdf` with a film, times its `tint`."""
-    n = jnp.broadcast_to(jnp.asarray(numbers["base"]), 3)
+    n = jnp.asarray(numbers["base"]) * jnp.ones(3)
     colour = conductor({"ior": numbers["ior"], "n": n, "k": jnp.zeros(3)}, thickness, cosine)
     return colour * jnp.asarray(numbers["tint"])
 
@@ -155,7 +162,7 @@ DIELECTRIC = Formula(
     "MaterialX's dielectric with a film",
     (_FILM, Key("base", 1.0, 4.0), Key("tint", 0.0, 1.0, 3)),
     dielectric,
-    lambda look: {"ior": look.index, "base": float(look.base[1].real), "tint": np.ones(3)},
+    lambda look: {"ior": look.index, "base": np.real(look.base[..., 1]), "tint": np.ones(3)},
 )
 METAL = Formula(
     "OpenPBR's metal with a film",
@@ -188,99 +195,10 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
     add_material(document, standard, material, standard_surface_error(material), "_standard_surface")
     inputs = {"thinfilm_thickness": bsdf, "thin_film_thickness": standard}
     images = connect_thickness(document, path, material, inputs)
+    for what, values, nodes in base_images(material, bsdf, standard):
+        images += connect_range(document, path, what, values, nodes)
     images += connect_roughness(document, path, material, standard, bsdf)
     return (*save(document, path), *images)
-
-
-def new_document() -> Any:
-    """An empty document whose colours are linear, with the primaries of sRGB."""
-    document = _library().createDocument()
-    document.setColorSpace("lin_rec709")
-    document.setAttribute("generator", f"pellicle {version('pellicle')}")
-    return document
-
-
-def set_inputs(node: Any, inputs: dict[str, tuple[str, Any]]) -> None:
-    """Set the inputs of a node, given as type and value."""
-    kinds = {"color3": _library().Color3, "vector2": _library().Vector2}
-    for name, (kind, value) in inputs.items():
-        convert = kinds.get(kind)
-        node.setInputValue(name, convert(*value) if convert else value, kind)
-
-
-def add_material(
-    document: Any, shader: Any, material: Material, error: ColourError, ending: str = ""
-) -> None:
-    """Add a material of a shader with its error, and with both sets of numbers."""
-    name = document.createValidChildName(material.name + ending)
-    node = document.addMaterialNode(name, shader)
-    node.setDocString(
-        f"{material.drawn.used} numbers: mean ΔE2000 {error.mean:.2g}, largest {error.largest:.2g}, from the"
-        " exact colours, 0 to 80 degrees"
-    )
-    node.setAttribute("pellicle", json.dumps(material.record(), ensure_ascii=False))
-
-
-def save(document: Any, path: Path) -> tuple[Path, ...]:
-    """Write a document. Raises ValueError where MaterialX does not accept it."""
-    valid, why = document.validate()
-    if not valid:
-        raise ValueError(f"MaterialX does not accept the document: {why}")
-    with replacing(path) as temporary:
-        _library().writeToXmlFile(document, str(temporary))
-    return (path,)
-
-
-def connect_thickness(
-    document: Any, path: Path, material: Material, inputs: dict[str, Any], unit: float = 1.0
-) -> tuple[Path, ...]:
-    """Write the image of an uneven film, and connect it to inputs of nodes, in nm times `unit`."""
-    if material.thickness_map is None:
-        return ()
-    image, texture = _image(document, path, "thickness", share_of_range(material.thickness_map))
-    low, high = material.drawn.chosen.scale * unit * material.look.thickness[[0, -1]]
-    range_of = _node(document, "remap", "thickness_of_image", "float", **{"in": texture})
-    set_inputs(range_of, _floats(outlow=low, outhigh=high))
-    for name, node in inputs.items():
-        _connect(node, name, range_of)
-    return (image,)
-
-
-def connect_roughness(
-    document: Any, path: Path, material: Material, surface: Any, bsdf: Any = None
-) -> tuple[Path, ...]:
-    """Write the image of an uneven roughness, √α, and connect it to a surface, and squared to a BSDF."""
-    if material.roughness_map is None:
-        return ()
-    image, texture = _image(document, path, "roughness", np.sqrt(material.roughness_map))
-    _connect(surface, "specular_roughness", texture)
-    if bsdf is not None:
-        alpha = _node(document, "multiply", "alpha", "float", in1=texture, in2=texture)
-        both = _node(document, "combine2", "alpha_of_both_axes", "vector2", in1=alpha, in2=alpha)
-        _connect(bsdf, "roughness", both)
-    return (image,)
-
-
-def _image(document: Any, path: Path, what: str, share: np.ndarray) -> tuple[Path, Any]:
-    """Write a grey image beside the document, and add its node."""
-    image = write_grey_image(path.with_name(f"{path.stem}_{what}.png"), share)
-    texture = document.addNode("image", f"{what}_image", "float")
-    set_inputs(texture, {"file": ("filename", image.name), "vaddressmode": ("string", "clamp")})
-    return image, texture
-
-
-def _node(document: Any, category: str, name: str, kind: str, **inputs: Any) -> Any:
-    """Add a node whose inputs are connected to other nodes."""
-    node = document.addNode(category, name, kind)
-    for key, source in inputs.items():
-        node.setConnectedNode(key, source)
-    return node
-
-
-def _connect(node: Any, name: str, source: Any) -> None:
-    """Connect an input in place of its value."""
-    node.removeInput(name)
-    node.setConnectedNode(name, source)
 
 
 def bsdf_of(material: Material) -> tuple[str, str, dict[str, tuple[str, Any]]]:
@@ -288,13 +206,13 @@ def bsdf_of(material: Material) -> tuple[str, str, dict[str, tuple[str, Any]]]:
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
     inputs = {"roughness": ("vector2", [look.roughness] * 2)}
-    inputs |= _floats(thinfilm_thickness=solution.scale * material.thickness, thinfilm_ior=numbers["ior"])
+    inputs |= floats(thinfilm_thickness=solution.scale * material.thickness, thinfilm_ior=numbers["ior"])
     if look.metallic:
-        colours = {"ior": _colour(numbers["n"]), "extinction": _colour(numbers["k"])}
+        colours = {"ior": colour3(numbers["n"]), "extinction": colour3(numbers["k"])}
         return "conductor_bsdf", "film_conductor", colours | inputs
     glass = {
-        "tint": _colour(numbers["tint"]),
-        **_floats(ior=numbers["base"]),
+        "tint": colour3(numbers["tint"]),
+        **floats(ior=numbers["base"]),
         "scatter_mode": ("string", "RT"),
     }
     return "dielectric_bsdf", "film_dielectric", glass | inputs
@@ -304,7 +222,7 @@ def standard_surface(material: Material) -> dict[str, tuple[str, Any]]:
     """Inputs of a Standard Surface, by name as type and value."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    inputs = _floats(
+    inputs = floats(
         specular=1.0,
         specular_roughness=np.sqrt(look.roughness),  # squared to GGX's α
         thin_film_thickness=solution.scale * material.thickness,
@@ -312,10 +230,10 @@ def standard_surface(material: Material) -> dict[str, tuple[str, Any]]:
     )
     if look.metallic:
         reflectance, edge = artistic_colours(numbers["n"], numbers["k"])
-        colours = {"base_color": _colour(reflectance), "specular_color": _colour(edge)}
-        return inputs | colours | _floats(base=1.0, metalness=1.0)
-    glass = _floats(base=0.0, specular_IOR=numbers["base"], transmission=1.0)
-    return inputs | glass | {"specular_color": _colour(numbers["tint"])}
+        colours = {"base_color": colour3(reflectance), "specular_color": colour3(edge)}
+        return inputs | colours | floats(base=1.0, metalness=1.0)
+    glass = floats(base=0.0, specular_IOR=numbers["base"], transmission=1.0)
+    return inputs | glass | {"specular_color": colour3(numbers["tint"])}
 
 
 def artistic_colours(n: Any, k: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -341,13 +259,36 @@ def artistic_index(reflectance: Any, edge: Any) -> tuple[np.ndarray, np.ndarray]
     return n, np.sqrt(np.maximum(k2, 0.0))
 
 
+def base_images(material: Material, bsdf: Any, standard: Any) -> list[tuple[str, np.ndarray, dict[str, Any]]]:
+    """Images of a base by name, with the inputs of both nodes that take each."""
+    images = material.base_images
+    if not images:
+        return []
+    if not material.look.metallic:
+        return [("ior", images["base"], {"ior": bsdf, "specular_IOR": standard})]
+    n, k = (images.get(key, material.drawn.chosen.numbers[key]) for key in ("n", "k"))
+    named = {"base_color": standard, "specular_color": standard}
+    of_standard = zip(named.items(), artistic_colours(n, k), strict=True)
+    return [
+        *(
+            (name, images[key], {name: bsdf})
+            for key, name in (("n", "ior"), ("k", "extinction"))
+            if key in images
+        ),
+        *((name, values, {name: node}) for (name, node), values in of_standard),
+    ]
+
+
 def standard_surface_error(material: Material) -> ColourError:
     """The error of a Standard Surface, whose two colours cannot say every n and k of a metal."""
     drawn, look = material.drawn, material.look
     if not look.metallic:
         return drawn.chosen.error
-    n, k = artistic_index(*artistic_colours(drawn.chosen.numbers["n"], drawn.chosen.numbers["k"]))
-    return colour_error(drawn.formula, look, {**drawn.chosen.numbers, "n": n, "k": k}, drawn.chosen.scale)
+    numbers = drawn.chosen.numbers
+    if material.base_texture is not None:
+        numbers = material.base_texture.at_texels(numbers)
+    n, k = artistic_index(*artistic_colours(numbers["n"], numbers["k"]))
+    return colour_error(CONDUCTOR, look, {**numbers, "n": n, "k": k}, drawn.chosen.scale)
 
 
 def write_open_pbr(path: Path, material: Material) -> tuple[Path, ...]:
@@ -357,6 +298,10 @@ def write_open_pbr(path: Path, material: Material) -> tuple[Path, ...]:
     set_inputs(surface, open_pbr(material))
     add_material(document, surface, material, material.drawn.chosen.error)
     images = connect_thickness(document, path, material, {"thin_film_thickness": surface}, unit=1e-3)
+    metal = {"base": "base_color", "edge": "specular_color"}
+    names = metal if material.look.metallic else {"base": "specular_ior"}
+    for key, values in material.base_images.items():
+        images += connect_range(document, path, names[key], values, {names[key]: surface})
     images += connect_roughness(document, path, material, surface)
     return (*save(document, path), *images)
 
@@ -365,30 +310,17 @@ def open_pbr(material: Material) -> dict[str, tuple[str, Any]]:
     """Inputs of an OpenPBR surface, by name as type and value; its thickness is in µm."""
     solution, look = material.drawn.chosen, material.look
     numbers = solution.numbers
-    values = _floats(
+    values = floats(
         specular_roughness=np.sqrt(look.roughness),  # squared to GGX's α
         thin_film_weight=numbers.get("weight", 1.0),
         thin_film_thickness=1e-3 * solution.scale * material.thickness,
         thin_film_ior=numbers["ior"],
     )
     if look.metallic:
-        colours = {"base_color": _colour(numbers["base"]), "specular_color": _colour(numbers["edge"])}
-        return values | colours | _floats(base_metalness=1.0)
-    glass = _floats(base_weight=0.0, specular_ior=numbers["base"], transmission_weight=1.0)
-    return values | glass | {"specular_color": _colour(numbers["tint"])}
-
-
-def _floats(**numbers: Any) -> dict[str, tuple[str, Any]]:
-    return {name: ("float", float(number)) for name, number in numbers.items()}
-
-
-def _colour(value: Any) -> tuple[str, Any]:
-    return "color3", np.broadcast_to(np.asarray(value, float), 3).tolist()
-
-
-def _library() -> Any:
-    """The package MaterialX, which declares no types."""
-    return import_module("MaterialX")
+        colours = {"base_color": colour3(numbers["base"]), "specular_color": colour3(numbers["edge"])}
+        return values | colours | floats(base_metalness=1.0)
+    glass = floats(base_weight=0.0, specular_ior=numbers["base"], transmission_weight=1.0)
+    return values | glass | {"specular_color": colour3(numbers["tint"])}
 
 
 TARGET = Target("materialx", "MaterialX", (".mtlx",), ("MaterialX",), formula, write, takes_map=True)

@@ -30,7 +30,7 @@ from pellicle.files import replacing, write_text
 from pellicle.optics.pair import to_complex
 from pellicle.rendering.appearance import FILM, Appearance
 from pellicle.rendering.targets import Material, Target
-from pellicle.rendering.textures import share_of_range, write_grey_image
+from pellicle.rendering.textures import share_of_range, write_image
 from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
@@ -65,9 +65,9 @@ def write(path: Path, material: Material) -> tuple[Path, ...]:
         write_text(chosen["plugin"], _text("mitsuba_plugin.py"), overwrite=True)
         nm = look.thickness if material.thickness_map is None else material.thickness_map
         if "map" in chosen:
-            write_grey_image(chosen["map"], share_of_range(nm))
+            write_image(chosen["map"], share_of_range(nm))
         if "roughness" in chosen:
-            write_grey_image(chosen["roughness"], np.asarray(material.roughness_map))
+            write_image(chosen["roughness"], np.asarray(material.roughness_map))
         scene = {
             "comment": f"import {PLUGIN} and call its register() first, see there",
             "table": chosen["lookup"].name,

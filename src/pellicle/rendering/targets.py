@@ -15,6 +15,7 @@ import numpy as np
 
 from pellicle.errors import UsageError, did_you_mean, install_command
 from pellicle.rendering.appearance import ANGLES, Appearance
+from pellicle.rendering.base_texture import BaseTexture
 from pellicle.rendering.formula import Formula, Solution
 
 SCHEMA = "pellicle.export/1"
@@ -48,7 +49,7 @@ class Material:
 
     `solved` is None for a target without a formula of its own, which tabulates the exact colours.
     `thickness_map` (rows, columns) is in nm, None for an even film; `roughness_map` (rows, columns) is the
-    GGX α over the object, None for that of `look`.
+    GGX α over the object, None for that of `look`; `base_texture` the numbers of its base, None for one base.
     """
 
     name: str
@@ -56,6 +57,15 @@ class Material:
     solved: Solved | None
     thickness_map: np.ndarray | None = None
     roughness_map: np.ndarray | None = None
+    base_texture: BaseTexture | None = None
+
+    @property
+    def base_images(self) -> dict[str, np.ndarray]:
+        """Images of the drawn numbers of the base, by key; none for one base."""
+        if self.base_texture is None:
+            return {}
+        chosen = self.drawn.chosen.numbers
+        return {key: self.base_texture.image(key, chosen) for key in self.base_texture.numbers}
 
     @property
     def thickness(self) -> float:
@@ -87,9 +97,17 @@ class Material:
             entries[name] = {
                 "thickness_nm": [float(solution.scale * x) for x in (self.look.thickness[0], self.thickness)],
                 **{key: np.asarray(x).tolist() for key, x in solution.numbers.items()},
+                **self._base_range(solution),
                 "delta_e2000": {"mean": solution.error.mean, "largest": solution.error.largest},
             }
         return entries
+
+    def _base_range(self, solution: Solution) -> dict[str, Any]:
+        """The least and the largest numbers of a base with a texture."""
+        if self.base_texture is None:
+            return {}
+        ends = {key: x.ends(solution.numbers[key]) for key, x in self.base_texture.numbers.items()}
+        return {"base_range": {key: [x.tolist() for x in both] for key, both in ends.items()}}
 
 
 class Target(NamedTuple):

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,11 +47,16 @@ def read_image(path: str | os.PathLike[str], argument: str, largest: bool = Fals
 
 
 class MappedFilm(NamedTuple):
-    """Film of a map: thickness (nm) at every texel, medians of fitted parameters by name, and sentences."""
+    """Film of a map: thickness (nm) at every texel, medians of fitted parameters by name, and sentences.
+
+    `others` are the parameters beside the thickness at every texel, and `medians` sentences on their medians.
+    """
 
     thickness: Float[np.ndarray, "rows columns"]
     values: dict[str, float]
     notes: tuple[str, ...]
+    others: dict[str, Float[np.ndarray, "rows columns"]]
+    medians: dict[str, str]
 
 
 def mapped_film(given: Any, layer: str | None = None) -> MappedFilm:
@@ -70,8 +76,8 @@ def mapped_film(given: Any, layer: str | None = None) -> MappedFilm:
             raise UsageError("`thickness_map` is a strip, and a texture has rows and columns: map a region")
         given = given.found.thickness[..., 0]
     array = _array(given, "thickness_map", _not_nm)
-    array, notes = _filled(array, np.isfinite(array))
-    return MappedFilm(array, {}, notes)
+    (array,), notes = _filled([array], np.isfinite(array))
+    return MappedFilm(array, {}, notes, {}, {})
 
 
 def _not_nm(array: np.ndarray) -> str:
@@ -115,18 +121,25 @@ def _array(
     return array
 
 
-def share_of_range(values: Float[np.ndarray, "rows columns"]) -> Float[np.ndarray, "rows columns"]:
-    """A map from 0 at its least to 1 at its largest value."""
-    span = np.ptp(values)
-    return (values - values.min()) / (span if span > 0 else 1.0)
+def share_of_range(values: Float[np.ndarray, "rows columns *channels"]) -> np.ndarray:
+    """An image from 0 at its least to 1 at its largest value, each channel by itself."""
+    low, span = values.min(axis=(0, 1)), np.ptp(values, axis=(0, 1))
+    return (values - low) / np.where(span > 0, span, 1.0)
 
 
-def write_grey_image(path: Path, share: Float[np.ndarray, "rows columns"]) -> Path:
-    """Write values from 0 (black) to 1 (white) as a grey PNG of 16 bits."""
+def png(share: Float[np.ndarray, "rows columns *channels"]) -> bytes:
+    """Encode values from 0 to 1 as a PNG: grey of 16 bits, or of 8 bits where it has three channels."""
     from PIL import Image  # a requirement of Matplotlib
 
+    white, kind = (65535, np.uint16) if share.ndim == 2 else (255, np.uint8)
+    Image.fromarray(np.round(white * share).astype(kind)).save(file := BytesIO(), format="PNG")
+    return file.getvalue()
+
+
+def write_image(path: Path, share: Float[np.ndarray, "rows columns *channels"]) -> Path:
+    """Write values from 0 to 1 as a PNG."""
     with replacing(path) as temporary:
-        Image.fromarray(np.round(65535 * share).astype(np.uint16)).save(temporary, format="PNG")
+        temporary.write_bytes(png(share))
     return path
 
 
@@ -143,25 +156,29 @@ def _fitted(made: Map, layer: str | None) -> MappedFilm:
     if not names:
         raise UsageError(f"{made.path}: has no fitted thickness" + (f" of {layer}" if layer else ""))
     known = np.isin(made.dataset[STATUS].values, [CODES[CONVERGED], CODES[BY_NEIGHBOURS]])
-    thickness, notes = _filled(made[names[0]].values, known)
-    images = {name: made[name].values[known] for name in made.parameters}
-    values = {name: float(np.median(each)) for name, each in images.items()}
-    for name in values.keys() - {names[0]}:
-        low, high = np.quantile(images[name], [0.05, 0.95])
-        notes += (f"{name} is {values[name]:.4g}, the median of the map (of 90 %: {low:.4g} to {high:.4g})",)
-    return MappedFilm(thickness, values, notes)
+    order = [names[0], *(name for name in made.parameters if name != names[0])]
+    images = {name: made[name].values for name in order}
+    (thickness, *others), notes = _filled([*images.values()], known)
+    values = {name: float(np.median(image[known])) for name, image in images.items()}
+    medians = {}
+    for name in order[1:]:
+        low, high = np.quantile(images[name][known], [0.05, 0.95])
+        medians[name] = (
+            f"{name} is {values[name]:.4g}, the median of the map (of 90 %: {low:.4g} to {high:.4g})"
+        )
+    return MappedFilm(thickness, values, notes, dict(zip(order[1:], others, strict=True)), medians)
 
 
 def _filled(
-    thickness: np.ndarray, known: Bool[np.ndarray, "rows columns"]
-) -> tuple[np.ndarray, tuple[str, ...]]:
-    """A thickness whose unknown pixels take that of the nearest known one, and a sentence on it."""
+    images: list[np.ndarray], known: Bool[np.ndarray, "rows columns"]
+) -> tuple[list[np.ndarray], tuple[str, ...]]:
+    """Images whose unknown pixels take the values of the nearest known one, and a sentence on it."""
     from scipy.ndimage import distance_transform_edt  # slow to import
 
     if not known.any():
         raise UsageError("`thickness_map` has no pixel with one thickness; export its recipe")
     if known.all():
-        return thickness, ()
+        return images, ()
     nearest: Any = distance_transform_edt(~known, return_distances=False, return_indices=True)
     share = f"{100 * (1 - known.mean()):.2g} % of the map has no thickness of its own"
-    return thickness[tuple(nearest)], (f"{share}, and takes the nearest",)
+    return [image[tuple(nearest)] for image in images], (f"{share}, and takes the nearest",)
