@@ -1,18 +1,20 @@
 """Systematic effects against simulations of scenes that have them, and the errors that follow."""
 
+import jax
 import numpy as np
 import pytest
+import tmm
 
 import pellicle as pl
 from pellicle.dispersion.effective_medium import Bruggeman
 from pellicle.dispersion.empirical import Constant
+from pellicle.fitting.film import extended_scene
 from pellicle.fitting.film.extended_scene import extended
 from pellicle.fitting.film.fit import fitted, measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import simulations_of, systematic_effects
 from pellicle.fitting.linear_system import HALF_NORMAL
 from pellicle.fitting.progress import quiet
-from pellicle.scene.layers import Interface
 
 from ...differences import derivative
 
@@ -183,10 +185,66 @@ def test_mixed_interface_under_a_birefringent_film(film, mixes):
     (view,) = make(*measurements(pl.simulate(scene, NINE, noise=0.01), scene)).views
     scene = extended(view, np.array([200.0]))
     assert (scene.mixture is not None) == mixes
-    interfaces = [
-        [type(x) is Interface for x in program.scene.layers] for program in scene.programs().values()
+    mixtures = [
+        [type(x.material) is Bruggeman for x in program.scene.layers] for program in scene.programs().values()
     ]
-    assert any(map(any, interfaces)) == mixes
+    assert any(map(any, mixtures)) == mixes
+
+
+def with_faces(layers, angle=60.0, signal="R"):
+    """The extended scene of films on a half space that oxidises, its data and the parameters."""
+    scene = pl.Scene(layers, 3.9, light=pl.Light(angle=angle, signal=signal))
+    (view,) = make(*measurements(pl.simulate(scene, NINE, noise=0.01), scene)).views
+    return extended(view, np.array([200.0])), view.data, np.array([200.0])
+
+
+FILM = pl.Layer(2.0, pl.Free(50, 400, start=200.0))
+
+
+def test_faces_beside_each_other():
+    """Of no size they are not there: each is simulated as if it were alone."""
+    scene, data, at = with_faces(FILM)
+    effects = scene.roughness, scene.oxide, scene.mixture, scene.overlayer
+    together = scene.signals(data, at, [(number, 2.0) for number in effects])[:, :9]
+
+    def tmm_R(layers):
+        n, d = [1.0, *(n for n, _ in layers), 3.9], [np.inf, *(d for _, d in layers), np.inf]
+        rays = [(nm, p) for nm in NINE for p in "sp"]
+        return np.reshape([tmm.coh_tmm(p, n, d, np.pi / 3, nm)["R"] for nm, p in rays], (9, 2)).mean(axis=1)
+
+    # Bruggeman's equation of half and half: 2 ε² − (a + b) ε / 2 − a b = 0 of permittivities a, b
+    a, b = 2.0**2, 3.9**2
+    half = np.sqrt(((a + b) / 2 + np.sqrt((a + b) ** 2 / 4 + 8 * a * b)) / 4)
+    film = (2.0, 200.0)
+    thin = [[film, (1.46, 2.0)], [film, (half, 2.0)], [(1.5, 2.0), film]]
+    np.testing.assert_allclose(together[1:], [*map(tmm_R, thin)], atol=1e-12)
+    rough = pl.Scene(pl.Layer(2.0, 200.0, roughness=2.0), 3.9, light=pl.Light(angle=60.0, signal="R"))
+    np.testing.assert_allclose(together[0], pl.simulate(rough, NINE).values, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("layers", "count"),
+    [
+        (FILM, 2),
+        (pl.Layer(pl.Anisotropic(1.6, 1.7, axis=(20.0, 10.0)), pl.Free(50, 400, start=200.0)), 1),
+    ],
+)
+def test_programs_of_effects(layers, count, monkeypatch):
+    """The scene and all faces take two programs, and one where s and p mix."""
+    scene, data, at = with_faces(layers, signal="psi-delta")
+    numbers = [scene.wavelength, scene.thickness[0], scene.mixture, scene.oxide, scene.overlayer]
+    numbers += [] if scene.roughness is None else [scene.roughness]
+    called = set()
+    for name in ("simulated", "simulated_once"):
+        program = getattr(extended_scene, name)
+
+        def counted(form, own, data, values, name=name, program=program):
+            called.add((name, form, jax.tree.structure(own), values.shape))
+            return program(form, own, data, values)
+
+        monkeypatch.setattr(extended_scene, name, counted)
+    scene.signals(data, at, [(number, 1.0) for number in numbers])
+    assert len(called) == count
 
 
 def test_a_shift_of_wavelengths_at_the_ends_of_a_table_beside_a_free_index():

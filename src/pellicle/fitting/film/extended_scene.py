@@ -28,11 +28,12 @@ from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
 from pellicle.forward_model.film_signal import depolarises
 from pellicle.forward_model.plan import Plan, Row
+from pellicle.optics.coherent import FEW
 from pellicle.programs.cache import kept
 from pellicle.scene.expressions import value
 from pellicle.scene.film import Reference, Scene, thickness_spread, unchecked
 from pellicle.scene.free import Content, Free, free_leaves, insert, is_free, remembered
-from pellicle.scene.graded import each_medium
+from pellicle.scene.graded import each_medium, face
 from pellicle.scene.layers import Interface, Layer
 
 OVERLAYER_INDEX = 1.5
@@ -186,18 +187,15 @@ class ExtendedScene:
             instrument=instrument,
             reference=self._reference(opened, layers, below),
         )
-        self._foot: list[Any] = []
+        self._native: Layer | None = None
+        self._mixed: Layer | None = None
         self._with_face: dict[int, tuple[Any, ...]] = {}
         self._stacks, self._programs = [tuple(layers)], dict[int, Program]()
         if allowed.substrate:
             self._stacks.append(tuple(self._faces(layers)))
         self._stack_of = dict.fromkeys(self._with_face, _WITH_FACES)
         if allowed.substrate and isinstance(layers[0], Layer):
-            # apart: the roughness of a covered face is that of two
-            self.overlayer, thin = self._number(0.0)
-            self._stack_of[self.overlayer.position] = len(self._stacks)
-            self._stacks.append((Layer(Constant(OVERLAYER_INDEX), thin), *self._stacks[_PLAIN]))
-            self._with_face[self.overlayer.position] = self._stacks[-1]
+            self._cover(layers)
 
     def _reference(self, opened: Scene, layers: list[Any], below: Any) -> Reference | None:
         """The reference. Media that the sample has too are those of one wafer, and layers of one thickness
@@ -228,21 +226,19 @@ class ExtendedScene:
         reference, fitted = self._plain.reference, self._fitted.reference
         if reference is None or fitted is None or not self._one_wafer:
             return reference
-        added = [x for x in layers if any(x is own for own in self._foot)]
         foot, own = (next(iter(x.layers[::-1]), None) for x in (fitted, self._fitted))
-        same = False
+        same = oxidised = False
         if isinstance(foot, Layer):
-            nm = np.asarray(self._fitted.light.wavelength)
-            oxidised = like_oxide(foot.material, nm)
-            added = [x for x in added if not (oxidised and isinstance(x, Layer))]
+            oxidised = like_oxide(foot.material, np.asarray(self._fitted.light.wavelength))
             same = isinstance(own, Layer) and Content(foot.material) == Content(own.material)
-        if not same and not any(isinstance(x, Layer) for x in added):
-            added = []
+        # of an oxide where the layer has no index of its own
+        mixes = same or (isinstance(own, Layer) and isinstance(own.material, Anisotropic) and not oxidised)
+        added = [x for x in layers if (x is self._native and not oxidised) or (x is self._mixed and mixes)]
         return unchecked(reference, layers=(*reference.layers, *added))
 
     def _faces(self, layers: list[Any]) -> list[Any]:
-        """The layers with a roughness, an oxide and a mixed interface of no size."""
-        plain, top, foot = tuple(layers), layers[0], self._fitted.layers[-1]
+        """The layers with a roughness, a mixed interface and an oxide of no size."""
+        plain, top, foot = tuple(layers), layers[0], layers[-1]
         single = isinstance(top, Layer) and top.repeats == 1  # a face in a group is rough in every repeat
         if single and top.roughness is None and computes_roughness(self._fitted):
             self.roughness, rough = self._number(0.0)
@@ -250,20 +246,37 @@ class ExtendedScene:
             self._with_face[self.roughness.position] = tuple(layers)
         if isinstance(foot, Layer) and self._allowed.oxidises:
             if not self._allowed.like_oxide:
-                self.oxide, thin = self._number(0.0)
-                self._foot = [Layer(Constant(OXIDE_INDEX), thin)]
-                layers = [*layers, *self._foot]
-                self._with_face[self.oxide.position] = (*plain, layers[-1])
+                self.oxide, thickness = self._number(0.0)
+                self._native = Layer(Constant(OXIDE_INDEX), thickness)
+                self._with_face[self.oxide.position] = (*plain, self._native)
+            native = [] if self._native is None else [self._native]
             # media with an index of their own mix: under a birefringent layer an oxide does
-            isotropic = not isinstance(foot.material, Anisotropic)
-            if isotropic or self.oxide is not None:
-                self.mixture, thin = self._number(0.0)
-                face = Interface(thin)
-                between = [face] if isotropic else [*layers[len(plain) :], face]
-                layers = [*layers, face]
-                self._foot.append(face)
-                self._with_face[self.mixture.position] = (*plain, *between)
+            on_oxide, below = isinstance(foot.material, Anisotropic), self._plain.substrate.material
+            if not on_oxide or native:
+                self.mixture, thickness = self._number(0.0)
+                above = native[0].material if on_oxide else face(foot.material, 1.0)
+                [half] = Interface(0.0).slices(above, below)
+                self._mixed = replace(half, thickness=thickness)
+                self._with_face[self.mixture.position] = (*plain, *(native if on_oxide else []), self._mixed)
+                native.insert(len(native) if on_oxide else 0, self._mixed)
+            layers = [*layers, *native]
         return layers
+
+    def _cover(self, layers: list[Any]) -> None:
+        """An overlayer. Where that is as quick, other numbers than its own are simulated with one of no
+        thickness: in one program less."""
+        self.overlayer, thin = self._number(0.0)
+        cover, at = Layer(Constant(OVERLAYER_INDEX), thin), self.overlayer.position
+        self._with_face[at] = (cover, *layers)
+        if not computes_roughness(self._fitted):
+            # s and p mix: a program takes seconds to compile
+            self._stacks, self._stack_of = [(cover, *self._stacks[_WITH_FACES])], {}
+        elif layers[0].roughness is None and len(layers) != FEW and not depolarises(self._form.plan):
+            # apart from other faces: the roughness of a covered face is that of two
+            self._stacks[_PLAIN] = self._with_face[at]
+        else:
+            self._stack_of[at] = len(self._stacks)
+            self._stacks.append(self._with_face[at])
 
     def _number(self, value: float, lower: float = 0.0) -> tuple[Number, Free]:
         free = Free(min(lower, value), value + _WIDEST, start=value)
@@ -334,7 +347,7 @@ class ExtendedScene:
         A scene with all of them is a deep stack, which takes a hundred times as long.
         """
         faces = {position: self._program(layers) for position, layers in self._with_face.items()}
-        return {None: self._program_of(_PLAIN), **faces}
+        return {None: self._program(self._plain.layers), **faces}
 
     def _program(self, layers: tuple[Any, ...]) -> Program:
         scene = unchecked(self._plain, layers=layers, reference=self._on_reference(layers))
