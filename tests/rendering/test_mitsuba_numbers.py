@@ -103,3 +103,26 @@ def test_a_table_of_one_index_refuses_another(tmp_path):
         RuntimeError, match="has one index: export a recipe in which that of the film is free"
     ):
         mi.load_dict(plugin)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("absorbs", [0.0, 0.1])
+def test_indices_with_and_without_dispersion_are_those_of_their_wavelength(tmp_path, absorbs):
+    """The index of the base has dispersion, that of a film that absorbs has none."""
+    film = pl.dispersion.Constant(2.0, absorbs) if absorbs else pl.dispersion.Cauchy(1.9, 2e4)
+    scene = pl.Scene(pl.Layer(film, 150.0), pl.dispersion.Cauchy(1.5, 4e3))
+    np.savez(tmp_path / "film.npz", **lookup(appearance(scene)).arrays())
+    mi.set_variant("scalar_spectral_polarized")
+    mitsuba_plugin.register()
+    si, wavelengths = mi.SurfaceInteraction3f(), [421.3, 487.6, 552.2, 618.9]
+    si.wi, si.wavelengths = mi.Vector3f(0, 0.6, 0.8), wavelengths
+    bsdf = mi.load_dict({"type": "pellicle_film", "filename": str(tmp_path / "film.npz"), "alpha": 0.0})
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    for kind, choice in (("R", 0.0), ("T", 1 - 1e-6)):
+        sampled, weight = bsdf.sample(context, si, choice, [0.5, 0.5])
+        expected = []
+        for nm in wavelengths:
+            media = [1.0, 2.0 + 1j * absorbs if absorbs else 1.9 + 2e4 / nm**2, 1.5 + 4e3 / nm**2]
+            both = tmm.unpolarized_RT(media, [np.inf, 150.0, np.inf], np.arccos(0.8), nm)
+            expected.append(both[kind])
+        np.testing.assert_allclose(np.array(weight)[0, 0] * sampled.pdf, expected, atol=5e-5)

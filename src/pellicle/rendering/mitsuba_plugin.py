@@ -74,7 +74,10 @@ def _init(film: Any, props: Any) -> None:
         film.own, film.step, film.changed, film.fine = own, float(table["index_step"]), None, None
         film.table = film.values = film.media = None
         if table["alone"] and not mi.is_rgb:
-            film.media = table_texture(table["media"])
+            media = table["media"]  # only indices with dispersion are looked up
+            film.same = [float(x[0]) if np.ptp(x) == 0 else None for x in media.T]
+            varying = [i for i, x in enumerate(film.same) if x is None]
+            film.media = table_texture(media[:, varying or [0]])
         else:
             film.values = _values(table, "", film.eta)
             film.table = table_texture(film.values)
@@ -191,19 +194,27 @@ def _thickness(film: Any, si: Any, active: Any) -> Any:
     return film.low + (film.high - film.low) * film.thickness.eval_1(si, active)
 
 
-def _waves(film: Any, nm: Any, cosine: Any, thickness: Any, change: Any, active: Any) -> Any:
-    """Amplitudes (s, p) of reflection and of transmission by Airy's formula, at a wavelength `nm` in vacuum.
+def _waves(film: Any, nm: Any, cosine: Any, thickness: Any, change: Any, active: Any) -> list[list[Any]]:
+    """Elements of reflection and of transmission by Airy's formula, at a wavelength `nm` in vacuum.
 
     With ε = n² and q = √(ε − n₀² sin²θ) those of a face are (q − q′)/(q + q′) for s, and for p
-    (ε′ q − ε q′)/(ε′ q + ε q′).
+    (ε′ q − ε q′)/(ε′ q + ε q′). Numerators and denominators are kept apart, so that elements of both kinds
+    share two divisions of real numbers.
     """
-    number, (first, last) = mi.Complex2f, film.wavelength
-    at = mi.Point1f(node((nm - first) / (last - first), film.media.shape[0]))
-    n0, n, k, base_n, base_k = film.media.eval(at, active)
+    number = mi.Complex2f
+    n0, n, k, base_n, base_k = _indices(film, nm, active)
     square = n0**2 * (1 - cosine**2) * (dr.select(cosine < 0, film.eta**2, 1) if film.eta else 1)
+
+    def medium(n: Any, k: Any, absorbs: bool) -> tuple[Any, Any]:
+        """ε and q of a medium."""
+        if absorbs:
+            return number(n, k) ** 2, dr.sqrt(number(n, k) ** 2 - square)
+        return number(n**2, 0), number(dr.safe_sqrt(n**2 - square), dr.safe_sqrt(square - n**2))
+
     above, layer, below = (
-        (x, dr.sqrt(x - square))
-        for x in (number(n0**2, 0), number(n + change, k) ** 2, number(base_n, base_k) ** 2)
+        medium(n0, None, False),
+        medium(n + change, k, film.same[2] != 0),
+        medium(base_n, base_k, film.same[4] != 0),
     )
     if film.eta:  # light from below meets them in the other order
         turned = [dr.select(cosine < 0, b, a) for a, b in zip(above, below, strict=True)]
@@ -211,18 +222,35 @@ def _waves(film: Any, nm: Any, cosine: Any, thickness: Any, change: Any, active:
     (e0, q0), (e1, q1), (e2, q2) = above, layer, below
     half = q1 * (2 * dr.pi * thickness / nm)
     root = number(dr.cos(dr.real(half)), dr.sin(dr.real(half))) * dr.exp(-dr.imag(half))
-    turn, flux = 4 * q1 * root, dr.safe_sqrt(dr.real(q0) * dr.real(q2))
     faces = (
-        ((q0 - q1, q0 + q1), (q1 - q2, q1 + q2), flux),
-        ((e1 * q0 - e0 * q1, e1 * q0 + e0 * q1), (e2 * q1 - e1 * q2, e2 * q1 + e1 * q2), None),
+        ((q0 - q1, q0 + q1), (q1 - q2, q1 + q2)),
+        ((e1 * q0 - e0 * q1, e1 * q0 + e0 * q1), (e2 * q1 - e1 * q2, e2 * q1 + e1 * q2)),
     )
-    reflected, passed = [], []
-    for (r0, t0), (r1, t1), own in faces:
-        whole = t0 * t1 + r0 * r1 * root**2
-        reflected.append((r0 * t1 + t0 * r1 * root**2) / whole)
-        own = e1 * (flux * dr.safe_sqrt(dr.real(e0) * dr.real(e2))) if own is None else own
-        passed.append(turn * own / whole)
-    return reflected, passed
+    (s, whole_s), (p, whole_p) = (
+        (r0 * t1 + t0 * r1 * root**2, t0 * t1 + r0 * r1 * root**2) for (r0, t0), (r1, t1) in faces
+    )
+    over_s, over_p = dr.rcp(dr.squared_norm(whole_s)), dr.rcp(dr.squared_norm(whole_p))
+    turn = dr.conj(whole_s) * whole_p * (over_s * over_p)
+    reflected = _pair(dr.squared_norm(s) * over_s, dr.squared_norm(p) * over_p, s * dr.conj(p) * turn)
+    if not film.eta:
+        return [reflected]
+    flux = 16 * dr.squared_norm(q1 * root) * dr.maximum(dr.real(q0) * dr.real(q2), 0)
+    both = dr.real(e0) * dr.real(e2)
+    of_p = dr.squared_norm(e1) * both * over_p
+    return [reflected, _pair(flux * over_s, flux * of_p, dr.conj(e1) * turn * (flux * dr.safe_sqrt(both)))]
+
+
+def _pair(s: Any, p: Any, both: Any) -> list[Any]:
+    """Elements of the squares of the amplitudes s and p, and of s times the conjugate of p."""
+    return [(s + p) / 2, (s - p) / 2, dr.real(both), dr.imag(both)]
+
+
+def _indices(film: Any, nm: Any, active: Any) -> list[Any]:
+    """n of the ambient medium, n and k of the film and of the base at a wavelength in nm."""
+    first, last = film.wavelength
+    at = mi.Point1f(node((nm - first) / (last - first), film.media.shape[0]))
+    found = iter(film.media.eval(at, active)) if None in film.same else iter(())
+    return [next(found) if x is None else mi.Float(x) for x in film.same]
 
 
 def _by_airy(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], list[Any]]:
@@ -232,11 +260,7 @@ def _by_airy(film: Any, si: Any, cosine: Any, active: Any) -> tuple[list[Any], l
     kinds = [[dr.zeros(mi.UnpolarizedSpectrum) for _ in range(count)] for _ in range(2)]
     for channel in range(len(kinds[0][0])):
         nm = si.wavelengths[channel] if mi.is_spectral else mi.Float(GREEN)
-        waves = _waves(film, nm, cosine, thickness, change, active)
-        for elements, (s, p) in zip(kinds[: 2 if film.eta else 1], waves, strict=False):
-            a, b = dr.squared_norm(s), dr.squared_norm(p)
-            both = s * dr.conj(p)
-            values = (a + b) / 2, (a - b) / 2, dr.real(both), dr.imag(both)
+        for elements, values in zip(kinds, _waves(film, nm, cosine, thickness, change, active), strict=False):
             for element, value in zip(elements, values, strict=False):
                 element[channel] = value
     return kinds[0], kinds[1]
