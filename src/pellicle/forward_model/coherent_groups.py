@@ -154,20 +154,6 @@ def _internal(medium: Any, a: Any, below: Plate, wavelength: Any, polarisation: 
     return plate.internal_transmittance(extinction, below.plate_mm, wavelength)
 
 
-def power(plan: Plan, groups: list[CoherentGroup], polarisation: str, transmitted: bool) -> Any:
-    """R of the first group and everything below it, or T through them into the last medium."""
-    group, *below = groups
-    powers = _powers(plan, group, polarisation)
-    if not below:
-        return powers.T() if transmitted else powers.R()
-    front = plate.Face(powers.R(), powers.T(), powers.R_below())
-    back = power(plan, below, polarisation, False)
-    medium = _of(group.internal, polarisation), group.collected
-    if not transmitted:
-        return plate.plate_reflectance(front, back, *medium)
-    return plate.plate_transmittance(front, back, power(plan, below, polarisation, True), *medium)
-
-
 class _Powers(NamedTuple):
     """Functions for the power coefficients of a group; one that is not called costs nothing."""
 
@@ -176,18 +162,45 @@ class _Powers(NamedTuple):
     R_below: Callable[[], Any]
 
 
-def _powers(plan: Plan, group: CoherentGroup, polarisation: str) -> _Powers:
+def powers(plan: Plan, groups: list[CoherentGroup], polarisations: str, transmitted: bool) -> list[Any]:
+    """R of the first group and everything below it, or T through them into the last medium, for each letter
+    of `polarisations`."""
+    each = [_powers(plan, group, polarisations) for group in groups]
+    return [
+        _together(groups, own, letter, transmitted) for letter, *own in zip(polarisations, *each, strict=True)
+    ]
+
+
+def _together(groups: list[CoherentGroup], each: list[_Powers], polarisation: str, transmitted: bool) -> Any:
+    (group, *below), (own, *others) = groups, each
+    if not below:
+        return own.T() if transmitted else own.R()
+    front = plate.Face(own.R(), own.T(), own.R_below())
+    back = _together(below, others, polarisation, False)
+    medium = _of(group.internal, polarisation), group.collected
+    if not transmitted:
+        return plate.plate_reflectance(front, back, *medium)
+    return plate.plate_transmittance(front, back, _together(below, others, polarisation, True), *medium)
+
+
+def _powers(plan: Plan, group: CoherentGroup, polarisations: str) -> list[_Powers]:
     if not group.layers and group.roughness is None:
-        above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
-        a, q_above = interface.transverse(above, group.angle)
-        face = (above, q_above, below, interface.normal(below, a), polarisation)
-        reflectance = partial(interface.reflectance, *face)
-        return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
+        return [_of_face(group, letter) for letter in polarisations]
     if plan.on("orders"):
-        return _damped_orders(plan, group, polarisation)
-    [amplitudes] = responses_of(plan, group, polarisation)
+        return [_damped_orders(plan, group, letter) for letter in polarisations]
+    amplitudes = responses_of(plan, group, polarisations)
+    if len(amplitudes) < len(polarisations):  # both are equal at normal incidence
+        amplitudes *= len(polarisations)
     functions = response.reflectance, response.transmittance, response.reflectance_below
-    return _Powers(*(partial(function, amplitudes) for function in functions))
+    return [_Powers(*(partial(function, own) for function in functions)) for own in amplitudes]
+
+
+def _of_face(group: CoherentGroup, polarisation: str) -> _Powers:
+    above, below = (seen_by(medium, polarisation) for medium in (group.above, group.below))
+    a, q_above = interface.transverse(above, group.angle)
+    face = (above, q_above, below, interface.normal(below, a), polarisation)
+    reflectance = partial(interface.reflectance, *face)
+    return _Powers(reflectance, partial(interface.transmittance, *face), reflectance)
 
 
 def responses_of(plan: Plan, group: CoherentGroup, polarisations: str) -> tuple[response.Response, ...]:

@@ -19,7 +19,7 @@ from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.errors import UsageError
 from pellicle.forward_model import mixed_polarisations
-from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, responses_of
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, powers, responses_of
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.materials import Material, check_common_range
 from pellicle.optics import ellipsometry, plate
@@ -209,15 +209,15 @@ def build(plan: Plan) -> Simulate:
     only (see `scene.free.insert`). The function is pure and can be traced.
     """
     kind, ellipsometric = plan.kind, plan.kind.ellipsometric
-    powers = partial(_stokes_rows if ellipsometric else _power_rows, plan)
+    rows = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
     mixed = plan.row("anisotropy").count >= GENERAL
     if mixed:
-        powers, finish = partial(mixed_polarisations.rows, plan), kind.of_sums
+        rows, finish = partial(mixed_polarisations.rows, plan), kind.of_sums
     averaged = plan.row("coherence").count or plan.on("angle-spread")
 
     def at_each_wavelength(groups: list[CoherentGroup], **turn: Any) -> Sequence[Any]:
-        return list(powers(groups, **turn)) if averaged else finish(powers(groups))
+        return list(rows(groups, **turn)) if averaged else finish(rows(groups))
 
     def monochromatic(scene: Scene, /, **turn: Any) -> Any:
         groups = coherent_groups(plan, scene)
@@ -243,10 +243,10 @@ def build(plan: Plan) -> Simulate:
         scene = turned(_shifted(scene))
         for remove in plan.left_out:
             scene = remove(scene)
-        rows = finish(intensities(scene)) if averaged else intensities(scene)
+        signal = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
-        rows = kind.isotropic(rows) if ellipsometric and not mixed else rows
-        return stack_rows(rows).T.reshape(-1) if ellipsometric else kind.of_power(rows[0])
+        signal = kind.isotropic(signal) if ellipsometric and not mixed else signal
+        return stack_rows(signal).T.reshape(-1) if ellipsometric else kind.of_power(signal[0])
 
     return simulate if plan.reference is None else _against(simulate, build(plan.reference))
 
@@ -319,7 +319,7 @@ def _power_rows(plan: Plan, groups: list[CoherentGroup]) -> list[Any]:
     if not plan.on("polarisation"):
         one = (plan.on("oblique") or plan.on("anisotropy")) and plan.polarisation != "unpolarised"
         polarisations = plan.polarisation if one else "s"
-    return [power(plan, groups, p, plan.kind.transmitted) for p in polarisations]
+    return powers(plan, groups, polarisations, plan.kind.transmitted)
 
 
 def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes:
@@ -332,7 +332,7 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
         if through:
             raise UsageError(mixed_polarisations.NO_PLATE)
         return mixed_polarisations.stokes(plan, groups)
-    s, p = (power(plan, groups, polarisation, through) for polarisation in "sp")
+    s, p = powers(plan, groups, "sp", through)
     return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups, through))
 
 

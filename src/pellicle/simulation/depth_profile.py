@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
-from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, power, responses_of
+from pellicle.forward_model.coherent_groups import CoherentGroup, coherent_groups, powers, responses_of
 from pellicle.forward_model.film_signal import tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, plate, response
@@ -59,7 +59,7 @@ def absorbed_power(
             up.append(jnp.zeros_like(arriving))
             layers.append(absorbed)
             break
-        below, passed = power(plan, groups[i + 1 :], polarisation, False), group.internal
+        [below], passed = powers(plan, groups[i + 1 :], polarisation, False), group.internal
         returning = response.reflectance_below(responses[i])
         first = arriving * response.transmittance(responses[i]) / (1 - returning * below * passed**2)
         arriving = first * passed
@@ -71,7 +71,7 @@ def absorbed_power(
         faces = back * _upward_difference(groups, i, responses[i], q, polarisation)
         faces += arriving * _exchange(group.below, q, _ratio(responses[i + 1]), polarisation)
         inner.append((first + arriving * below) * lost + faces)
-    R, T = (power(plan, groups, polarisation, through) for through in (False, True))
+    R, T = (powers(plan, groups, polarisation, through)[0] for through in (False, True))
     return AbsorbedPower(R, T, layers, inner, down, up)
 
 
