@@ -79,8 +79,6 @@ def _identified(
             growth = again if kept else growth
     if kept:
         doubt = conclusion.doubt(growth.problem, kept)
-        if doubt == conclusion.LONE:
-            doubt = _one_film_instead(growth, kept[0], spectra, request)
         better = _better_face(growth.problem, kept[0], spectra, request)
         if not doubt and not better:
             better = _better_glass(growth, kept, spectra, request)
@@ -100,18 +98,6 @@ def _identified(
         kept, condition = conclusion.plausible(growth.weighed), _UNUSUAL
     condition = condition if kept else ""
     return _record(growth, kept, condition, condition, left_out, request, began)
-
-
-def _one_film_instead(growth: Growth, best: Weighed, spectra: Sequence[Spectrum], request: Request) -> str:
-    """Reason to doubt two layers from one R or T: a usual mistake with which one film describes the data as
-    well, or describes values that the mistake changes, else empty. 340 nm of MgF2 in R relative to aluminium
-    were SiO2 on MgF2."""
-    for mistake, _, again, _ in _likely_mistakes(spectra, request, growth):
-        comparable = np.array_equal(again.problem.data, growth.problem.data)
-        least = best.ln_z - conclusion.DECIDED if comparable else -np.inf
-        if any(x.ln_z > least for x in conclusion.survivors(grow(again, 1).weighed)):
-            return f"one film describes the data too if {mistake}"
-    return "" if time.monotonic() < growth.deadline else conclusion.LONE
 
 
 def _likely_mistakes(
