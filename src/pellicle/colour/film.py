@@ -1,6 +1,7 @@
 """Colour of one film: its reflectance in each band, weighted and summed."""
 
-from typing import Any, final
+from functools import partial
+from typing import Any, NamedTuple, final
 
 import equinox as eqx
 import jax
@@ -21,6 +22,12 @@ FEW = 12
 9 to 13 µs in a loop; the program compiles in 2 s. The Jacobians of a fit would take longer."""
 
 
+# one program each: in single operations the first colour takes 8 s of processor time, not 1.5
+_lab = jax.jit(spaces.lab, static_argnums=1)
+_linear_srgb = jax.jit(spaces.linear_srgb, static_argnums=1)
+_srgb = jax.jit(spaces.srgb)
+
+
 @final
 class Colour(eqx.Module):
     """Colours relative to a white; `xyz` has Y = 1 for a perfect reflector."""
@@ -31,17 +38,17 @@ class Colour(eqx.Module):
     @property
     def lab(self) -> Float[Array, "... 3"]:
         """CIE 1976 L*, a*, b*."""
-        return jnp.asarray(spaces.lab(self.xyz, self.white))
+        return _lab(self.xyz, self.white)
 
     @property
     def linear_srgb(self) -> Float[Array, "... 3"]:
         """Linear sRGB, not clipped: interference colours exceed its gamut."""
-        return spaces.linear_srgb(self.xyz, self.white)
+        return _linear_srgb(self.xyz, self.white)
 
     @property
     def srgb(self) -> Float[Array, "... 3"]:
         """Display values, 0 to 1."""
-        return spaces.srgb(self.linear_srgb)
+        return _srgb(self.linear_srgb)
 
 
 def film_colour(
@@ -94,21 +101,12 @@ def reflectance(
     layers, thicknesses = (layer, thickness) if several else ([layer], [thickness])
     if len(thicknesses) != len(layers):
         raise ValueError(f"`thickness` needs one for each of {len(layers)} layers, not {len(thicknesses)}")
-    *thicknesses, theta = (jnp.asarray(x)[..., None] * 1.0 for x in (*thicknesses, jnp.deg2rad(angle)))
-    thickness = thicknesses[0]
-    wavelength = jnp.asarray(bands.wavelength, jnp.result_type(thickness, theta))
-    n0, n2 = _index(ambient, wavelength), interface.allow_tunnelling(_index(substrate, wavelength))
-    if not is_real(n0):
-        raise ValueError("the ambient must not absorb: give it a real index")
-    n1 = _index(layers[0], wavelength)
-    if not bands.absorbs and not is_real(n1):
-        raise ValueError(
-            "the layer absorbs, which belcour-barla does not model: use method gaussians-8 or uniform-64"
-        )
-    k0d = [2 * jnp.pi / wavelength * d for d in thicknesses]
+    above, *media, below = (_medium(x) for x in (ambient, *layers, substrate))
+    depths, theta = [jnp.asarray(x) for x in thicknesses], jnp.asarray(angle)
+    wavelength = jnp.asarray(bands.wavelength, jnp.result_type(*depths, theta, 1.0))
+    films = _Films(above, media, below, depths, theta, wavelength)
     if bands.width is None:
-        media = [_index(medium, wavelength) for medium in layers]
-        return response.reflectance(*coherent.responses(n0, media, n2, k0d, theta, few=FEW))
+        return _of_samples(films, absorbs=bands.absorbs)
     if several:
         raise ValueError('several layers need single wavelengths: give `method="uniform-64"`')
     # of a known material by NumPy: JAX's numbers are unknown within a program
@@ -116,27 +114,73 @@ def reflectance(
     if isinstance(layer, AbstractDispersion) and not traced:
         known = layer.index(np.asarray(bands.wavelength))
     propagating = interface.propagates(known, ambient, 90.0)  # and so at any angle
+    width = jnp.asarray(bands.width, wavelength.dtype)
+    how = {"count": bands.orders, "propagating": propagating, "absorbs": bands.absorbs}
+    return _of_bands(films, width, **how)
+
+
+class _Films(NamedTuple):
+    """Films as numbers, arrays and materials, which a compiled function takes."""
+
+    ambient: Any
+    layers: list[Any]
+    substrate: Any
+    thicknesses: list[Any]  # nm
+    angle: Any  # degrees
+    wavelength: Any  # nm: of each band
+
+
+@partial(jax.jit, static_argnames="absorbs")
+def _of_samples(films: _Films, *, absorbs: bool) -> Any:
+    """Reflectance at single wavelengths."""
+    n0, media, n2, k0d, theta = _waves(films, absorbs)
+    return response.reflectance(*coherent.responses(n0, media, n2, k0d, theta, few=FEW))
+
+
+@partial(jax.jit, static_argnames=("count", "propagating", "absorbs"))
+def _of_bands(films: _Films, width: Any, *, count: int, propagating: bool, absorbs: bool) -> Any:
+    """Reflectance of one layer in bands of a `width` in 1/λ, by `count` orders of the film's series."""
+    n0, [n1], n2, [k0d], theta = _waves(films, absorbs)
     if not propagating:
         n1 = interface.allow_tunnelling(n1)
-    index_slope = _phase_index(layer, n0, n1, theta, wavelength, propagating)
-    spread = 2 * jnp.pi * jnp.asarray(bands.width, wavelength.dtype) * 2 * thickness * index_slope
+    index_slope = _phase_index(films.layers[0], n0, n1, theta, films.wavelength, propagating)
+    spread = 2 * jnp.pi * width * 2 * (films.thicknesses[0][..., None] * 1.0) * index_slope
     damping = jnp.exp(-0.5 * spread * spread)
     both = [
         orders.reflectance(
-            orders.airy_series(n0, n1, n2, k0d[0], theta, letter), lambda m: damping ** (m * m), bands.orders
+            orders.airy_series(n0, n1, n2, k0d, theta, letter), lambda m: damping ** (m * m), count
         )
         for letter in "sp"
     ]
     return 0.5 * (both[0] + both[1])
 
 
+def _waves(films: _Films, absorbs: bool) -> tuple[Number, list[Number], Number, list[Any], Any]:
+    """Indices of ambient, layers and substrate in each band, k₀d of each layer, and the angle in radians."""
+    above, layers, below, thicknesses, angle, wavelength = films
+    n0, *media, n2 = (_index(x, wavelength) for x in (above, *layers, below))
+    if not is_real(n0):
+        raise ValueError("the ambient must not absorb: give it a real index")
+    if not absorbs and not is_real(media[0]):
+        raise ValueError(
+            "the layer absorbs, which belcour-barla does not model: use method gaussians-8 or uniform-64"
+        )
+    k0d = [2 * jnp.pi / wavelength * (d[..., None] * 1.0) for d in thicknesses]
+    return n0, media, interface.allow_tunnelling(n2), k0d, jnp.deg2rad(angle)[..., None] * 1.0
+
+
+def _medium(medium: Any) -> Any:
+    """A material as it is, or numbers as an array."""
+    if isinstance(medium, str):
+        raise ValueError(f"{medium!r} is a name, for pl.film_colour: here give pl.material({medium!r})")
+    return medium if isinstance(medium, AbstractDispersion) else jnp.asarray(medium)
+
+
 def _index(medium: Any, wavelength: Any) -> Number:
     """Return the index in each band; an array of numbers gets an axis for the bands."""
     if isinstance(medium, AbstractDispersion):
         return medium.index(wavelength)
-    if isinstance(medium, str):
-        raise ValueError(f"{medium!r} is a name, for pl.film_colour: here give pl.material({medium!r})")
-    return to_pair(jnp.asarray(medium)[..., None] * 1.0)
+    return to_pair(medium[..., None] * 1.0)
 
 
 def _phase_index(

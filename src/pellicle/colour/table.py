@@ -159,7 +159,7 @@ class FilmColourTable(eqx.Module):
     def xyz(self, thickness: Any, cosine: Any = 1.0) -> Float[Array, "... 3"]:
         """XYZ (..., 3) at thicknesses (nm) and cosines of the angle of incidence, which broadcast."""
         films = jnp.broadcast_arrays(*(jnp.asarray(x, self.nodes.dtype) for x in (thickness, cosine)))
-        return _interpolated(self.nodes, _Grid(self.path, self.cosine, self.shear), *films)
+        return _compiled(self.nodes, _Grid(self.path, self.cosine, self.shear), *films)
 
     def __call__(self, thickness: Any, cosine: Any = 1.0) -> Colour:
         """Colour at thicknesses (nm) and cosines of the angle of incidence, which broadcast."""
@@ -231,6 +231,9 @@ def _interpolated(nodes: Any, grid: _Grid, thickness: Any, cosine: Any) -> Any:
             for k, weight in enumerate(weights):
                 total = total + weight[..., None] * node[..., 3 * k : 3 * k + 3]
     return total
+
+
+_compiled = jax.jit(_interpolated)
 
 
 def _cell(coordinate: Any, span: Any, count: int, xp: Any) -> tuple[Any, tuple[Any, Any]]:
