@@ -65,6 +65,13 @@ def test_nothing_is_traced(name, monkeypatch):
     known_index(MODELS[name], WAVELENGTH)
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_a_known_model_compiles_nothing_when_it_is_called(name):
+    called = jax.make_jaxpr(lambda: MODELS[name](WAVELENGTH))()
+    assert not called.eqns
+    assert called.consts[0].dtype == complex
+
+
 def test_a_formula_without_a_real_index_is_nan_without_a_warning():
     assert np.isnan(known_index(d.Sellmeier((1.0,), (300.0**2,)), np.array([299.0]))).all()
 

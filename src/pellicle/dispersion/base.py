@@ -30,8 +30,16 @@ class AbstractDispersion(eqx.Module):
         """Index at `wavelength` (nm, any shape): a real array, or a Pair where it may absorb."""
 
     def __call__(self, wavelength: Any) -> Complex[Array, "..."]:
-        """n + ik as a complex array at `wavelength` (nm, any shape)."""
-        return to_complex(self.index(jnp.asarray(wavelength, dtype=jnp.result_type(float, wavelength))))
+        """n + ik as a complex array at `wavelength` (nm, any shape).
+
+        Of numbers that are known and no arrays of JAX it is computed by NumPy, without compilation.
+        """
+        precision = jnp.result_type(float, wavelength)
+        if any(isinstance(x, jax.Array) for x in jax.tree_util.tree_leaves((self, wavelength))):
+            return to_complex(self.index(jnp.asarray(wavelength, dtype=precision)))
+        return jnp.asarray(
+            np.asarray(known_index(self, np.asarray(wavelength)), complex), jnp.result_type(precision, 1j)
+        )
 
 
 def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Any:

@@ -128,17 +128,22 @@ def floating(x: Any):
 def index_at(what: Medium, wavelength) -> Any:
     """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
     if isinstance(what, str | AbstractDispersion):
-        material = medium(what)
-        for principal in [] if isinstance(wavelength, Tracer) else principal_media(material):
-            if hasattr(principal, "check_range"):
-                principal.check_range(np.asarray(wavelength))
-        return material.index(wavelength)
+        return _material_at(what, wavelength).index(wavelength)
     if not isinstance(what, Tracer) and np.iscomplexobj(what):
         known: Any = np.ravel(np.asarray(what, complex))  # JAX's copy would be traced in a program
         if (gain := known[known.imag < 0]).size:
             said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
             raise UsageError(f"{said} absorption is n + ik with k ≥ 0")
     return to_pair(floating(what))
+
+
+def _material_at(what: str | AbstractDispersion, wavelength: Any) -> AbstractDispersion:
+    """A material, with data at the wavelengths where these are known."""
+    material = medium(what)
+    for principal in [] if isinstance(wavelength, Tracer) else principal_media(material):
+        if hasattr(principal, "check_range"):
+            principal.check_range(np.asarray(wavelength))
+    return material
 
 
 def _loses_precision(*arguments: Any) -> bool:
@@ -265,12 +270,13 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
 
     ```
     """
-    wavelength = floating(wavelength)
+    if isinstance(what, str | AbstractDispersion):
+        value = _material_at(what, wavelength)(wavelength)
+    else:
+        value = to_complex(index_at(what, floating(wavelength)))
     if isinstance(what, Anisotropic):
-        index_at(what, wavelength)  # which raises for wavelengths outside the data
-        return medium(what)(wavelength)
-    value = to_complex(index_at(what, wavelength))
-    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, wavelength.shape))
+        return value
+    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, jnp.shape(wavelength)))
 
 
 def _responses(*arguments: Any) -> tuple[Response, ...]:
