@@ -248,6 +248,7 @@ def test_table_goals_failures_and_changes(bench, tmp_path):
     assert lines[2] == "clean: stderr_noise is 2.00 times the former one (median)"
 
 
+@pytest.mark.slow
 def test_clean_and_wrong_cases_of_an_oxide(bench):
     """From measurement to outcome: noise alone is answered firmly, another index is not."""
     suite, answer = bench["suite"], bench["script"]["answer"]

@@ -66,6 +66,7 @@ def test_what_is_planned_is_within_the_tolerance():
     assert planned.flops < full.flops / 3
 
 
+@pytest.mark.slow
 def test_coarser_wavelengths_are_joined_by_lines(oblique):
     truth = by_library(oblique)
     lines = np.stack([np.interp(NM, NM[::2], row[::2]) for row in truth])
@@ -74,6 +75,7 @@ def test_coarser_wavelengths_are_joined_by_lines(oblique):
     assert "too few" in reason(oblique, "every 4th wavelength")
 
 
+@pytest.mark.slow
 def test_orders_converge_as_a_geometric_series(oblique):
     """Each order is smaller than the last by |q| or more, which is below a half here."""
     truth = by_library(oblique)

@@ -35,6 +35,7 @@ def test_a_plan_as_table_and_record(pellicle, faint):
     assert "the tolerance is 0.001" in table[len(rows) + 2]
 
 
+@pytest.mark.slow
 def test_each_sample_has_its_plan(pellicle, write, tmp_path):
     """One table for those of the same effects."""
     names = "abc"

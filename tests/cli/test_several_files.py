@@ -167,6 +167,7 @@ def test_repeats_of_one_thickness_agree(pellicle, spectrum_file, scene, tmp_path
     assert (out / "summary.csv").exists()
 
 
+@pytest.mark.slow
 def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, scene_recipe):
     for name, thickness in zip("abc", (299.0, 300.0, 301.5), strict=True):
         spectrum_file(f"{name}.csv", thickness)

@@ -57,6 +57,7 @@ def live(scene, tmp_path_factory):
     return made, true
 
 
+@pytest.mark.slow
 def test_continuity_decides_orders_and_a_jump_is_found(live):
     made, true = live
     fits = [fit for fit in made.fits.values() if not fit.error]

@@ -111,6 +111,7 @@ def test_an_effect_with_a_free_parameter_is_not_even_tried(effect):
     assert alternatives(effect, thing) == []
 
 
+@pytest.mark.slow
 def test_an_opaque_layer_that_may_be_thin_stays_transparent():
     thin = scene([pl.Layer(1.46, 100.0), pl.Layer(0.2 + 3.4j, pl.Free(400.0, 900.0))])
     assert not pl.plan(thin, 1e-2).on("opaque")

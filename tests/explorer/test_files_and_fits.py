@@ -203,6 +203,7 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     assert answer["commands"]["toml"] == "Run it: pellicle fit recipe.toml, saved beside film.csv"
 
 
+@pytest.mark.slow
 def test_the_program_of_the_explorer_fits_as_it_does(session, monkeypatch, capsys):
     """With every option of reading and of the fit, and with the free numbers of the page."""
     film = pl.simulate(pl.Scene(pl.Layer("SiO2", 300.0), "Si"), NM, noise=0.002, seed=1)

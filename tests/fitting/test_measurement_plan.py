@@ -43,6 +43,7 @@ def plan():
     return pl.plan_measurement(rivals, NM, signals=signals, **about)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("signal", "angle"), [("R", 0.0), ("R", 70.0), ("psi-delta", 70.0)])
 def test_evidence_is_half_of_the_misfit_that_a_refit_leaves(plan, signal, angle):
     def left(true, other):

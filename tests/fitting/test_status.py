@@ -90,6 +90,7 @@ def test_ambiguous_n_and_its_mirror(film, measured):
     assert fit.probability + fit.rivals[0].probability == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_misfit_where_sigma_is_not_known(film, measured):
     """Large residuals with a structure: a slope that no film has."""
     nm = np.linspace(400.0, 900.0, 128)

@@ -180,6 +180,7 @@ def test_group_of_one_layer_and_scene_without_layers_are_refused(tmp_path):
         pl.read_recipe(path)
 
 
+@pytest.mark.slow
 def test_depth_profile_lists_every_repeat():
     profile = pl.depth_profile(mirror(3, 0.05), at=[600.0], wavelength=[600.0])
     apart = pl.Scene(list(written_out(mirror(3, 0.05).layers)), GLASS, light=pl.Light(angle=ANGLE))

@@ -157,6 +157,7 @@ def test_each_order_is_added_up_to_the_last(kind, share, reflections):
     assert np.abs(found - collected(kind)).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_the_limits():
     """All light, none, and a number of reflections beyond which nothing is left."""
     for kind in ("R", "psi-delta"):

@@ -193,6 +193,7 @@ thickness = { lower = 0, upper = 1500 }
 """
 
 
+@pytest.mark.slow
 def test_the_command_follows_grey_frames_to_the_black_film(tmp_path):
     thickness = wedge(20.0)
     frames = written(tmp_path / "frames", seen(thickness), skipped=range(40, 46))

@@ -84,6 +84,7 @@ def test_a_jump_and_a_gap_are_told_and_nothing_after_them_is_wrong():
     assert set(index) == set(np.argsort(-found.dataset.residual_rms.fillna(0).values)[:3])
 
 
+@pytest.mark.slow
 def test_an_index_that_all_times_share_is_known_by_all():
     scene = pl.Scene(pl.Layer(pl.Free(1.4, 1.6), pl.Free(0, 3000)), 3.9)
     found = pl.series(cube(GROWN, noise=0.003, seed=2, n=1.5), scene).dataset
@@ -142,6 +143,7 @@ def test_what_is_no_series_is_refused(tmp_path):
         pl.series(data, fixed)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_folder_and_goes_on_in_it(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     values = cube(GROWN).R.values[::4]

@@ -47,6 +47,7 @@ def off(found, thickness):
     return (found["thickness"].values - thickness) / found["thickness_stderr_noise"].values
 
 
+@pytest.mark.slow
 def test_a_laser_follows_a_film_from_a_known_start():
     grown = 5 * FRINGE * (0.7 * TIME / 600 + 0.3 * (TIME / 600) ** 2)
     found = pl.series(trace(grown), scene(first=0.0))

@@ -12,6 +12,8 @@ from pellicle.optics.pair import Pair, to_complex
 
 AMBIENT, SUBSTRATE, ANGLE = 1.3, Pair(np.array([1.7, 4.0]), np.array([0.0, 0.1])), 0.7
 POWERS = (response.reflectance, response.reflectance_below, response.transmittance)
+few_layers = jax.jit(coherent.few_layers, static_argnames="propagating")
+stack = jax.jit(coherent.stack)
 
 
 def amplitudes(responses):
@@ -31,8 +33,8 @@ def test_one_smooth_layer_takes_the_closed_form(propagating):
 @pytest.mark.parametrize("count", [1, 3])
 def test_few_layers_agree_with_the_loop(count, angle, propagating):
     layers, phases = [2.1, Pair(1.5, 0.2), 1.4][:count], [0.3, 1.0, 2.0][:count]
-    few = coherent.few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
-    for one, many in zip(few, coherent.stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
+    few = few_layers(AMBIENT, layers, SUBSTRATE, phases, angle, propagating=propagating)
+    for one, many in zip(few, stack(AMBIENT, layers, SUBSTRATE, phases, angle), strict=True):
         for power in POWERS:
             np.testing.assert_allclose(power(one), power(many), rtol=1e-13)
         for name in ("reflected", "below"):

@@ -63,6 +63,7 @@ def test_with_an_exact_transform_and_many_orders_it_is_exact(changes, base):
     np.testing.assert_allclose(found, exact, atol=0.004)
 
 
+@pytest.mark.slow
 def test_many_wavelengths_are_exact(changes):
     """Reflected by a film that absorbs, and what enters its base, which has no extinction."""
     look = appearance(pl.Scene(pl.Layer(1.9 + 0.2j, 200.0), 1.5))

@@ -171,6 +171,7 @@ def test_the_example_recipe():
     assert 0.2 < np.ptp(data.values) < 3
 
 
+@pytest.mark.slow
 def test_effects_on_one_wafer_move_sample_and_reference():
     """Index of the oxide in both, an oxide on bare silicon in both, by tmm; `pl.Tied` follows the sample."""
     film, nm = pl.Layer(2.0, pl.Free(1, 150), "film"), NM

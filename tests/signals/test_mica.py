@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 import tmm
 
 import pellicle as pl
@@ -42,6 +43,7 @@ def measured(thickness: float, seed: int) -> pl.Spectrum:
     return pl.Spectrum(NM, (flake - bare) / (flake + bare) + noise, "contrast", sigma=np.full(len(NM), NOISE))
 
 
+@pytest.mark.slow
 def test_flakes_calibrated_by_others_in_one_fit():
     """Oxide, aperture and stray light are shared, and those of the reference."""
     recipe = read_recipe(RECIPE)

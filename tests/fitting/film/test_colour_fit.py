@@ -62,6 +62,7 @@ def test_three_angles_determine_the_thickness(space, sigma):
         np.testing.assert_allclose(fit.parts[0].curve.difference, apart, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_one_colour_of_unknown_exposure_has_several_thicknesses():
     data = colours(432.0, angles=ANGLES[:1])
     fit = pl.fit(data, scene("free"))

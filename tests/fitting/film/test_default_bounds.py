@@ -40,6 +40,7 @@ def test_default_bounds_are_widened_where_the_data_want_it(film, measured, n, lo
     assert (free.lower, free.upper) == (fit["n"].lower, fit["n"].upper)
 
 
+@pytest.mark.slow
 def test_bounds_of_the_user_are_kept(film, measured):
     fit = pl.fit(measured(film(), 430.0), film(material=constant(1.2, 1.4, None)))
     assert fit.status in (pl.Status.AT_BOUND, pl.Status.MISFIT)

@@ -67,6 +67,7 @@ def test_a_plate_with_its_back_face(film, measured):
     assert "The back face makes no difference here" in opaque.verdict
 
 
+@pytest.mark.slow
 def test_a_prior_pulls_and_sharpens(film, measured):
     """As another measurement would: on a parameter that the data leave open, the prior is the answer."""
     data = measured(film(12.0, 1.46), noise=0.003, sigma=True)

@@ -76,6 +76,7 @@ def fit():
     return pl.fit(data, scene)
 
 
+@pytest.mark.slow
 def test_the_band_contains_the_index_that_the_formula_cannot_follow(fit):
     true = np.asarray(pl.refractive_index(NM, "Fe2O3"))
     found = fit.index
@@ -83,6 +84,7 @@ def test_the_band_contains_the_index_that_the_formula_cannot_follow(fit):
         assert np.mean(np.abs(value - truth) <= 1.96 * stderr) > 0.9
 
 
+@pytest.mark.slow
 def test_results_are_n_and_k_at_the_knots(fit):
     short = fit.index_in_short
     np.testing.assert_allclose(short.wavelength, KNOTS, atol=4)

@@ -118,6 +118,7 @@ def test_of_one_scene_ellipsometry_leaves_out_the_scale(spectra, refuses):
     refuses(UsageError, "no scale and no offset", pl.fit, spectra[2], scene)
 
 
+@pytest.mark.slow
 def test_a_spectrum_of_another_sample_is_a_misfit_that_names_the_file():
     """Without σ, too: its noise would grow with its residuals until it counts for nothing."""
     right, wrong = oxide(100.0), replace(oxide(130.0), sigma=np.full(60, 0.02))

@@ -44,6 +44,7 @@ def test_a_fit_says_where(film, measured, sigma):
     assert not any("misses structure" in warning for warning in pl.fit(data, scene).warnings)
 
 
+@pytest.mark.slow
 def test_a_band_that_is_no_films_enlarges_the_error(film, measured):
     """It moves the answer by less than the error that it causes; a wrong index is a misfit."""
     data = measured(film(), 430.0, sigma=True)
