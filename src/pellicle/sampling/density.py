@@ -22,6 +22,7 @@ from pellicle.fitting.evaluation import Static, explained
 from pellicle.fitting.linear_system import Evidence
 from pellicle.fitting.problem import Explained, Problem
 from pellicle.fitting.reweighting import RankedMinima
+from pellicle.optics.pair import namespace
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.signals.base import Signal
 
@@ -67,8 +68,9 @@ class Nearest(NamedTuple):
 
     def at(self, unit: Any) -> Systematics:
         """The effects at the minimum that is nearest to a point (parameters,)."""
-        which = jnp.argmin(jnp.sum(jnp.square(self.centre - unit), axis=1))
-        return jax.tree_util.tree_map(lambda x: jnp.asarray(x)[which], self.each)
+        xp = namespace(self.centre, unit)
+        which = xp.argmin(xp.sum(xp.square(self.centre - unit), axis=1))
+        return jax.tree_util.tree_map(lambda x: xp.asarray(x)[which], self.each)
 
 
 def nearest(every: Sequence[Systematics], centre: np.ndarray) -> Nearest:
