@@ -59,15 +59,18 @@ def lab(xyz: Any, white: Any) -> Float[Array | np.ndarray, "... 3"]:
     return xp.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
 
 
-def delta_e76(one: Any, other: Any) -> Float[Array, "..."]:
-    """Return ΔE*ab (CIE 1976) of Lab values (..., 3). It is differentiable; where equal, its gradient is 0.
+def delta_e76(one: Any, other: Any) -> Float[Array | np.ndarray, "..."]:
+    """Return ΔE*ab (CIE 1976) of Lab values (..., 3); arrays of NumPy stay so.
+
+    It is differentiable; where equal, its gradient is 0.
 
     >>> float(delta_e76([50.0, 3.0, 4.0], [50.0, 0.0, 0.0]))
     5.0
     """
-    square = jnp.sum((jnp.asarray(one) - jnp.asarray(other)) ** 2, axis=-1)
+    xp = namespace(one, other)
+    square = xp.sum((xp.asarray(one) - xp.asarray(other)) ** 2, axis=-1)
     equal = square == 0
-    return jnp.where(equal, 0.0, jnp.sqrt(jnp.where(equal, 1.0, square)))
+    return xp.where(equal, 0.0, xp.sqrt(xp.where(equal, 1.0, square)))
 
 
 def delta_e2000(one: Any, other: Any) -> np.ndarray:
