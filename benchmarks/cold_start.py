@@ -20,37 +20,32 @@ Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 5:
 `--programs` has the programs of `pl.fit` of four scenes instead, each in a new process with an empty cache:
 lines of StableHLO and of optimised HLO, and processor time (s) of tracing with lowering and of compilation.
 
-On a machine with 10 to 20 busy processes, where times are about twice as long; all but R while the polish
-still imported Optimistix:
+On a machine of which others take a part, where times are up to twice as long:
 
                                      StableHLO       HLO   trace compile
-    R, thickness                                                    5.40
-        deviances                          283       708    0.12    0.07
-        polished                          1775      4106    0.82    1.18
-        local                              532      1306    0.17    0.09
-        _simulated                         913      1899    0.20    0.22
-        _simulated                        1941      5758    0.57    0.55
-        _simulated                        1380      1993    0.23    0.21
-    psi and delta, Cauchy                                          14.06
-        deviances                         1048      1952    0.48    0.39
-        polished                          6035     10503    2.92    3.65
-        local                             3673      5581    1.38    0.76
-        _simulated                         989      2478    0.26    0.48
-        _simulated                        1809      3859    0.71    0.51
-        _simulated                        1456      2610    0.33    0.31
-    psi and delta, two layers                                      20.98
-        deviances                         1526      2250    0.63    0.54
-        polished                          9014     14561    4.04    5.46
-        local                             5479      7891    1.96    1.45
-        _simulated                        1464      2797    0.42    0.78
-        _simulated                        2083      5956    0.78    0.87
-        _simulated                        1974      3042    0.40    0.39
-    tilted axis                                                    36.64
-        deviances                         2388      6694    1.02    3.81
-        polished                          8688     18168    5.97   10.23
-        local                             5253     13542    2.62    2.26
-        _simulated                        2893     10924    0.82    4.17
-        _simulated                        3330     12107    0.75    1.48
+    R, thickness                                                    5.16
+        deviances                          283       720    0.15    0.11
+        polished                          1889      4214    1.18    0.94
+        local                              564      1339    0.24    0.13
+        _simulated                         848      2053    0.19    0.27
+        _simulated                        1291      5064    0.43    0.42
+    psi and delta, Cauchy                                          10.95
+        deviances                          730      1956    0.29    0.31
+        polished                          3159      7444    2.43    2.52
+        local                             1559      4332    1.31    0.43
+        _simulated                         924      2680    0.28    0.58
+        _simulated                        1191      4160    0.55    0.45
+    psi and delta, two layers                                      13.70
+        deviances                          974      2254    0.34    0.45
+        polished                          3571      8363    2.44    2.98
+        local                             1845      5187    1.64    0.71
+        _simulated                        1207      3114    0.39    0.79
+        _simulated                        1393      5165    0.64    0.76
+    tilted axis                                                    28.38
+        deviances                         2388      6701    0.65    2.56
+        polished                          8448     16406    5.07    8.40
+        local                             5266     13562    1.99    2.56
+        _simulated                        3327     12203    1.14    3.56
 """
 
 from __future__ import annotations
