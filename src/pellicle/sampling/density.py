@@ -304,8 +304,7 @@ class _Expansion(NamedTuple):
 
 def _expansion(problem: Problem, nearby: Nearest, unit: np.ndarray) -> _Expansion:
     """Linearisation of an affine problem at a point (parameters,) of the unit cube."""
-    effects = jax.device_get(nearby.at(unit))
-    values = np.asarray(problem.values(unit))
+    effects, values = nearby.at(unit), np.asarray(problem.values(unit))
     parts = [view.local(problem.seen_by(view, values)) for view in problem.views]
     counted = np.array([view.independent_fraction for view in problem.views])
     matrix, _, names, pulls = scaled(problem, unit, parts, (1 / (counted * effects.shares)).tolist())

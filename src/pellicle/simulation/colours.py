@@ -28,7 +28,7 @@ from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.layers import Layer, medium
-from pellicle.simulation.functions import check_numbers
+from pellicle.simulation.arguments import check_numbers
 from pellicle.simulation.spectra import simulate_signal
 
 BANDS = "uniform-64"

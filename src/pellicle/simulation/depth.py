@@ -15,7 +15,7 @@ from pellicle.errors import UsageError
 from pellicle.optics.field import absorptances, fields
 from pellicle.optics.interface import transverse
 from pellicle.optics.pair import to_complex
-from pellicle.simulation.functions import Medium, film_arguments, floating
+from pellicle.simulation.arguments import Medium, film_arguments, floating
 
 
 class Field(NamedTuple):
