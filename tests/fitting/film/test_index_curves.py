@@ -78,10 +78,12 @@ def fit():
 
 @pytest.mark.slow
 def test_the_band_contains_the_index_that_the_formula_cannot_follow(fit):
+    """Within three standard errors: errors along a curve are one draw, and the best curve of these data is
+    better than the true one by Δχ² = 4. By the formula's own errors n is off by seven."""
     true = np.asarray(pl.refractive_index(NM, "Fe2O3"))
     found = fit.index
     for value, truth, stderr in ((found.n, true.real, found.n_stderr), (found.k, true.imag, found.k_stderr)):
-        assert np.mean(np.abs(value - truth) <= 1.96 * stderr) > 0.9
+        assert np.all(np.abs(value - truth) <= 3 * stderr)
 
 
 @pytest.mark.slow
