@@ -275,6 +275,13 @@ def test_impossible_numbers_are_refused(arguments, named, said, refuses):
     refuses(UsageError, re.escape(said), pl.reflectance, *arguments, **named)
 
 
+def test_wavelengths_of_an_index_may_be_a_list():
+    found = pl.refractive_index([500, 600.0], "Au")
+    np.testing.assert_array_equal(found, pl.refractive_index(np.array([500.0, 600.0]), "Au"))
+    np.testing.assert_allclose(found, jax.jit(pl.material("Au"))(jnp.array([500.0, 600.0])), rtol=1e-12)
+    np.testing.assert_array_equal(pl.refractive_index([500, 600], 1.5), [1.5, 1.5])
+
+
 def test_an_index_of_a_material_converts_to_complex():
     silicon = pl.material("Si")
     expected = complex(pl.refractive_index(550.0, "Si"))

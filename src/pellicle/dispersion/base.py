@@ -34,12 +34,11 @@ class AbstractDispersion(eqx.Module):
 
         Of numbers that are known and no arrays of JAX it is computed by NumPy, without compilation.
         """
-        precision = jnp.result_type(float, wavelength)
         if any(isinstance(x, jax.Array) for x in jax.tree_util.tree_leaves((self, wavelength))):
-            return to_complex(self.index(jnp.asarray(wavelength, dtype=precision)))
-        return jnp.asarray(
-            np.asarray(known_index(self, np.asarray(wavelength)), complex), jnp.result_type(precision, 1j)
-        )
+            nm: Any = jnp.asarray(wavelength)
+            return to_complex(self.index(nm.astype(jnp.result_type(float, nm))))
+        nm = np.asarray(wavelength)
+        return jnp.asarray(np.asarray(known_index(self, nm), complex), jnp.result_type(float, nm, 1j))
 
 
 def known_index(dispersion: AbstractDispersion, wavelength: np.ndarray) -> Any:

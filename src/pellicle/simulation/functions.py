@@ -8,6 +8,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Complex, Float
 
@@ -156,7 +157,7 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
         value = to_complex(index_at(what, floating(wavelength)))
     if isinstance(what, Anisotropic):
         return value
-    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, jnp.shape(wavelength)))
+    return jnp.broadcast_to(value, jnp.broadcast_shapes(value.shape, np.shape(wavelength)))
 
 
 def _responses(*arguments: Any) -> tuple[Response, ...]:
