@@ -281,6 +281,7 @@ def test_wavelengths_of_an_index_may_be_a_list():
     traced = jax.jit(lambda nm: pl.refractive_index(nm, "Au"))(jnp.array([500.0, 600.0]))
     np.testing.assert_allclose(found, traced, rtol=1e-12)
     np.testing.assert_array_equal(pl.refractive_index([500, 600], 1.5), [1.5, 1.5])
+    assert pl.refractive_index((500, 600), pl.Anisotropic(1.6, 1.7)).shape == (2, 2)
 
 
 def test_an_index_of_a_material_converts_to_complex():

@@ -151,6 +151,8 @@ def refractive_index(wavelength: Any, what: Medium) -> Complex[Array, "..."]:
 
     ```
     """
+    if isinstance(wavelength, list | tuple):
+        wavelength = np.asarray(wavelength)
     if isinstance(what, str | AbstractDispersion):
         value = material_at(what, wavelength)(wavelength)
     else:
