@@ -32,8 +32,8 @@ _STRAINED = 2.5
 """Size of an effect, in standard uncertainties, above which two layers are tried nonetheless: 32 nm of
 polystyrene on 394 nm of Y2O3 in R were one film with a slope of the lamp of 3.3 (Δ ln Z 11)."""
 _HIDDEN = 1.5
-"""The same on a substrate of low index, as many lower layers have: 170 nm of Al2O3 on 84 nm of SiO2 on BK7 in
-R were 156 nm of HfO2 with an offset of 2.3."""
+"""Size of an effect above which two layers are tried on a substrate of low index, as many lower layers have:
+170 nm of Al2O3 on 84 nm of SiO2 on BK7 in R were 156 nm of HfO2 with an offset of 2.3."""
 _THICK = np.arange(24.0, 1200.0, 24.0)
 _THIN = np.array([6.0, 16, 28, 42, 58, 76, 96, 120, 146, 174, 204, 234])
 """Thicknesses (nm) of the grid: a minimum is 50 nm wide where n is 2.4."""
