@@ -1,7 +1,9 @@
 """Colour of a film by every method, against the Airy formula in steps of 1 nm."""
 
 import doctest
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import colour
 import jax
@@ -11,6 +13,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, film, film_colour, integration_bands, lab, sensor
+from pellicle.dispersion.base import AbstractDispersion
 
 from ..airy import airy
 from ..by_tmm import films
@@ -125,6 +128,22 @@ def test_a_colour_is_few_programs(thickness, layer, method):
         return film_colour(thickness, layer, 1.5, angle=angle, method=method).srgb
 
     assert len(jax.make_jaxpr(shown)(thickness, 40.0).eqns) < 10
+
+
+class Own(AbstractDispersion):
+    """A medium of a user, of a function."""
+
+    function: Callable[[Any], Any]
+
+    def index(self, wavelength):
+        return self.function(wavelength)
+
+
+def test_a_medium_of_a_function_has_the_colour_of_its_numbers():
+    own, same = Own(lambda nm: 1.5 + 3000.0 / nm**2), pl.dispersion.Cauchy(1.5, 3000.0)
+    for method in ("uniform-64", "gaussians-8"):
+        found, expected = (film_colour(300.0, x, 1.6, method=method).xyz for x in (own, same))
+        np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_the_documented_example():

@@ -105,8 +105,11 @@ def reflectance(
     depths, theta = [jnp.asarray(x) for x in thicknesses], jnp.asarray(angle)
     wavelength = jnp.asarray(bands.wavelength, jnp.result_type(*depths, theta, 1.0))
     films = _Films(above, media, below, depths, theta, wavelength)
+    # a medium of the user's own may hold what is no argument of a program, such as a function
+    compiled = all(isinstance(x, _NUMBERS) for x in jax.tree.leaves(films))
     if bands.width is None:
-        return _of_samples(films, absorbs=bands.absorbs)
+        run = _of_samples if compiled else _of_samples.__wrapped__
+        return run(films, absorbs=bands.absorbs)
     if several:
         raise ValueError('several layers need single wavelengths: give `method="uniform-64"`')
     # of a known material by NumPy: JAX's numbers are unknown within a program
@@ -116,7 +119,10 @@ def reflectance(
     propagating = interface.propagates(known, ambient, 90.0)  # and so at any angle
     width = jnp.asarray(bands.width, wavelength.dtype)
     how = {"count": bands.orders, "propagating": propagating, "absorbs": bands.absorbs}
-    return _of_bands(films, width, **how)
+    return (_of_bands if compiled else _of_bands.__wrapped__)(films, width, **how)
+
+
+_NUMBERS = (int, float, complex, np.ndarray, np.generic, jax.Array)
 
 
 class _Films(NamedTuple):
