@@ -1,6 +1,7 @@
 """Colour of one film: its reflectance in each band, weighted and summed."""
 
 from functools import partial
+from inspect import unwrap
 from typing import Any, NamedTuple, final
 
 import equinox as eqx
@@ -108,7 +109,7 @@ def reflectance(
     # a medium of the user's own may hold what is no argument of a program, such as a function
     compiled = all(isinstance(x, _NUMBERS) for x in jax.tree.leaves(films))
     if bands.width is None:
-        run = _of_samples if compiled else _of_samples.__wrapped__
+        run = _of_samples if compiled else unwrap(_of_samples)
         return run(films, absorbs=bands.absorbs)
     if several:
         raise ValueError('several layers need single wavelengths: give `method="uniform-64"`')
@@ -119,7 +120,7 @@ def reflectance(
     propagating = interface.propagates(known, ambient, 90.0)  # and so at any angle
     width = jnp.asarray(bands.width, wavelength.dtype)
     how = {"count": bands.orders, "propagating": propagating, "absorbs": bands.absorbs}
-    return (_of_bands if compiled else _of_bands.__wrapped__)(films, width, **how)
+    return (_of_bands if compiled else unwrap(_of_bands))(films, width, **how)
 
 
 _NUMBERS = (int, float, complex, np.ndarray, np.generic, jax.Array)
