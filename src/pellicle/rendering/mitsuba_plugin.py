@@ -20,8 +20,8 @@ Parameters of the plugin:
 
 All three are differentiable. In RGB variants the table has linear sRGB under D65, in spectral ones the film
 at each wavelength, in monochromatic ones that at 550 nm; polarised variants get the Mueller matrices of its
-waves. A film of one layer is computed by Airy's formula where light is polarised, and where thickness or
-index are not those of the table or have gradients, but for RGB.
+waves. But for RGB, a film of one layer is computed by Airy's formula where light is polarised, where it
+passes media without dispersion, and where thickness or index are not those of the table or have gradients.
 
 A film on a transparent base transmits from both sides as the built-in `roughdielectric` does, with the same
 medium on both sides (a bubble) straight on. Others reflect on the front side only, as `roughconductor` does;
@@ -81,7 +81,7 @@ def _init(film: Any, props: Any) -> None:
         else:
             film.values = _values(table, "", film.eta)
             film.table = table_texture(film.values)
-        if not mi.is_rgb and not (mi.is_polarized and film.media is not None):
+        if not mi.is_rgb and not (film.media is not None and _quick(film)):
             film.fine = _values(table, "own_", film.eta)
         if f"changed_{'rgb' if mi.is_rgb else 'spectra'}" in table:
             film.changed = table_texture(_values(table, "changed_", film.eta))
@@ -107,6 +107,14 @@ def _init(film: Any, props: Any) -> None:
             film.transmits | sides | varying | (0 if film.straight else flags.NonSymmetric)
         )
     film.m_flags = film.m_components[0] | film.m_components[-1]
+
+
+def _quick(film: Any) -> bool:
+    """True where Airy's formula takes less time than a lookup at the film's own thickness.
+
+    It does for the Mueller elements of both sides, and for indices without dispersion where light passes too.
+    """
+    return mi.is_polarized or bool(film.eta and None not in film.same)
 
 
 def _values(table: Any, kind: str, eta: float) -> np.ndarray:
