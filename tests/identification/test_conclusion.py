@@ -91,6 +91,8 @@ def test_two_layers_are_certain_only_where_all_that_are_left_are_these():
     assert doubt(of_constant_indices("R", MgO=1.73, SiO2=1.46), [best]).startswith("one spectrum of R or T")
     one = [weighed([("MgO", 60.0), ("SiO2", 8.0)], 0.0, most=OXIDE, remaining=1.4)]  # on a native oxide
     assert doubt(of_constant_indices("R", MgO=1.73, SiO2=1.46), one) == ""
+    thick = [weighed([("MgO", 60.0), ("SiO2", 48.0)], 0.0, most=OXIDE)]  # no native oxide
+    assert doubt(of_constant_indices("R", MgO=1.73, SiO2=1.46), thick).startswith("one spectrum of R or T")
 
 
 def test_the_thickness_of_one_film_covers_all_its_names():

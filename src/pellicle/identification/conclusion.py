@@ -77,7 +77,9 @@ def plausible(weighed: Sequence[Weighed]) -> list[Weighed]:
 def doubt(problem: Problem, kept: Sequence[Weighed]) -> str:
     """Reason for which the best of the structures that are left is not certain, empty for none."""
     best, alike = kept[0], one_film(problem, kept)
-    layered = sum(layer.most > OXIDE for layer in best.structure.layers) > 1
+    # an oxide that is thicker than a native one is a layer too
+    depths = zip(best.structure.layers, _depths(best), strict=True)
+    layered = sum(layer.most > OXIDE or v > BARE for layer, v in depths) > 1
     share = 1.0 if layered else _SHARE
     if len(alike) < len(kept) and sum(_shares(alike, best)) < share * sum(_shares(kept, best)):
         return SEVERAL
