@@ -237,6 +237,7 @@ def mixed(model):
     return jnp.sum(jnp.sin(real(index)) + jnp.cos(3 * imag(index)))
 
 
+@pytest.mark.slow
 def test_gradients_against_central_differences():
     """In every parameter of every model; differences by NumPy."""
     for model in (d.Oscillators(3.0, (m,)) if name in TERMS else m for name, m in MODELS.items()):

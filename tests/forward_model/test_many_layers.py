@@ -48,6 +48,7 @@ def test_a_program_grows_by_the_numbers_of_a_layer_alone(names):
     assert lines(60, names) - lines(20, names) < 5 * 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("signal", "angle"), [("R", 0.0), ("psi-delta", 65.0)])
 def test_slopes_in_rows_are_those_of_each_layer(monkeypatch, signal, angle):
     scene = stack(9, signal, angle)

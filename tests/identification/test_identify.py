@@ -71,6 +71,7 @@ def test_a_film_without_dispersion_is_never_certain():
     assert abs(thickness.value - 135) < 3 * thickness.stderr < 15
 
 
+@pytest.mark.slow
 def test_a_wrong_angle_is_named_and_never_certain():
     """100 nm of oxide, of which Ψ and Δ were measured at 68° and stated at 70°."""
     ncs = by_tmm.ncs(NM, (1.0, index("SiO2"), index("Si")), [100.0], 68.0)

@@ -75,6 +75,7 @@ def paths(thickness, colour=False, turn=TURN, **about):
     return found, away, lights, film
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("thickness", "colour"),
     [

@@ -77,6 +77,7 @@ def test_a_path_that_comes_to_rest_has_a_rival_that_goes_on():
     assert going_on(Start(time, 2 * time, kinks), 0.0, 300.0) is None
 
 
+@pytest.mark.slow
 def test_a_film_whose_fringes_die_out_goes_on():
     """A path that turns at each extremum follows the light, too."""
     grown = 600 * (1 - np.exp(-TIME / 400))
@@ -93,6 +94,7 @@ def test_a_film_whose_fringes_die_out_goes_on():
     assert right.mean() > 0.8
 
 
+@pytest.mark.slow
 def test_a_turn_near_an_extremum_is_found_or_left_open():
     turn = 2 * FRINGE + 3
     grown = np.where(TIME < 300, turn * TIME / 300, turn - (TIME - 300))
@@ -101,6 +103,7 @@ def test_a_turn_near_an_extremum_is_found_or_left_open():
     assert not (wrong & (found.dataset.status == CODES["by-neighbours"])).any()
 
 
+@pytest.mark.slow
 def test_one_laser_without_a_start_decides_no_order():
     grown = 100 + 4 * FRINGE * TIME / 600
     found = pl.series(trace(grown, seed=1), scene())
@@ -108,6 +111,7 @@ def test_one_laser_without_a_start_decides_no_order():
     assert any("not decided" in text for text in found.warnings)
 
 
+@pytest.mark.slow
 def test_no_order_is_decided_because_the_next_path_is_unlikely():
     """A draw in which the path that pays least next is far less likely than the same course a fringe away."""
     at = TIME / 600
@@ -115,6 +119,7 @@ def test_no_order_is_decided_because_the_next_path_is_unlikely():
     assert pl.series(trace(grown, noise=0.023, seed=1), scene()).decided == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [2.0, 2.25])  # it turns between two extrema, and at one
 def test_a_film_that_is_etched_and_grows_again_is_followed_through_its_turn(depth):
     thickness = FRINGE * (4.25 - depth * np.sin(np.pi * TIME / 600))
@@ -124,6 +129,7 @@ def test_a_film_that_is_etched_and_grows_again_is_followed_through_its_turn(dept
     assert np.sqrt(np.mean(off(found, thickness) ** 2)) < 1.7
 
 
+@pytest.mark.slow
 def test_two_lasers_decide_the_order_by_themselves():
     grown = 300 + 900 * TIME / 600
     found = pl.series(trace(grown, (532.0, LASER), seed=3), scene())
@@ -131,6 +137,7 @@ def test_two_lasers_decide_the_order_by_themselves():
     assert np.abs(found["thickness"] - grown).max() < LASER / 200
 
 
+@pytest.mark.slow
 def test_a_closed_shutter_is_told_and_nothing_after_it_is_wrong():
     grown = 5 * FRINGE * TIME / 600
     data = trace(grown, seed=4)

@@ -86,6 +86,7 @@ def test_texels_at_which_colours_are_compared_have_the_extremes():
     assert list(np.ravel(NM)[chosen]) == sorted(np.ravel(NM)[chosen])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("to", "key"), [("gltf", "base"), ("materialx", "n"), ("openpbr", "edge"), ("blender", "base_ior")]
 )

@@ -358,6 +358,7 @@ def test_a_table_of_another_version_is_refused(tmp_path):
         mi.load_dict({"type": "pellicle_film", "filename": str(tmp_path / "old.npz")})
 
 
+@pytest.mark.slow
 def test_a_film_of_less_index_than_its_base_has_numbers_everywhere():
     """At grazing incidence from below no light reaches it: NaN there would spread to light from above."""
     arrays = lookup(appearance(pl.Scene(pl.Layer(1.5, 1000.0), 1.7))).arrays()

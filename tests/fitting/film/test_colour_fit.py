@@ -124,6 +124,7 @@ def test_clipped_channels_are_limits():
     assert fit["instrument.scale"].value == pytest.approx(3.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_camera_clips_the_model_too():
     """A soap film of a colour outside sRGB: red is 0.004 by noise, where the film has less than none."""
     nm, water, noise = NM, 1.333, np.array([0.004, 0.0, 0.0])

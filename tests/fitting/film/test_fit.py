@@ -153,6 +153,7 @@ def test_the_record(film, measured):
     assert fit.seconds > 0
 
 
+@pytest.mark.slow
 def test_rivals_cost_what_a_fit_there_costs(film, measured):
     """Δχ² of a rival against a fit that is allowed nothing else; curves against the closed formula."""
     scene = film()
