@@ -19,7 +19,7 @@ from pellicle.brdf.directions import direction, half_vector, reflect
 from pellicle.brdf.lobes import Parameters
 
 ANGLES = (0.0, 30.0, 60.0, 80.0)
-"""Angles of incidence (degrees) at which `max_albedo` evaluates the albedo."""
+"""Angles of incidence (degrees) of `albedos`."""
 NARROW = 0.1
 """Angle (radians) of the half vector from the normal where both integrals have an equal share: lobes wider
 than that are resolved by the grid of directions."""
@@ -67,22 +67,18 @@ def _narrow(h: Any) -> Any:
     return 1 / (1 + (tangent / NARROW**2) ** 2)
 
 
-def max_albedo(brdf: Callable, parameters: Parameters) -> float:
-    """Return the largest directional albedo over `ANGLES` and channels; above 1, energy is created."""
-    return float(np.max(np.asarray(jax.jit(partial(albedos, brdf))(dict(parameters)))))
-
-
 def albedos(brdf: Callable, parameters: Parameters) -> Float[Array, "angles channels"]:
     """Return the directional albedo at `ANGLES`."""
     albedo = partial(directional_albedo, brdf, parameters)
     return jax.vmap(albedo)(jnp.asarray(ANGLES))
 
 
-def energy_warning(albedo: float) -> str | None:
-    """Return a warning with the largest albedo, of `max_albedo`, if the BRDF creates energy, else None."""
-    if albedo <= 1.005:  # the error of the quadrature, for lobes beside the mirror direction
+def energy_warning(albedo: Any) -> str | None:
+    """Return a warning with the largest of `albedos` if the BRDF creates energy, else None."""
+    largest = float(np.max(albedo))
+    if largest <= 1.005:  # the error of the quadrature, for lobes beside the mirror direction
         return None
     return (
-        f"the BRDF creates energy: it reflects up to {albedo:.2f} times the incident light, "
+        f"the BRDF creates energy: it reflects up to {largest:.2f} times the incident light, "
         "so its weights are not albedos"
     )

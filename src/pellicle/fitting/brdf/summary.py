@@ -241,7 +241,7 @@ def number_warnings(
     messages += [sentence for material in materials_in(media) for sentence in material.warnings()]
     # over bands the colour of every direction of the quadrature would be an integral of its own
     nodes = node_count(float(fitted["thickness"])) if surface.sensor is not None else 0
-    energy = energy_warning(float(np.max(_albedo((surface.model, nodes), dict(fitted)).value)))
+    energy = energy_warning(_albedo((surface.model, nodes), dict(fitted)).value)
     return [*messages, energy] if energy else messages
 
 
