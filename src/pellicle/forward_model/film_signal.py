@@ -156,17 +156,19 @@ def turned_stokes(rows: Any, cosine: Any, square: Any) -> Any:
 Simulate = Callable[[Scene], Any]
 
 
-def tabulated(scene: Scene, slope: bool = True) -> Scene:
+def tabulated(scene: Scene, slope: bool | None = None) -> Scene:
     """The scene with every medium evaluated at the wavelengths of its light.
 
     Of a medium with free parameters, the materials in it are evaluated. A fit then compiles one program for
     all materials, and evaluates each once. `slope` includes the derivative in wavelength, with which the
-    index goes on where a shift of the wavelengths leaves the range of a table.
+    index goes on where a shift of the wavelengths leaves the range of a table; by default where the scene has
+    a bandwidth or such a shift.
 
     **Raises:** ValueError where a material has no data, naming it and the wavelengths.
     """
-    wavelength = np.asarray(scene.light.wavelength, dtype=float)
-
+    wavelength, instrument = np.asarray(scene.light.wavelength, dtype=float), scene.instrument
+    if slope is None:
+        slope = instrument.bandwidth is not None or instrument.wavelength_shift is not None
     if (reference := scene.reference) is not None:
         known = tabulated(of_reference(scene), slope)
         # each medium of it, which leaves ties to the sample
