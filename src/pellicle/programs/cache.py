@@ -143,12 +143,18 @@ _CALLS = re.compile(r"custom_call @([\w.]+)")
 @lru_cache(maxsize=3)
 def compiler_options(calls: Calls) -> Options:
     """Options of XLA for programs of so many calls: those that it knows, and none for a GPU."""
-    options: Options = {}
-    for name, value in _OPTIONS[calls].items() if jax.default_backend() == "cpu" else ():
-        with suppress(jax.errors.JaxRuntimeError):  # jaxlib 0.11 has one code generator
-            jax.jit(lambda: 0.0).lower().compile(compiler_options={name: value})
-            options[name] = value
-    return options
+    options = _OPTIONS[calls] if jax.default_backend() == "cpu" else {}
+    return options if _are_known(options) else {k: x for k, x in options.items() if _are_known({k: x})}
+
+
+def _are_known(options: Options) -> bool:
+    """True where XLA has these options: jaxlib 0.11 has one code generator."""
+    if options:
+        try:
+            jax.jit(lambda: 0.0).lower().compile(compiler_options=options)
+        except jax.errors.JaxRuntimeError:
+            return False
+    return True
 
 
 def load(path: Path, key: bytes) -> Program | None:
