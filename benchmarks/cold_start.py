@@ -4,48 +4,48 @@ Run `python benchmarks/cold_start.py`. First fits start with an empty cache of p
 ones with a filled cache. The commands take turns; the table gives medians of wall and processor time (s), and
 their ratios to bare JAX, the least that any program of JAX takes.
 
-Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 5:
+Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 3:
 
                                           wall s   cpu s  wall ratio  cpu ratio
-    bare JAX                                0.63    0.73        1.00       1.00
-    pellicle --help                         0.17    0.16        0.26       0.23
-    R by a recipe                           1.37    1.68        2.18       2.31
-    R, CSV by flags                         1.53    1.83        2.44       2.51
-    psi and delta, recipe                   1.55    1.65        2.47       2.26
-    R by a recipe, --out                    2.29    2.58        3.65       3.54
-    R by a recipe, empty cache              3.98    4.92        6.34       6.76
-    R, CSV by flags, empty cache            3.95    5.03        6.31       6.91
-    psi and delta, recipe, empty cache      5.40    6.63        8.61       9.11
+    bare JAX                                0.81    0.91        1.00       1.00
+    pellicle --help                         0.23    0.23        0.29       0.26
+    R by a recipe                           1.99    2.18        2.47       2.40
+    R, CSV by flags                         2.09    2.30        2.59       2.53
+    psi and delta, recipe                   2.08    2.19        2.58       2.41
+    R by a recipe, --out                    2.95    3.13        3.65       3.44
+    R by a recipe, empty cache              4.96    5.31        6.14       5.84
+    R, CSV by flags, empty cache            4.56    4.92        5.65       5.41
+    psi and delta, recipe, empty cache      5.70    5.96        7.06       6.56
 
 `--programs` has the programs of `pl.fit` of four scenes instead, each in a new process with an empty cache:
 lines of StableHLO and of optimised HLO, and processor time (s) of tracing with lowering and of compilation.
 
-On a machine of which others take a part, where times are up to twice as long:
+On the same machine:
 
                                      StableHLO       HLO   trace compile
-    R, thickness                                                    5.16
-        deviances                          283       720    0.15    0.11
-        polished                          1889      4214    1.18    0.94
-        local                              564      1339    0.24    0.13
-        _simulated                         848      2053    0.19    0.27
-        _simulated                        1291      5064    0.43    0.42
-    psi and delta, Cauchy                                          10.95
-        deviances                          730      1956    0.29    0.31
-        polished                          3159      7444    2.43    2.52
-        local                             1559      4332    1.31    0.43
-        _simulated                         924      2680    0.28    0.58
-        _simulated                        1191      4160    0.55    0.45
-    psi and delta, two layers                                      13.70
-        deviances                          974      2254    0.34    0.45
-        polished                          3571      8363    2.44    2.98
-        local                             1845      5187    1.64    0.71
-        _simulated                        1207      3114    0.39    0.79
-        _simulated                        1393      5165    0.64    0.76
-    tilted axis                                                    28.38
-        deviances                         2388      6701    0.65    2.56
-        polished                          8448     16406    5.07    8.40
-        local                             5266     13562    1.99    2.56
-        _simulated                        3327     12203    1.14    3.56
+    R, thickness                                                    2.43
+        deviances                          283       720    0.06    0.06
+        polished                          1889      4214    0.49    0.56
+        local                              564      1339    0.09    0.05
+        _simulated                         848      2053    0.09    0.14
+        _simulated                        1291      5064    0.19    0.24
+    psi and delta, Cauchy                                           4.63
+        deviances                          730      1956    0.19    0.22
+        polished                          3159      7444    0.75    1.55
+        local                             1559      4332    0.39    0.17
+        _simulated                         924      2680    0.12    0.32
+        _simulated                        1191      4160    0.19    0.18
+    psi and delta, two layers                                       4.76
+        deviances                          974      2267    0.16    0.24
+        polished                          3571      8376    0.73    1.52
+        local                             1845      5200    0.40    0.24
+        _simulated                        1207      3127    0.11    0.28
+        _simulated                        1393      5178    0.20    0.23
+    tilted axis                                                    14.12
+        deviances                         2388      6714    0.36    1.58
+        polished                          8448     16419    1.95    4.72
+        local                             5266     13575    1.09    0.88
+        _simulated                        3327     12216    0.44    2.29
 """
 
 from __future__ import annotations
