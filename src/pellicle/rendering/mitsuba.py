@@ -35,7 +35,7 @@ from pellicle.scene.layers import Layer
 from pellicle.scene.surface import Surface
 from pellicle.simulation.brdf import Directions, simulate_samples
 from pellicle.simulation.colours import BANDS
-from pellicle.simulation.film_sphere import mueller_elements, stack
+from pellicle.simulation.film_sphere import Stack, mueller_elements, stack
 
 ALPHA = 0.1
 """GGX roughness of a film that has none of its own: `measured` has no perfect mirrors."""
@@ -215,6 +215,7 @@ def _media(look: Appearance) -> np.ndarray:
     n0, film, base = (
         to_complex(known_index(x, OWN_WAVELENGTHS)) * np.ones(len(OWN_WAVELENGTHS)) for x in found
     )
+    base = base if look.metallic else np.real(base)
     return np.stack([np.real(n0), *(part(x) for x in (film, base) for part in (np.real, np.imag))], axis=1)
 
 
@@ -225,16 +226,21 @@ def _sides(
 
     The index of the film is larger by a `step`.
     """
-    cosine, every = np.linspace(0.0, 1.0, cosines) ** 2, _wavelengths(wavelength)
+    # not 0, where a film of thickness 0 between equal media has no limit
+    cosine = np.maximum(np.linspace(0.0, 1.0, cosines) ** 2, 1e-6)
+    every = _wavelengths(wavelength)
     if not look.coherent:
         return {"": _reflectances(look, nm, cosine, wavelength)[..., None]}, 0.0
     films = stack(look.scene, FILM, eye=Sensor(every, np.empty(0)))
     layers: list[Any] = list(films.layers)
     layers[films.varied] += step
     films = films._replace(layers=tuple(layers))
-    n0, n2 = (np.real(to_complex(medium)) for medium in (films.ambient, films.substrate))
+    n0, n2 = (np.asarray(to_complex(x)).real.astype(float) for x in (films.ambient, films.substrate))
     bands = len(every) - len(wavelength)
     above, eta = (float(np.interp(550.0, every[:bands], x[:bands])) for x in (n0, n2 / n0))
+    if not look.metallic:  # light from below would gain energy at grazing incidence in a base that absorbs
+        films = films._replace(substrate=n2)
+    films, n2 = _in_constant_ambient(films, n0, above), n2 * above / n0
     both = mueller_elements(films, nm[:, None], above * np.sqrt(1 - cosine**2))
     both = np.moveaxis(both, 1, -1)
     if look.metallic or eta < 1:
@@ -253,6 +259,18 @@ def _sides(
     )
     below = np.moveaxis(mueller_elements(reversed_films, nm[:, None], transverse)[0], 0, -1)
     return {"": both[0], "_transmitted": both[1], "_below": below}, eta
+
+
+def _in_constant_ambient(films: Stack, n0: np.ndarray, index: float) -> Stack:
+    """The same films in an ambient medium of one `index` in place of n0 at each wavelength.
+
+    Waves depend on ratios of indices, and of indices to the wavelength, alone. The transverse index of an
+    angle is then the same at all wavelengths.
+    """
+    scale = index / n0
+    layers, substrate = jax.tree.map(lambda part: part * scale, (films.layers, films.substrate))
+    eye = films.eye._replace(wavelength=films.eye.wavelength * scale)
+    return films._replace(eye=eye, ambient=np.full_like(n0, index), layers=layers, substrate=substrate)
 
 
 def film_tables(look: Appearance, alpha: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
