@@ -22,7 +22,8 @@ def test_a_surface_is_a_film_on_rough_facets(refuses):
     np.testing.assert_allclose(layer.material(NM), 2.9)
     np.testing.assert_allclose(film.scene.substrate.material(NM), [2.4 + 2.8j, 2.5 + 2.8j, 2.6 + 2.8j])
     assert film.notes == ("the diffuse part of the surface is left out",)
-    refuses(UsageError, "no film on a base", film_of, pl.Surface("granier-heidrich"))
+    for model in ("granier-heidrich", "clear-coat-film"):
+        refuses(UsageError, f"{model} is not a film on a base in air", film_of, pl.Surface(model))
 
 
 def test_values_of_a_fit_replace_starts_by_name(refuses):

@@ -166,8 +166,8 @@ class Film(NamedTuple):
 def film_of(described: Scene | Surface | Fit) -> Film:
     """Return the film of a scene or a surface, or of a fit with its best values.
 
-    **Raises:** UsageError for a surface without a film on a base, for a fit without a scene and for a
-    birefringent film.
+    **Raises:** UsageError for a surface other than a film on a base in air, for a fit without a scene and for
+    a birefringent film.
     """
     if isinstance(described, Fit):
         scene: Any = described.scene
@@ -178,12 +178,12 @@ def film_of(described: Scene | Surface | Fit) -> Film:
     check_scene(described)
     if isinstance(described, Surface):
         # the film on the facets of a surface
-        if described.brdf.from_film_colour is None:
-            raise UsageError(
-                f"{described.model} has no film on a base, as renderers do: export microfacet-film or"
-                " blinn-phong-film"
-            )
         numbers: dict[str, Any] = dict(described.start_numbers())
+        if described.brdf.from_film_colour is None or "coat_n" in numbers:
+            raise UsageError(
+                f"{described.model} is not a film on a base in air, as renderers have: export"
+                " microfacet-film or blinn-phong-film"
+            )
         layer = _medium(numbers, "n", "k") if described.film is None else described.film
         base = _medium(numbers, "base_n", "base_k") if described.base is None else described.base
         ambient = _medium(numbers, "ambient_n", "ambient_k")
