@@ -1,10 +1,13 @@
 """The registry of renderers: every target is named where users look, and says which package it lacks."""
 
+import numpy as np
 import pytest
 
 import pellicle as pl
 from pellicle.errors import UsageError
 from pellicle.rendering import targets
+from pellicle.rendering.appearance import appearance
+from pellicle.rendering.formula import physical
 from pellicle.rendering.targets import TARGETS, Target, target
 
 
@@ -39,3 +42,16 @@ def test_tables_lack_nothing_that_formulas_lack(tmp_path, monkeypatch):
     assert written.material.look.notes == ()
     lacking = [note.split(":")[0] for note in written.material.look.lacking]
     assert lacking == ["the film has 2 layers", "the layer absorbs"]
+
+
+def test_gold_has_the_least_index_of_formats_and_titania_absorbs_nothing():
+    gold, titania = (appearance(pl.Scene(pl.Layer(name, 20.0), "BK7")) for name in ("Au", "TiO2"))
+    assert gold.index == 1
+    assert [look.lacking for look in (gold, titania)] == [
+        ("the layer absorbs: formats have none that does",),
+        (),
+    ]
+    for name in TARGETS:
+        formula = target(name, package_check=False).formula
+        if formula is not None:
+            assert np.isfinite(physical(formula(gold), gold).error.mean)

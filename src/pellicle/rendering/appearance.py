@@ -23,6 +23,8 @@ CHANNELS = np.array([650.0, 550.0, 450.0])
 """Wavelengths (nm) of red, green and blue, at which a renderer's indices per channel are taken."""
 OPAQUE = 1e-4
 """Extinction above which a substrate is opaque: visible light enters it by less than half a millimetre."""
+_ABSORBED = 1e-3
+"""Share of light absorbed in a layer above which it is said to absorb; 200 nm of TiO2 have 8e-5."""
 FILM = "film"
 """Name of the layer whose thickness may vary."""
 
@@ -60,8 +62,8 @@ class Appearance:
 
     @property
     def index(self) -> float:
-        """Refractive index of the layer at 550 nm."""
-        return float(self.layer[1].real)
+        """Refractive index of the layer at 550 nm, at least 1 as in all formats: gold has less."""
+        return max(float(self.layer[1].real), 1.0)
 
     def spectra(self, wavelength: np.ndarray, thickness: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """Reflectance (angles, thicknesses, wavelengths); wavelengths and thicknesses in nm, degrees."""
@@ -92,7 +94,7 @@ def appearance(scene: Scene, thickness: Any = None, layer: str | None = None) ->
     colour, bands = interference_colours(scene, nm, ANGLES, FILM), integration_bands(BANDS)
     n0, n2 = (index_of(medium, bands.wavelength) for medium in (scene.ambient, scene.substrate.material))
     own, base = (index_of(medium, CHANNELS) for medium in (film.material, scene.substrate.material))
-    xyz, left_out = np.swapaxes(np.asarray(colour.xyz), 0, 1), _left_out(scene, film)
+    xyz, left_out = np.swapaxes(np.asarray(colour.xyz), 0, 1), _left_out(scene, film, nm[-1])
     return Appearance(nm, xyz, own, base, bare_colour(n0, n2), scene, index_free=index_free, **left_out)
 
 
@@ -109,8 +111,11 @@ def index_of(medium: AbstractDispersion, wavelength: np.ndarray) -> np.ndarray:
     return np.broadcast_to(re + (0j if im is None else 1j * np.asarray(im)), wavelength.shape)
 
 
-def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
-    """The sentences `notes` and `lacking` of an `Appearance`, and whether it is `coherent`."""
+def _left_out(scene: Scene, film: Layer, thickest: float) -> dict[str, Any]:
+    """The sentences `notes` and `lacking` of an `Appearance`, and whether it is `coherent`.
+
+    The film is `thickest` nm thick at most.
+    """
     instrument, own = scene.instrument, scene.substrate
     coherent = sum(isinstance(x, Layer | Interface) for x in scene.layers)
     plates = own.back is not None or any(isinstance(x, Plate) for x in scene.layers)
@@ -121,7 +126,7 @@ def _left_out(scene: Scene, film: Layer) -> dict[str, Any]:
         "interfaces with a roughness in nm are part of its colours": rough,
         "the spread of its thickness is part of its colours": uneven,
     }
-    absorbs = np.max(np.imag(index_of(film.material, CHANNELS))) > 0
+    absorbs = np.max(4 * np.pi * np.imag(index_of(film.material, CHANNELS)) / CHANNELS) * thickest > _ABSORBED
     immersed = np.max(np.abs(index_of(scene.ambient, CHANNELS) - 1.0)) > 1e-3
     lacking = {
         f"the film has {coherent} layers: formats have one": coherent > 1,
