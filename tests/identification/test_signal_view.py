@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.identification.problem import Metric
+from pellicle.identification.problem import Metric, Problem
 from pellicle.identification.signal_view import SLOTS, SignalView, compared_points
 from tests import by_tmm
 
@@ -65,6 +65,15 @@ def test_neighbours_are_averaged_where_fringes_allow_it():
     assert 100 < len(few) <= 160
     np.testing.assert_allclose(few.values, np.interp(few.wavelength, spectrum.wavelength, spectrum.values))
     assert len(compared_points(spectrum, 60_000.0)) > 300
+
+
+def test_a_measured_depolarisation_is_left_out():
+    light = pl.Light(angle=65.0, signal="psi-delta")
+    window = pl.Scene(pl.Layer(2.1, 180.0), pl.Substrate("BK7", back="air"), light=light)
+    measured = pl.simulate(window, NM)
+    assert measured.depolarisation is not None
+    problem = Problem((SignalView(compared_points(measured, 2000.0), window),), 3000.0)
+    assert {x.change.size for x in problem.instrument} == {3 * NM.size}
 
 
 def test_a_metric_is_the_inverse_of_noise_and_columns():

@@ -241,6 +241,7 @@ def compared_points(spectrum: Spectrum, widest_path: float, most: int = MOST_POI
 
     `widest_path` (nm) is the optical path of the closest fringes; each keeps 8 points.
     """
+    spectrum = replace(spectrum, depolarisation=None, depolarisation_sigma=None)  # of which no use is made
     kind: Any = spectrum.kind
     rows = []
     for own in settings_of(spectrum):
@@ -260,7 +261,7 @@ def compared_points(spectrum: Spectrum, widest_path: float, most: int = MOST_POI
         )
 
     angle = None if spectrum.angle is None else mean(spectrum.angle)
-    fresh = dict.fromkeys(("sigma", "delta_sigma", "depolarisation", "depolarisation_sigma", "lines"))
+    fresh = dict.fromkeys(("sigma", "delta_sigma", "lines"))
     averaged = kind.averaged(mean(coordinates))
     return replace(spectrum, **{**fresh, "wavelength": mean(spectrum.wavelength), "angle": angle, **averaged})
 
