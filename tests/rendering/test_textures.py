@@ -64,8 +64,15 @@ def test_images_are_read(tmp_path, refuses):
     refuses(UsageError, "α .GGX. from 0 to 1", roughness_image, [[1.5]])
     np.save(tmp_path / "alpha.npy", np.array([[-0.1]]))
     refuses(DataError, r"alpha\.npy: must have roughnesses", roughness_image, tmp_path / "alpha.npy")
-    Image.new("RGB", (2, 2)).save(tmp_path / "colour.png")
-    refuses(DataError, r"colour\.png: must have the shape", mapped_film, tmp_path / "colour.png")
+    for mode in ("RGB", "P", "LA"):
+        Image.new(mode, (2, 2)).save(tmp_path / "colour.png")
+        refuses(
+            DataError, r"colour\.png: .* \(it has a palette or several ", mapped_film, tmp_path / "colour.png"
+        )
+    Image.new("1", (2, 2), 1).save(tmp_path / "bit.png")
+    np.testing.assert_array_equal(roughness_image(tmp_path / "bit.png"), 1)
+    Image.fromarray(np.float32([[0.25]])).save(tmp_path / "float.tif")
+    np.testing.assert_array_equal(roughness_image(tmp_path / "float.tif"), 0.25)
 
 
 def written(to, folder, **maps):

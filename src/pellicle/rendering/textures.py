@@ -35,9 +35,13 @@ def read_image(path: str | os.PathLike[str], argument: str, largest: bool = Fals
             from PIL import Image  # a requirement of Matplotlib
 
             with Image.open(path) as image:
+                grey = image.convert("L") if image.mode == "1" else image  # else its white is 1
+                # a pixel of a palette (P) is the number of its colour
+                if len(grey.getbands()) > 1 or grey.mode == "P":
+                    raise ValueError("it has a palette or several channels")
                 # Pillow opens some grey images of 16 bits as integers of 32
-                white = 255 if image.mode in ("1", "L") else 65535
-                values = np.asarray(image) / (white if largest else 1)
+                white = {"L": 255, "F": 1}.get(grey.mode, 65535)
+                values = np.asarray(grey) / (white if largest else 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise DataError(
