@@ -1,6 +1,7 @@
 """`pellicle identify`: JSON, recipes that a fit takes, and messages."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,3 +81,12 @@ def test_what_is_missing_is_said(pellicle, film):
         ((film,), "is named twice"),
     ):
         assert message in pellicle("identify", film, *flags, "--substrate", "Si", code=2).err
+
+
+def test_a_delta_without_its_sign_is_named_and_written_to_the_recipe(pellicle, tmp_path):
+    """Of 100 nm by WVASE: nothing but the fit shows that Δ is folded, as 11 points an angle have no kink."""
+    path, flags = Path("measurements/wvase/cauchy_100nm.txt"), ("--among", "SiO2", "--allow", "layers=1")
+    told = pellicle("identify", path, "--substrate", "Si", *flags, "--out", tmp_path / "out", code=0)
+    assert "The sign of Δ seems not to have been measured" in " ".join(told.out.split())
+    assert "folded = true" in (tmp_path / "out" / "1.toml").read_text()
+    assert abs(pl.read_recipe(tmp_path / "out" / "1.toml").scene().layers[0].thickness.start - 100) < 0.5

@@ -37,6 +37,7 @@ _ANGLES = (
     "Spectra without an angle of incidence were compared at one: if they are of several, state each, as"
     " `angle` of its spectrum or in the order of the files, as in --angle 8,60."
 )
+_FOLDED = "The sign of Δ seems not to have been measured: Δ was taken as folded into 0 to 180°."
 _SCREEN, _MISTAKES = 1.5, 2
 """Ratio of χ² of the best film of the catalogue with a mistake to that as stated, up to which it is tried,
 and number of mistakes that are. Of 12 mistakes that explained data 11 had less than 0.25 and one 1.2, as a
@@ -58,6 +59,8 @@ def identified(spectra: Sequence[Spectrum], request: Request, began: float) -> I
     found = _identified(spectra, request, began, deadline)
     if found.status is Outcome.NONE and len(spectra) > 1 and any(x.angle is None for x in spectra):
         found = replace(found, verdict=f"{found.verdict} {_ANGLES}")
+    if any(x.folded for x in found.data) and not any(x.folded for x in spectra):
+        found = replace(found, verdict=f"{found.verdict} {_FOLDED}")
     if time.monotonic() < deadline:
         return found
     ended = f"The budget of {request.budget:g} s ended before all was tried."

@@ -118,6 +118,12 @@ def write_identification(
     if any(x.left_out is not None for x in found.data):
         nm = np.concatenate([x.wavelength for x in found.data])
         options["range"] = [float(nm.min()), float(nm.max())]
+    if all(x.folded for x in found.data):
+        options["folded"] = True
+    elif folded := {x.path for x in found.data if x.folded}:
+        known = {x["path"]: x for x in tables}
+        own = [known.get(path, {"path": path}) for path in files]
+        tables = [x | {"folded": True} if x["path"] in folded else x for x in own]
     stated = {name: x for name, x in options.items() if name in ("signal", "polarisation", "transmission")}
     for number, x in enumerate(found.hypotheses, 1):
         scene = x.scene()
