@@ -166,6 +166,7 @@ def test_an_uneven_film_takes_its_thickness_from_an_image(tmp_path):
     mi.set_variant("scalar_rgb")
     load_plugin(made.files)
     scene = mi.load_file(str(made.files[3]))
+    assert "ball.bsdf.thickness.data" in mi.traverse(scene)  # as the documentation has it
     [bsdf] = [shape.bsdf() for shape in scene.shapes() if "pellicle_film" in str(shape.bsdf())]
     si = mi.SurfaceInteraction3f()
     si.wi, si.uv = mi.Vector3f(0, 0, 1), mi.Point2f(0.5 + 0.5 / 8, 0.5)  # the middle of the fifth column
