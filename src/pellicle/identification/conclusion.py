@@ -239,12 +239,12 @@ def _hypothesis(growth: Growth, x: Weighed, condition: str) -> Hypothesis:
     )
     values = problem.by_channel(x.attempt.values)
     return Hypothesis(
-        _name(x), layers, x.ln_z, x.remaining, x.adequate, problem.views[0].around,
+        name_of(x), layers, x.ln_z, x.remaining, x.adequate, problem.views[0].around,
         tuple(view.quantities(own.ravel()) for view, own in values), instrument, condition,
     )  # fmt: skip
 
 
-def _name(x: Weighed) -> str:
+def name_of(x: Weighed) -> str:
     """Name of a structure; one of a native oxide alone is bare."""
     if len(x.x) == 1 and x.structure.layers[0].most == BARE:
         return "native oxide" if x.x[0] > SIGNIFICANT * x.stderr[0] else "bare substrate"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 from pellicle.fitting.result import Estimate
-from pellicle.identification.conclusion import DECIDED, SEVERAL
+from pellicle.fitting.status import with_error
+from pellicle.identification.conclusion import DECIDED, SEVERAL, name_of
 from pellicle.identification.evidence import Weighed
 from pellicle.identification.growth import BARE
 from pellicle.identification.hypothesis import Hypothesis, NotTried, SupposedLayer
@@ -30,25 +31,25 @@ def verdict(
     `doubt` is the reason for which the first of the hypotheses that are left is not certain, empty for none;
     `alike` are then those of them that are the same film.
     """
+    far = [x for x in excluded if kept and kept[0].ln_z - x.ln_z >= DECIDED]
+    unlike = _unlike(kept, far)
     if not kept:
-        name, size = nearest.excess
+        (name, size), own = nearest.excess, name_of(nearest)
+        closest = "the bare substrate" if own == "bare substrate" else f"{own} on {substrate}"
         sentences = [
             "No hypothesis that was tried describes the data within usual errors.",
-            f"The nearest, {nearest.structure.name} on {substrate}, leaves residuals of"
-            f" {nearest.remaining:.2g} times the noise and needs an error of {name} of {size:.2g} times its"
-            " usual size.",
+            f"The nearest, {closest}, leaves residuals of {nearest.remaining:.2g} times the noise and needs"
+            f" an error of {name} of {size:.2g} times its usual size.",
         ]
     elif not doubt:
-        sentences = [f"{_sentence(_named(alike), substrate)}.", *_effects(kept[0], excluded)]
-        rest = [f"{x.name} ({x.probability:.1%})" for x in kept if all(x is not y for y in alike)]
+        sentences = [f"{_sentence(_named(alike), substrate, unlike)}.", *_effects(kept[0], excluded)]
+        rest = [x for x in kept if all(x is not y for y in alike)]
+        rest = [f"{x.name} ({100 * x.probability:.1f} %)" for x in rest]
         sentences += [f"Less probable: {', '.join(rest[:_SHOWN])}."] if rest else []
     else:
-        sentences = _undecided(kept, substrate, doubt)
-    if kept and excluded:
-        best = kept[0].ln_z
-        far = [x for x in excluded if best - x.ln_z >= DECIDED]
-        rows = [f"{x.name} (Δ ln Z {best - x.ln_z:.0f})" for x in far[:_SHOWN]]
-        sentences += [f"Excluded: {', '.join(rows)}."] if rows else []
+        sentences = _undecided(kept, substrate, doubt, unlike)
+    rows = [f"{x.name} (Δ ln Z {kept[0].ln_z - x.ln_z:.0f})" for x in far if not _freely(x, kept[0])]
+    sentences += [f"Excluded: {', '.join(rows[:_SHOWN])}."] if rows else []
     if left_out:
         names = ", ".join(x.material for x in left_out[:_SHOWN])
         more = f" and {len(left_out) - _SHOWN} more" if len(left_out) > _SHOWN else ""
@@ -56,21 +57,25 @@ def verdict(
     return " ".join(sentences)
 
 
-def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str) -> list[str]:
+def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str, unlike: Container[str]) -> list[str]:
+    best = _sentence(kept[0], substrate, unlike)
     names = [x.name for x in kept]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     if kept[0].condition:
+        others = [f"{x.name} ({100 * x.probability:.0f} %)" for x in kept[1 : _SHOWN + 1]]
+        rest = f" and {len(kept) - 1 - _SHOWN} more" if len(kept) - 1 > _SHOWN else ""
         return [
             "No hypothesis describes the data as they are stated.",
-            f"If {kept[0].condition}, they may be of this: {_lower(_sentence(kept[0], substrate))}.",
+            f"If {kept[0].condition}, they may be of this: {_lower(best)}.",
+            *([f"Also left: {', '.join(others)}{rest}."] if others else []),
         ]
     if doubt != SEVERAL:
-        only = f"One answer is left, but is not certain, as {doubt}: {_lower(_sentence(kept[0], substrate))}."
+        only = f"One answer is left, but is not certain, as {doubt}: {_lower(best)}."
         return [only, *_effects(kept[0], ())]
     sentences = [f"On {substrate} the data do not decide between these: {', '.join(names[:_SHOWN])}{more}."]
     main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]
     n = min(x.n[0] for x in main), max(x.n[1] for x in main)
-    like = dict.fromkeys(name for x in main for name in x.like[:2])
+    like = dict.fromkeys(name for x in main for name in x.like[:2] if name not in unlike)
     depths = [_interval(x.thickness) for x in main]
     low, high = min(x for x, _ in depths), max(x for _, x in depths)
     if all(x.thickness.value > BARE for x in main) and high < 1.5 * low:
@@ -79,6 +84,24 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str) -> list[s
             f" {low:.4g} to {high:.4g} nm."
         )
     return sentences
+
+
+def _unlike(kept: Sequence[Hypothesis], excluded: Sequence[Hypothesis]) -> set[str]:
+    """Names of films that are excluded where the best hypothesis is one film."""
+    if not kept or len(kept[0].layers) > 1:
+        return set()
+    names = {x.layers[0].material for x in excluded if len(x.layers) == 1}
+    return names - {layer.material for x in kept for layer in x.layers}
+
+
+def _freely(x: Hypothesis, best: Hypothesis) -> bool:
+    """True for the best film again, by a free index or as more than a native oxide, at a higher price."""
+    if len(x.layers) > 1 or len(best.layers) > 1 or best.layers[0].modelled or x.effects != best.effects:
+        return False
+    (own,), (film,) = x.layers, best.layers
+    apart = abs(own.thickness.value - film.thickness.value)
+    known = film.material in own.like and (own.modelled or own.material == film.material)
+    return known and apart < own.thickness.stderr + film.thickness.stderr
 
 
 def _named(alike: Sequence[Hypothesis]) -> Hypothesis:
@@ -99,20 +122,22 @@ def _lower(sentence: str) -> str:
     return sentence[0].lower() + sentence[1:]
 
 
-def _sentence(x: Hypothesis, substrate: str) -> str:
+def _sentence(x: Hypothesis, substrate: str, unlike: Container[str]) -> str:
     if x.name == "bare substrate":
         return f"No film is seen on {substrate}: an oxide is thinner than {_most(x):.2g} nm"
     if x.name == "native oxide":
         return f"{substrate} with a native oxide of {_value(x.layers[0].thickness)}"
-    films = [_film(layer) for layer in x.layers]
+    films = [_film(layer, unlike) for layer in x.layers]
     if len(films) == 1:
         return f"A film {films[0]} on {substrate}"
     return f"{len(films)} layers on {substrate}: " + " on ".join(f"one {film}" for film in films)
 
 
-def _film(layer: SupposedLayer) -> str:
+def _film(layer: SupposedLayer, unlike: Container[str]) -> str:
+    names = [name for name in layer.like if name not in unlike]
+    like = _as(names) or _as(layer.like).replace("as", "near", 1)
     absorbing = f", k {layer.k[0]:.2g} to {layer.k[1]:.2g}" if layer.k[1] > 1e-3 else ""
-    of = f"of index {_range(layer.n)}{absorbing}{_as(layer.like)}"
+    of = f"of index {_range(layer.n)}{absorbing}{like}"
     return f"{of}, {_value(layer.thickness)} thick"
 
 
@@ -148,5 +173,4 @@ def _most(x: Hypothesis) -> float:
 def _value(x: Estimate) -> str:
     if not math.isfinite(x.stderr):
         return f"{x.value:.3g} {x.unit} (not determined)"
-    digits = max(0, 1 - math.floor(math.log10(x.stderr))) if x.stderr > 0 else 3
-    return f"{x.value:.{min(digits, 4)}f} ± {x.stderr:.2g} {x.unit}"
+    return f"{with_error(x.value, x.stderr)} {x.unit}"

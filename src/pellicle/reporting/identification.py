@@ -52,6 +52,7 @@ def rows_of(found: Identification) -> list[tuple[Hypothesis, tuple[str, str, str
     least = max((x.ln_z for x in every), default=0.0)
     for i, x in enumerate(every[: len(found.hypotheses) + SHOWN]):
         numbers = ", ".join(describe(own) for own in x.parameters.values())
+        numbers = f"oxide {numbers}" if x.name == "bare substrate" else numbers
         share = f"{x.probability:.2g}" if i < len(found.hypotheses) else ""
         rows.append((x, (share, f"{x.ln_z - least:.1f}", f"{x.remaining:.3g}", numbers)))
     return rows
