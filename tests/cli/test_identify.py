@@ -78,6 +78,8 @@ def test_what_is_missing_is_said(pellicle, film):
         (("--budget", "-3"), "--budget must be above 0 seconds"),
         (("--family", "metals"), "no family 'metals'"),
         (("--among", "SiO2,Foo"), "unknown material 'Foo'"),
+        (("--among", "SiO2,1.46"), "--among takes materials and files of n and k, not 1.46"),
+        (("--among", "cauchy"), "films of free index are tried beside these"),
         ((film,), "is named twice"),
     ):
         assert message in pellicle("identify", film, *flags, "--substrate", "Si", code=2).err

@@ -29,7 +29,7 @@ def identify(
     among: Annotated[str | None, flag(SCENE, "Materials to try: SiO2,Si3N4.")] = None,
     family: Annotated[
         str | None,
-        flag(SCENE, "Films to try: oxide, nitride, fluoride, polymer, semiconductor or metal; or all."),
+        flag(SCENE, "Films to try: oxide, nitride, fluoride, polymer, semiconductor or metal (all)."),
     ] = None,
     allow: Annotated[
         str | None, flag(SCENE, "Layers, and mistakes to look for (layers=2,calibration,plate,substrate).")
@@ -83,6 +83,7 @@ def _identify(
 ) -> int:
     from pellicle.api.identification import identify as identified
     from pellicle.identification.films import chosen
+    from pellicle.materials import Material
     from pellicle.recipes.media import medium
     from pellicle.reporting.identification import failure, report, to_json, write_identification
 
@@ -91,7 +92,11 @@ def _identify(
             given[name] = medium(given[name], name=f"`{name}`")
     below = medium(substrate, name="`substrate`")
     for material in chosen(given.get("among"), given.get("family")):
-        medium(material, name="`among`")
+        if not isinstance(medium(material, name="`among`"), Material):
+            raise UsageError(
+                f"--among takes materials and files of n and k, not {material}: films of free index are tried"
+                " beside these"
+            )
     several = options.angle if isinstance(options.angle, list) else []
     if several and len(several) != len(paths):
         raise UsageError(

@@ -36,7 +36,8 @@ def chosen(among: Sequence[str] | None, family: str | None) -> list[str]:
         raise UsageError("give `among` or `family`, not both")
     if family is not None and family not in FAMILIES:
         near = did_you_mean(family, FAMILIES)
-        raise UsageError(f"no family {family!r} of films; known: {', '.join(FAMILIES)}{near}")
+        known = ", ".join(FAMILIES)
+        raise UsageError(f"no family {family!r} of films; give one of {known}{near}, or films by `among`")
     return list(among) if among is not None else list(FILMS if family is None else FAMILIES[family])
 
 
