@@ -60,3 +60,20 @@ def test_bad_input_in_one_sentence_before_a_fit(pellicle, scene_recipe, spectrum
     ):
         flags = [word for each in recipes for word in ("--recipe", each)]
         pellicle("compare", path, *flags).refused(code, words)
+
+
+def test_recipes_are_compared_where_all_their_media_are_known(
+    pellicle, scene_recipe, spectrum_file, monkeypatch
+):
+    """PMMA is known from 420 nm on: a film of silica is compared with it from there."""
+    seen = {}
+
+    def check(measured):
+        seen.update(measured)
+        raise ValueError("enough")
+
+    monkeypatch.setattr("pellicle.fitting.comparison.check_same", check)
+    a, b = scene_recipe(name="a.toml"), scene_recipe(name="b.toml", material='"PMMA"')
+    told = pellicle("compare", spectrum_file(), "--recipe", a, "--recipe", b, code=3).err
+    assert [x.wavelength[0] for [x] in seen.values()] == [420, 420]
+    assert told.count("points kept") == 1

@@ -89,7 +89,7 @@ def fitted(
     """Fit as `fit` does; causes of a misfit are looked for where it is to be `explained`."""
     check_measurement(data)
     check_scene(scene, several=True)
-    data, said = _covered(data, scene)
+    data, said = covered_by(data, scene)
     both: Any = data, scene
     if joint.of_both_kinds(scene) or isinstance(scene, Surface):
         refuse("several scenes", shared=shared)
@@ -104,7 +104,7 @@ def fitted(
     return replace(of_film, warnings=(*said, *of_film.warnings))
 
 
-def _covered(data: Any, *scenes: Any) -> tuple[Any, list[str]]:
+def covered_by(data: Any, *scenes: Any) -> tuple[Any, list[str]]:
     """Measurements without the points that a medium does not cover, and what was left out.
 
     Each of `scenes` is one for all measurements, or a list of one for each.
@@ -155,7 +155,7 @@ def sample(
         refuse("a Scene", residual=residual)
     if joint.of_both_kinds(scene) or isinstance(scene, Surface):
         refuse("several scenes", shared=shared)
-    data, _ = _covered(data, scene)
+    data, _ = covered_by(data, scene)
     subject = subject_of(data, scene, tolerance, residual, progress, shared)
     return sampled(subject, walkers, steps, seed, chain, progress, began)
 
@@ -194,7 +194,7 @@ def compare(
     if not isinstance(scenes, Mapping):
         raise UsageError("`scenes` must have names, as in {'oxide': scene, 'nitride': other}")
     own = shared_by_each(scenes, shared)
-    measured, _ = _covered(data, *scenes.values())
+    measured, _ = covered_by(data, *scenes.values())
 
     def of(name: str, explained: bool) -> Fit:
         options = own[name], tolerance, LEAST_SQUARES, residual, progress, explained

@@ -122,7 +122,7 @@ def _compare(
 ) -> int:
     """Compare the fits of one group of files, print and write the result with what repeats it, and return its
     exit code."""
-    from pellicle.api.fits import fitted
+    from pellicle.api.fits import covered_by, fitted
     from pellicle.fitting.comparison import best_explained, check_same
     from pellicle.reporting.comparison import failure, report, to_json, write_comparison
 
@@ -140,6 +140,10 @@ def _compare(
             name: measurement(files, len(files) > 1, say if name == first else None)
             for name, files in groups.items()
         }
+        seen = [scene for _, scene in problems.values()]
+        cut = {name: covered_by(data, *seen) for name, (data, _) in problems.items()}
+        say(*(f"{label}: {sentence}" for sentence in cut[first][1]))
+        problems = {name: (cut[name][0], scene) for name, (_, scene) in problems.items()}
         check_same({n: data if isinstance(data, list) else [data] for n, (data, _) in problems.items()})
         comparison = best_explained(candidates, fitted_by)
     except ValueError as error:
