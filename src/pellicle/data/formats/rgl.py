@@ -250,7 +250,7 @@ def _channels(
     """Weights (channels, stored) of the stored channels in those that are read, and a description."""
     if brdf.wavelengths is None:
         told = "R, G, B of linear sRGB"
-        return np.eye(3), told + ("" if bands else ', at wavelengths: give the surface sensor = "srgb"')
+        return np.eye(3), told + ("" if bands else ', which are bands: give the surface sensor = "srgb"')
     wanted = np.array(bands[0] if bands else WAVELENGTHS if wavelengths is None else wavelengths, dtype=float)
     first, last = brdf.wavelengths[[0, -1]]
     stored = [np.interp(wanted, brdf.wavelengths, row) for row in np.eye(brdf.wavelengths.size)]
