@@ -143,7 +143,8 @@ class Surface:
     - `uncertainty`: a `SurfaceUncertainty` of what the surface states or leaves out; it enters the errors of
       a fit.
 
-    **Raises:** UsageError for an unknown name or key, and where the count of numbers does not match;
+    **Raises:** UsageError for an unknown name or key, a number that no surface has, and where the count of
+    numbers does not match;
     ValueError for an unknown medium, or one without data at a wavelength.
 
     >>> surface = Surface("microfacet-film", {"thickness": Free(0, 500), "n": [1.5, 1.52, 1.54]}, base="Si")
@@ -178,6 +179,7 @@ class Surface:
                 raise UsageError(f"{key}: {count} numbers for bands of wavelengths; give one, or a medium")
             if count not in (1, self.channels):
                 raise UsageError(f"{key}: {count} numbers for {self.channels} wavelengths; give one or each")
+            _check_sign(next(p for p in self.brdf.parameters if p.key == key), value)
         _ = self.bands, self.media
 
     @property
@@ -261,6 +263,21 @@ class Surface:
         """Return the surface with its free numbers fixed at their start values."""
         start = {key: x.start if isinstance(x, Free) else x for key, x in self.numbers.items()}
         return replace(self, numbers=start)
+
+
+def _check_sign(parameter: Parameter, value: Any) -> None:
+    """Raise UsageError for a number that no surface has, such as a negative thickness."""
+    key, free = parameter.key, isinstance(value, Free)
+    try:
+        numbers = np.asarray(value.lower if free else value, float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{key} must be a number, got {value!r}") from None
+    if not free and not np.all(np.isfinite(numbers)):
+        raise UsageError(f"{key} must be finite, got {value}")
+    if parameter.lower >= 0 and np.any(numbers < 0):
+        raise UsageError(f"{key} must not be negative, got {np.min(numbers):g} {parameter.unit}".rstrip())
+    if parameter.lower > 0 and not free and np.any(numbers == 0):
+        raise UsageError(f"{key} must be above 0")
 
 
 VIEW_DIRECTIONS = 256
