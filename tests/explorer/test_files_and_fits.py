@@ -1,6 +1,7 @@
 """Data files and fits of the explorer's session."""
 
 import base64
+import dataclasses
 import threading
 
 import numpy as np
@@ -11,6 +12,8 @@ from pellicle.cli.explore import LightFlags, SceneFlags, _session
 from pellicle.explorer import dropped_files
 from pellicle.explorer import session as session_module
 from pellicle.explorer.session import Session
+from pellicle.fitting.result import Estimate
+from pellicle.identification.hypothesis import Hypothesis, Identification, Outcome, SupposedLayer
 from pellicle.scene.free import Free
 
 NM = np.linspace(400.0, 800.0, 128)
@@ -243,6 +246,28 @@ def test_a_film_is_identified_and_shown(session):
     assert np.abs(np.interp(NM, curve["x"], curve["y"]) - titania.values).max() < 0.02
     session.answer("data", {"name": "film.csv", "text": GOOD})
     assert "error" in session.answer("hypothesis", {"number": 0})  # of other data
+
+
+def test_a_film_is_identified_from_all_points_and_shown_with_its_folded_delta(monkeypatch):
+    """PMMA, which the scene has, is known from 420 nm on; the film that is found has no such limit."""
+    nm, light = np.linspace(390, 800, 40), pl.Light(angle=65.0, signal="psi-delta")
+    true = pl.simulate(pl.Scene(pl.Layer("SiO2", 100.0), "Si", light=light), nm)
+    data = dataclasses.replace(true, delta=180 - np.abs(180 - true.delta), folded=False, path="film.csv")
+    session = Session(pl.Scene(pl.Layer("PMMA", pl.Free(50, 200)), "Si", light=light), spectra=[data])
+
+    def found(spectra, scene, values):
+        assert [len(x) for x in spectra] == [40]
+        thickness = Estimate("thickness", 100.0, 1.0, "nm", 50.0, 200.0, free=True, stderr_noise=0.1)
+        layer = SupposedLayer("SiO2", ("SiO2",), (1.45, 1.47), (0.0, 0.0), (thickness,))
+        best = Hypothesis("SiO2", (layer,), 0.0, 1.0, True, scene)
+        folded = dataclasses.replace(data, folded=True)
+        return Identification(Outcome.IDENTIFIED, (best,), (), (), "", (folded,), (np.ones(2),))
+
+    monkeypatch.setattr(session_module, "identification", found)
+    assert session.answer("identify", {})["status"] == "identified"
+    assert "error" not in session.answer("hypothesis", {"number": 0})
+    assert session.shown.reading["folded"]
+    assert [x.folded for x in session.shown.spectra] == [True]
 
 
 def test_files_of_a_recipe_are_shown_in_turn_with_their_own_angles(tmp_path, write):

@@ -5,6 +5,7 @@ import time
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from logging import getLogger
 from pathlib import Path
@@ -77,6 +78,7 @@ class Session:
         self._ahead = False  # whether programs are compiled before a view needs them
         self._compiler, self._fit_run = Compiler(), FitRun()
         self._hypotheses: tuple[Hypothesis, ...] = ()  # those that the data leave
+        self._folded: tuple[bool, ...] = ()  # of each spectrum, as it was identified
         self._requests: dict[str, Callable[[Mapping[str, Any]], dict[str, Any]]] = {
             "scene": self._scene,
             "view": self._view,
@@ -158,11 +160,10 @@ class Session:
         view = self.shown.at(body)
         if not self.shown.spectra or isinstance(view, SurfaceExplorerView):
             raise UsageError("there are no data to identify: open a file of a spectrum first")
-        values = values_of(view, body)
-        spectra = all_covered(self.shown.spectra, view.scene)
+        values, spectra = values_of(view, body), self.shown.spectra
         found = self._fit_run.alone(lambda: identification(spectra, view.scene, values))
         assert found is not None  # nothing stops it
-        self._hypotheses = found.hypotheses
+        self._hypotheses, self._folded = found.hypotheses, tuple(bool(x.folded) for x in found.data)
         return identification_to_json(found)
 
     def _take_hypothesis(self, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,10 +171,12 @@ class Session:
         number = body.get("number")
         if type(number) is not int or number not in range(len(self._hypotheses)):
             raise UsageError(f"no hypothesis {number!r}: ask which film it is first")
-        kept = self._hypotheses
-        answer = self.shown.take(
-            self.shown.measured(kept[number].scene()), self.shown.spectra, self.shown.reading
-        )
+        kept, reading = self._hypotheses, self.shown.reading
+        if any(self._folded):
+            pairs = zip(self.shown.spectra, self._folded, strict=True)
+            self.shown.spectra = [replace(x, folded=True) if own else x for x, own in pairs]
+            reading = {**reading, "folded": True}
+        answer = self.shown.take(self.shown.measured(kept[number].scene()), self.shown.spectra, reading)
         self._hypotheses, self.shown.edited = kept, True
         return answer
 
