@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -132,7 +133,12 @@ def write_identification(
         contents[f"{number}.toml"] = recipe_text(
             scene, target, files=[] if tables else files, reading=options, tables=tables
         )
-    return write_result(target, to_json(found), contents | {"figure.png": draw(found)})
+    write_result(target, to_json(found), contents | {"figure.png": draw(found)})
+    for number in count(len(found.hypotheses) + 1):  # recipes of an earlier result
+        if not (old := target / f"{number}.toml").exists():
+            break
+        old.unlink()
+    return target
 
 
 def identification_page(found: Identification) -> str:
