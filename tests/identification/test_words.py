@@ -1,5 +1,8 @@
 """Verdicts of made hypotheses."""
 
+import dataclasses
+import math
+
 import pellicle as pl
 from pellicle.fitting.result import Estimate
 from pellicle.identification.evidence import Weighed
@@ -45,3 +48,9 @@ def test_probabilities_of_all_that_are_left_are_in_the_verdict():
     said = told([film("SiO2", ("SiO2",), 0.0, condition=why), rare], [], why)
     assert f"If {why}, they may be of this: a film of index" in said
     assert "Also left: PMMA (1 %)." in said
+
+
+def test_an_oxide_that_nothing_bounds_is_not_thinner_than_nothing():
+    for error, said in ((1.0, "No film is seen on Si: an oxide is thinner than 3.6 nm."), (math.inf, "Si.")):
+        bare = dataclasses.replace(film("SiO2", (), 0.0, depth=2.0, error=error), name="bare substrate")
+        assert told([bare], []).endswith(said)

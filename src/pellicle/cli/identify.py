@@ -124,7 +124,8 @@ def _identify(
     stated = {name: x for name, x in options.given().items() if x is not None and name != "angle"}
     tables = [{"path": path, "angle": angle} for path, angle in zip(paths, several, strict=False)]
     write = partial(write_identification, Path(out), found, stated, tables)
-    return max(code, written(write, f"{out}: report and recipes written"))
+    what = "report and recipes" if found.hypotheses else "report"
+    return max(code, written(write, f"{out}: {what} written"))
 
 
 def _spectra(path: str, options: FileOptions) -> list[Spectrum]:

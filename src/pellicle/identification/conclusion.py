@@ -204,7 +204,7 @@ def hypotheses(growth: Growth, weighed: Sequence[Weighed], condition: str = "") 
     found = [_hypothesis(growth, x, condition) for x in weighed]
     names = [x.name for x in found]
     found = [
-        replace(x, name=f"{x.name}, {' and '.join(f'{y.thickness.value:.3g}' for y in x.layers)} nm")
+        replace(x, name=f"{x.name}, {' and '.join(_digits(y.thickness.value) for y in x.layers)} nm")
         if names.count(x.name) > 1
         else x
         for x in found
@@ -212,6 +212,10 @@ def hypotheses(growth: Growth, weighed: Sequence[Weighed], condition: str = "") 
     return [
         replace(x, probability=float(p)) for x, p in zip(found, shares / max(shares.sum(), 1.0), strict=True)
     ]
+
+
+def _digits(nm: float) -> str:
+    return f"{nm:.3g}" if nm < 999.5 else f"{nm:.0f}"
 
 
 def answer(alike: Sequence[Hypothesis]) -> Hypothesis:

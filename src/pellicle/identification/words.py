@@ -124,7 +124,9 @@ def _lower(sentence: str) -> str:
 
 def _sentence(x: Hypothesis, substrate: str, unlike: Container[str]) -> str:
     if x.name == "bare substrate":
-        return f"No film is seen on {substrate}: an oxide is thinner than {_most(x):.2g} nm"
+        own = x.layers[0].thickness
+        most = f": an oxide is thinner than {own.value + 1.645 * own.stderr:.2g} nm"
+        return f"No film is seen on {substrate}{most if math.isfinite(own.stderr) else ''}"
     if x.name == "native oxide":
         return f"{substrate} with a native oxide of {_value(x.layers[0].thickness)}"
     films = [_film(layer, unlike) for layer in x.layers]
@@ -163,11 +165,6 @@ def _range(n: tuple[float, float]) -> str:
 def _interval(x: Estimate) -> tuple[float, float]:
     reach = x.stderr if math.isfinite(x.stderr) else 0.0
     return max(x.value - reach, 0.0), x.value + reach
-
-
-def _most(x: Hypothesis) -> float:
-    own = x.layers[0].thickness
-    return own.value + 1.645 * (own.stderr if math.isfinite(own.stderr) else own.value)
 
 
 def _value(x: Estimate) -> str:
