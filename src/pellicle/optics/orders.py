@@ -76,11 +76,16 @@ def _damped_sum(first: Number, q: Number, phase: Any, window: Window, count: int
     return 2 * total
 
 
+def _not_returned(gamma: Any) -> Any:
+    """1 − γ, above 0 where a layer between equal media returns all light at grazing incidence."""
+    return jnp.maximum(1 - gamma, jnp.finfo(gamma.dtype).eps)
+
+
 def reflectance(series: AirySeries, window: Window, count: int) -> Any:
     """Return |r|² with `count` orders damped by `window`."""
     beta = series.lower * series.damping
     into = 1 - series.upper * series.upper
-    echo = abs2(into) * abs2(beta) / (1 - abs2(series.upper * beta))
+    echo = abs2(into) * abs2(beta) / _not_returned(abs2(series.upper * beta))
     first = beta * (into * conj(series.upper) - series.upper * echo)
     orders = _damped_sum(first, -(series.upper * beta), series.phase, window, count)
     return abs2(series.upper) + echo + orders
@@ -90,7 +95,7 @@ def transmittance(series: AirySeries, window: Window, count: int) -> Any:
     """Return the power into the substrate with `count` orders damped by `window`."""
     q = -(series.upper * series.lower * series.damping)
     orders = _damped_sum(q, q, series.phase, window, count)
-    return series.direct * series.damping / (1 - abs2(q)) * (1 + orders)
+    return series.direct * series.damping / _not_returned(abs2(q)) * (1 + orders)
 
 
 def monochromatic(order: int) -> float:
