@@ -284,7 +284,11 @@ def test_what_cannot_be_identified(refuses):
         (spectrum, {"among": ["SiO3"]}, "SiO3"),
         (spectrum, {"layers": 3}, "`layers` must be 1 or 2"),
         (spectrum, {"allow": ["lamp"]}, "`allow` must be of calibration, plate"),
+        (spectrum, {"among": "SiO2"}, "`among` must be a list of names"),
+        (spectrum, {"allow": "plate"}, "`allow` must be a list"),
+        (spectrum, {"budget": 0}, "`budget` must be above 0 seconds"),
         ([], {}, "a list of spectra"),
     ):
         refuses(ValueError, message, pl.identify, data, "Si", **given)
     refuses(ValueError, "Sil", pl.identify, spectrum, "Sil")
+    refuses(ValueError, "must be known, without free numbers", pl.identify, spectrum, pl.Free(3.0, 4.0))

@@ -14,6 +14,7 @@ from pellicle.identification.hypothesis import Identification
 from pellicle.identification.identify import identified
 from pellicle.identification.request import Request
 from pellicle.scene.film import Light
+from pellicle.scene.free import is_free
 from pellicle.scene.layers import MediumLike, Substrate, medium
 
 
@@ -65,12 +66,16 @@ def identify(
     ```
     """
     began = time.perf_counter()
+    check_measurement(data)
     spectra = [data] if isinstance(data, Spectrum) else list(data)
-    check_measurement(spectra)
     if not spectra or not all(isinstance(x, Spectrum) for x in spectra):
         raise UsageError("`data` must be a spectrum, or a list of spectra of one sample")
     if layers not in (1, 2):
         raise UsageError(f"`layers` must be 1 or 2, not {layers!r}")
+    if isinstance(allow, str):
+        raise UsageError(f"`allow` must be a list, as in [{allow!r}]")
+    if budget is not None and not budget > 0:
+        raise UsageError(f"`budget` must be above 0 seconds, not {budget!r}")
     if unknown := [x for x in allow if x not in CONDITIONS]:
         raise UsageError(f"`allow` must be of {', '.join(CONDITIONS)}, not {unknown[0]!r}")
     below = substrate if isinstance(substrate, Substrate) else Substrate(substrate, back=back)
@@ -78,5 +83,7 @@ def identify(
         below, medium(ambient), Light(angle=angle), tuple(films.chosen(among, family)), layers, tuple(allow),
         float("inf") if budget is None else budget,
     )  # fmt: skip
+    if any(map(is_free, jax.tree_util.tree_leaves(request.around(), is_leaf=is_free))):
+        raise UsageError("`substrate`, `ambient`, `back` and `angle` must be known, without free numbers")
     with jax.enable_x64(True):
         return identified(spectra, request, began)
