@@ -42,6 +42,7 @@ def test_tables_lack_nothing_that_formulas_lack(tmp_path, monkeypatch):
     assert written.material.look.notes == ()
     lacking = [note.split(":")[0] for note in written.material.look.lacking]
     assert lacking == ["the film has 2 layers", "the layer absorbs"]
+    assert "formats have one, here low of 20 nm" in written.material.look.lacking[0]
 
 
 def test_gold_has_the_least_index_of_formats_and_titania_absorbs_nothing():

@@ -129,7 +129,8 @@ def _left_out(scene: Scene, film: Layer, thickest: float) -> dict[str, Any]:
     absorbs = np.max(4 * np.pi * np.imag(index_of(film.material, CHANNELS)) / CHANNELS) * thickest > _ABSORBED
     immersed = np.max(np.abs(index_of(scene.ambient, CHANNELS) - 1.0)) > 1e-3
     lacking = {
-        f"the film has {coherent} layers: formats have one": coherent > 1,
+        f"the film has {coherent} layers: formats have one, here {film.name or 'that'} of {thickest:.4g} nm;"
+        " the argument layer chooses it": coherent > 1,
         "the layer absorbs: formats have none that does": absorbs,
         "it is not in air, as formats assume": immersed,
     }
