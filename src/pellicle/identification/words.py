@@ -96,9 +96,10 @@ def _unlike(kept: Sequence[Hypothesis], excluded: Sequence[Hypothesis]) -> set[s
 
 def _freely(x: Hypothesis, best: Hypothesis) -> bool:
     """True for the best film again, by a free index or as more than a native oxide, at a higher price."""
-    if len(x.layers) > 1 or len(best.layers) > 1 or best.layers[0].modelled or x.effects != best.effects:
+    several = max(len(x.layers), len(best.layers)) > 1
+    if several or best.layers[0].modelled or x.effects != best.effects:
         return False
-    (own,), (film,) = x.layers, best.layers
+    own, film = x.layers[0], best.layers[0]
     apart = abs(own.thickness.value - film.thickness.value)
     known = film.material in own.like and (own.modelled or own.material == film.material)
     return known and apart < own.thickness.stderr + film.thickness.stderr

@@ -125,7 +125,7 @@ def write_identification(
     elif folded := {x.path for x in found.data if x.folded}:
         known = {x["path"]: x for x in tables}
         own = [known.get(path, {"path": path}) for path in files]
-        tables = [x | {"folded": True} if x["path"] in folded else x for x in own]
+        tables = [{**x, "folded": True} if x["path"] in folded else x for x in own]
     stated = {name: x for name, x in options.items() if name in ("signal", "polarisation", "transmission")}
     for number, x in enumerate(found.hypotheses, 1):
         scene = x.scene()
