@@ -235,7 +235,7 @@ def _sides(
     layers: list[Any] = list(films.layers)
     layers[films.varied] += step
     films = films._replace(layers=tuple(layers))
-    n0, n2 = (np.asarray(to_complex(x)).real.astype(float) for x in (films.ambient, films.substrate))
+    n0, n2 = (np.asarray(np.real(to_complex(x)), float) for x in (films.ambient, films.substrate))
     bands = len(every) - len(wavelength)
     above, eta = (float(np.interp(550.0, every[:bands], x[:bands])) for x in (n0, n2 / n0))
     if not look.metallic:  # light from below would gain energy at grazing incidence in a base that absorbs
