@@ -215,7 +215,8 @@ def _other_glasses(spectra: Sequence[Spectrum], request: Request) -> Iterator[_S
     """Other glasses in place of a glass that is stated: each in words, with spectra and request."""
     view, below = SignalView(spectra[0], request.around()), request.substrate
     stated: Any = view.index_of(below.material)
-    for name in GLASSES if "substrate" in request.conditions and stated.real.max() < _GLASSY else ():
+    glassy = stated.real.max() < _GLASSY and stated.imag.max() < 0.1  # gold has n below 1.7
+    for name in GLASSES if "substrate" in request.conditions and glassy else ():
         index = view.index_of(medium(name))
         if np.all(np.isfinite(index)) and abs(index.mean() / stated.mean() - 1) > _ANOTHER:
             other = replace(request, substrate=replace(below, material=medium(name)))

@@ -162,6 +162,7 @@ def identification_page(found: Identification) -> str:
         head=HEAD,
         rows=rows,
         note=_RESIDUALS,
+        condition=any(x.condition for x in found.hypotheses),
         not_tried=Table("Materials, structures and effects that were not tried", ("name", "why"), left_out),
         would_decide=Table("Measurements that would decide", ("signal", "angle", "Δ ln Z to expect"), would),
     )
