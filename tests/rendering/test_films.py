@@ -22,6 +22,8 @@ def test_a_surface_is_a_film_on_rough_facets(refuses):
     np.testing.assert_allclose(layer.material(NM), 2.9)
     np.testing.assert_allclose(film.scene.substrate.material(NM), [2.4 + 2.8j, 2.5 + 2.8j, 2.6 + 2.8j])
     assert film.notes == ("the diffuse part of the surface is left out",)
+    bright = pl.Surface("microfacet-film", {"diffuse": 0.0, "multiple_scattering": 1.0})
+    assert film_of(bright).notes == ("light reflected more than once between facets is left out",)
     for model in ("granier-heidrich", "clear-coat-film"):
         refuses(UsageError, f"{model} is not a film on a base in air", film_of, pl.Surface(model))
 

@@ -193,6 +193,8 @@ def film_of(described: Scene | Surface | Fit) -> Film:
             notes.append("the diffuse part of the surface is left out")
         if not np.all(numbers.get("specular", 1.0) == 1.0):
             notes.append("the weight of the specular part is left out: it is 1")
+        if np.any(numbers.get("multiple_scattering", 0.0)):
+            notes.append("light reflected more than once between facets is left out")
         if "exponent" in numbers:
             notes.append("the Blinn-Phong lobe becomes GGX facets of nearly its width")
             return Film(scene, float(np.sqrt(2 / (float(numbers["exponent"]) + 2))), tuple(notes))
