@@ -201,6 +201,13 @@ def test_a_film_whose_table_ends_within_the_data_bars_a_free_index():
     assert others.status is Outcome.IDENTIFIED
 
 
+def test_the_thickness_of_an_opaque_film_is_unknown():
+    found = pl.identify(reflectance(("Au", 400.0)), "Si", among=["Au", "Ag"], layers=1)
+    assert found.status is Outcome.UNDECIDED
+    assert {x.layers[0].material for x in found.hypotheses} == {"Au"}
+    assert "from whose lower face no light returns: its thickness is unknown." in found.verdict
+
+
 def test_time_that_ends_is_said():
     found = pl.identify(reflectance(("TiO2", 60.0), ("SiO2", 300.0)), "Si", budget=1e-9)
     assert found.verdict.endswith("The budget of 1e-09 s ended before all was tried.")

@@ -76,6 +76,11 @@ def _undecided(kept: Sequence[Hypothesis], substrate: str, doubt: str, unlike: C
     main = [max(x.layers, key=lambda layer: layer.thickness.value) for x in kept]
     n = min(x.n[0] for x in main), max(x.n[1] for x in main)
     like = dict.fromkeys(name for x in main for name in x.like[:2] if name not in unlike)
+    unseen = all(x.thickness.value > BARE and not math.isfinite(x.thickness.stderr) for x in main)
+    if unseen and len({x.material for x in main}) == 1:
+        sentences.append(
+            "All are one film, from whose lower face no light returns: its thickness is unknown."
+        )
     depths = [_interval(x.thickness) for x in main]
     low, high = min(x for x, _ in depths), max(x for _, x in depths)
     if all(x.thickness.value > BARE for x in main) and high < 1.5 * low:
