@@ -40,9 +40,6 @@ def test_a_film_is_named_and_written_as_a_recipe(pellicle, film, tmp_path):
     assert '<a href="1.toml">1.toml</a>' in page
     assert all(f"Show {x['name']}</button>" in page for x in [*found["hypotheses"], *found["excluded"]])
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
-    (out / "2.toml").write_text("of an earlier result")
-    pellicle("identify", film, *flags, code=0)
-    assert [x.name for x in sorted(out.glob("*.toml"))] == ["1.toml"]
 
 
 def test_files_at_several_angles_are_one_sample(pellicle, tmp_path):

@@ -10,6 +10,7 @@ from pellicle.identification import identify
 from pellicle.identification.free_models import CONDUCTOR, FREE_MODELS, built
 from pellicle.identification.growth import grow
 from pellicle.identification.hypothesis import Outcome
+from pellicle.reporting.identification import write_identification
 from tests import by_tmm
 
 NM = np.linspace(420, 880, 120)
@@ -201,11 +202,24 @@ def test_a_film_whose_table_ends_within_the_data_bars_a_free_index():
     assert others.status is Outcome.IDENTIFIED
 
 
-def test_the_thickness_of_an_opaque_film_is_unknown():
-    found = pl.identify(reflectance(("Au", 400.0)), "Si", among=["Au", "Ag"], layers=1)
-    assert found.status is Outcome.UNDECIDED
-    assert {x.layers[0].material for x in found.hypotheses} == {"Au"}
-    assert "from whose lower face no light returns: its thickness is unknown." in found.verdict
+@pytest.fixture(scope="module")
+def opaque():
+    return pl.identify(reflectance(("Au", 400.0)), "Si", among=["Au", "Ag"], layers=1)
+
+
+def test_the_thickness_of_an_opaque_film_is_unknown(opaque):
+    assert opaque.status is Outcome.UNDECIDED
+    assert {x.layers[0].material for x in opaque.hypotheses} == {"Au"}
+    assert "from whose lower face no light returns: its thickness is unknown." in opaque.verdict
+
+
+def test_recipes_of_an_earlier_identification_are_removed(opaque, tmp_path):
+    write_identification(tmp_path / "out", opaque)
+    assert (tmp_path / "out/2.toml").exists()
+    own = tmp_path / "out" / f"{len(opaque.hypotheses) + 1}.toml"
+    own.write_text("# of the user")
+    write_identification(tmp_path / "out", dataclasses.replace(opaque, hypotheses=opaque.hypotheses[:1]))
+    assert sorted(x.name for x in own.parent.glob("*.toml")) == ["1.toml", own.name]
 
 
 def test_time_that_ends_is_said():

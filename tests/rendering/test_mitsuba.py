@@ -10,11 +10,10 @@ import pytest
 
 import pellicle as pl
 from pellicle.colour import delta_e2000, lab, sensor
-from pellicle.dispersion.base import known_index
 from pellicle.errors import UsageError
 from pellicle.rendering import mitsuba_plugin
 from pellicle.rendering.appearance import appearance
-from pellicle.rendering.mitsuba import ALPHA, _sides, lookup, write_surface
+from pellicle.rendering.mitsuba import ALPHA, lookup, write_surface
 from tests.airy import airy
 from tests.directions import unit
 
@@ -365,37 +364,6 @@ def test_a_film_of_less_index_than_its_base_has_numbers_everywhere():
     """At grazing incidence from below no light reaches it: NaN there would spread to light from above."""
     arrays = lookup(appearance(pl.Scene(pl.Layer(1.5, 1000.0), 1.7))).arrays()
     assert [key for key, values in arrays.items() if not np.all(np.isfinite(values))] == []
-
-
-EPILAYER = pl.Scene(pl.Layer(2.5605, 8000.0), pl.dispersion.Constant(2.56, 3e-5))
-"""On a base that absorbs a little, in which light near grazing incidence would gain energy."""
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        pl.Scene(pl.Layer(1.33, 100.0), 1.0),
-        pl.Scene(pl.Layer(1.5, 100.0), 1.33, ambient="H2O"),
-        EPILAYER,
-    ],
-    ids=["bubble", "in water", "epilayer"],
-)
-def test_reflectances_are_finite_and_at_most_1(scene):
-    sides, _ = _sides(appearance(scene), np.array([0.0, scene.layers[0].thickness]), 12, np.array([700.0]))
-    for elements in sides.values():
-        assert np.max(np.abs(elements)) <= 1 + 1e-9  # False for NaN
-
-
-def test_an_angle_is_that_in_an_ambient_medium_with_dispersion():
-    scene, nm = pl.Scene(pl.Layer(1.5, 100.0), 2.0, ambient="H2O"), np.array([400.0, 700.0])
-    sides, _ = _sides(appearance(scene), np.array([100.0]), 12, nm)
-    n0 = np.asarray(known_index(scene.ambient, nm))
-    cosine = (2 / 11) ** 2  # of the third node
-    found = [
-        tmm.unpolarized_RT([n, 1.5, 2.0], [np.inf, 100.0, np.inf], np.arccos(cosine), each)["R"]
-        for n, each in zip(n0.tolist(), nm.tolist(), strict=True)
-    ]
-    np.testing.assert_allclose(sides[""][0, 2, -2:, 0], found, rtol=1e-9)
 
 
 def test_surfaces_without_colour_are_refused(tmp_path):

@@ -31,8 +31,10 @@ FILMS = [name for names in FAMILIES.values() for name in names]
 
 
 def chosen(among: Sequence[str] | None, family: str | None) -> list[str]:
-    """Names of the materials to be tried. Raises UsageError for what are no
-    names, for an unknown family, and for both."""
+    """Names of the materials to be tried.
+
+    **Raises:** UsageError for `among` without a list of names, for an unknown family, and for both.
+    """
     if among is not None and family is not None:
         raise UsageError("give `among` or `family`, not both")
     if isinstance(among, str) or not all(isinstance(x, str) for x in among or ()):

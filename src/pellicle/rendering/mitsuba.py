@@ -262,7 +262,7 @@ def _sides(
 
 
 def _in_constant_ambient(films: Stack, n0: np.ndarray, index: float) -> Stack:
-    """The same films in an ambient medium of one `index` in place of n0 at each wavelength.
+    """Films in an ambient medium of one `index`, equivalent to films in n0 (wavelengths,).
 
     Waves depend on ratios of indices, and of indices to the wavelength, alone. The transverse index of an
     angle is then the same at all wavelengths.

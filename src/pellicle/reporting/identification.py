@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from pellicle.files import new_folder
+from pellicle.files import MARKER, new_folder
 from pellicle.fitting.status import describe
 from pellicle.identification.hypothesis import Hypothesis, Identification, Outcome, SupposedLayer
 from pellicle.recipes.write import recipe_text
@@ -133,12 +134,19 @@ def write_identification(
         contents[f"{number}.toml"] = recipe_text(
             scene, target, files=[] if tables else files, reading=options, tables=tables
         )
+    earlier = _recipes(target)
     write_result(target, to_json(found), contents | {"figure.png": draw(found)})
-    for number in count(len(found.hypotheses) + 1):  # recipes of an earlier result
-        if not (old := target / f"{number}.toml").exists():
-            break
-        old.unlink()
+    for name in earlier - contents.keys():
+        (target / name).unlink(missing_ok=True)
     return target
+
+
+def _recipes(folder: Path) -> set[str]:
+    """Names of the recipes that an earlier identification wrote into a folder."""
+    with suppress(OSError, ValueError):
+        record = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+        return {f"{number + 1}.toml" for number in range(len(record.get("hypotheses", ())))}
+    return set()
 
 
 def identification_page(found: Identification) -> str:
