@@ -72,6 +72,15 @@ def test_the_kept_recipe_is_the_same(tmp_path):
     assert [one.reading["noise"] for one in kept.each] == [0.01, 0.01]
 
 
+def test_the_kept_recipe_shares_the_same_numbers(tmp_path):
+    path = Path(__file__).parents[2] / "docs" / "examples" / "mica_flakes.toml"
+    read = pl.read_recipe(path)
+    assert isinstance(read, FilmRecipe)
+    kept = tomllib.loads(samples_text(read, {}, {}, tmp_path))
+    assert kept["shared"] == ["instrument.numerical_aperture", "instrument.stray_light"]
+    assert checked(kept, str(tmp_path / "recipe.toml")).tables.shared == kept["shared"]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -249,16 +249,20 @@ def _check(parts: Iterable[tuple[str, Any, Any]], words: str) -> None:
             raise UsageError(f"a recipe cannot express {words.format(name)}")
 
 
-def _document(tables: Mapping[str, Mapping[str, Any] | Sequence[Mapping[str, Any]]]) -> str:
-    """Format tables by their names; a list of tables is an array of tables. Empty ones are left out."""
-    parts = []
+def _document(tables: Mapping[str, Any]) -> str:
+    """Format tables by their names; a list of tables is an array of tables, one of strings a key above all
+    tables. Empty ones are left out."""
+    keys, parts = [], []
     for name, content in tables.items():
         several = not isinstance(content, Mapping)
+        if several and content and isinstance(content[0], str):
+            keys.append(f"{_key(name)} = {_toml(content)}")
+            continue
         head = f"[[{name}]]" if several else f"[{name}]"
         for table in content if several else [content]:
             if table:
                 parts.append("\n".join([head, *(f"{_key(k)} = {_toml(v)}" for k, v in table.items())]))
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join([*keys, *parts]) + "\n"
 
 
 def _toml(thing: Any) -> str:
