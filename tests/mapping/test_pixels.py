@@ -14,7 +14,8 @@ from pellicle.fitting.batch.effects import _simulation
 from pellicle.fitting.batch.search import minima
 from pellicle.fitting.film.extended_scene import Number, Program
 from pellicle.fitting.film.systematic_effects import SimulatedEffect
-from pellicle.mapping.pixels import bands_off, fit_pixels, prepare, spectrum
+from pellicle.fitting.problem import Noise
+from pellicle.mapping.pixels import _example, bands_off, fit_pixels, prepare, spectrum
 
 from .. import by_tmm
 
@@ -238,6 +239,20 @@ def test_bands_that_are_off_at_most_pixels_are_named(gain):
 
 def test_a_cube_without_data_is_refused(refuses):
     refuses(DataError, "no pixel has data", prepare, cube_of(np.full((4, 100), np.nan), None), OXIDE)
+
+
+def test_a_dead_pixel_does_not_refuse_the_cube():
+    """The first pixel that is looked at has values that no film reflects; noise may give all of them some."""
+    values = np.full((9, 100), 0.3)
+    values[4], values[1] = -0.5, 2.0
+    assert np.all(_example(cube_of(values), {"values": values[[4, 1, 0]]}).values == 0.3)
+    seen = _example(cube_of(values), {"values": values[[4, 1]]}).values
+    assert np.all(seen == 0)
+
+
+def test_noise_is_guessed_of_two_bands():
+    weight = batch_data({"values": np.array([[0.2, 0.3]])}, Noise()).weight
+    np.testing.assert_allclose(weight, 1 / (0.01 * 0.1))
 
 
 def test_effects_share_the_unchanged_signal():

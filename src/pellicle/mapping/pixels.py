@@ -20,6 +20,7 @@ from pellicle.fitting.film.problem import make, measured
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
 from pellicle.scene.film import Scene
+from pellicle.signals.limits import DELTA, HIGHEST, PSI
 
 _SAMPLE = 9
 """Pixels that show how large the values and their errors are."""
@@ -56,7 +57,7 @@ def prepare(cube: Cube, scene: Scene, orders: int = ORDERS, rows: int = ROWS) ->
     **Raises:** as `pellicle.fit` does; DataError where no pixel has data.
     """
     sample = _sample(cube)
-    example = spectrum(cube, {name: _complete(rows[0]) for name, rows in sample.items()})
+    example = _example(cube, sample)
     with jax.enable_x64(True):
         target = measured(example, scene)
         check_free(target.scene)
@@ -80,6 +81,21 @@ def _sample(cube: Cube) -> dict[str, np.ndarray]:
         if len(order):
             return {name: values[order] for name, values in sample.items()}
     raise DataError(f"{cube.path or 'cube'}: no pixel has data")
+
+
+def _example(cube: Cube, sample: dict[str, np.ndarray]) -> Spectrum:
+    """The first sampled spectrum that is none of a dead pixel; where noise makes all of them impossible, the
+    first within the limits of its signal."""
+    limits = {"values": PSI, "delta": DELTA} if "delta" in sample else {"values": (0.0, HIGHEST)}
+    first = {name: _complete(rows[0]) for name, rows in sample.items()}
+    within = first | {name: np.clip(first[name], *ends) for name, ends in limits.items()}
+    others = ({name: _complete(rows[i]) for name, rows in sample.items()} for i in range(1, _SAMPLE))
+    for pixel in (first, *itertools.islice(others, len(sample["values"]) - 1)):
+        try:
+            return spectrum(cube, pixel)
+        except DataError:
+            continue
+    return spectrum(cube, within)
 
 
 def bands_off(model: PixelModel, cube: Cube) -> list[str]:

@@ -158,6 +158,7 @@ def _median_of(size: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 def _guess(values: np.ndarray) -> np.ndarray:
     """First guess of an unknown noise, (spectra, 1), which the residuals replace."""
-    rough = median(np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:]), -1)
+    bends = np.abs(values[:, :-2] - 2 * values[:, 1:-1] + values[:, 2:])
+    rough = median(bends, -1) if bends.size else 0.0
     guess = np.maximum(0.01 * np.ptp(values, axis=1), _TO_NORMAL * rough)
     return np.maximum(guess, 1e-12)[:, None]
