@@ -53,6 +53,7 @@ def test_a_strip_across_a_wedge(pellicle, recipe, colours, tmp_path):
     words = ("map", path, "--recipe", recipe(), "--strip", "0,6,59,6")
     [record] = pellicle(*words, "--out", tmp_path / "out", "--json", code=0).objects
     assert record["strip"] == "0,6,59,6"
+    assert "nm in the median (noise and camera)" in (tmp_path / "out" / "report.txt").read_text()
     np.testing.assert_allclose(record["positions"]["thickness"], THICKNESS, atol=4)
     assert record["converged"] > 0.9
     assert json.loads((tmp_path / "out" / "result.json").read_text())["schema"] == "pellicle.map/1"

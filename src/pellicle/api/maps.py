@@ -59,8 +59,8 @@ def map(data: Any, scene: Scene, **options: Any) -> Any:
       deviation of a coded channel, by default 1.5/255 of sRGB and 0.01 of "rgb".
 
     **Returns:** of a cube a `Map`: `dataset` has values, standard errors, status and rivals of each pixel. Of
-    a photograph a `ThicknessMap`: `found` has thickness, standard error (of the noise alone), probability and
-    status of each position, the most probable thickness first.
+    a photograph a `ThicknessMap`: `found` has thickness, standard error (of noise and camera), probability
+    and status of each position, the most probable thickness first.
 
     **Raises:** DataError for data that cannot be read; UsageError for arguments of the other kind of data,
     for a store that is of another map, for pixels outside a photograph, and where nothing is free.

@@ -36,7 +36,7 @@ def report(made: ThicknessMap) -> str:
     low, middle, high = np.percentile(films.thickness[..., 0], [0, 50, 100])
     rows = [
         ("thickness", f"{low:.1f} to {high:.1f} nm, {middle:.1f} nm in the median"),
-        ("errors", f"{np.median(films.stderr[..., 0]):.2g} nm in the median (noise alone)"),
+        ("errors", f"{np.median(films.stderr[..., 0]):.2g} nm in the median (noise and camera)"),
         ("status", share),
         ("misfit", f"ΔE*ab {np.median(films.delta_e[..., 0]):.2g} in the median (CIE 1976)"),
         *(("" if i else "read", note) for i, note in enumerate(made.notes)),
