@@ -172,6 +172,15 @@ def test_command_program_and_recipe_keep_an_option(option, folder, monkeypatch):
     assert without != told(made)
 
 
+def test_a_flag_that_is_switched_off_is_repeated(folder):
+    made = parsed(f"fit {ANGLES} --no-folded")
+    part, shown = object.__new__(Part), object.__new__(Fit)
+    vars(part)["data"], vars(shown)["parts"] = made.files[0].read()[0], (part,)
+    (_, again), *_ = repetition(shown, made.described)
+    assert "--no-folded" in shlex.split(again)
+    assert told(parsed(again.removeprefix("pellicle "))) == told(made)
+
+
 def test_a_posterior_is_repeated_by_its_own_command_and_program(folder, monkeypatch):
     made = parsed(f"fit {FILM} --tolerance 0.01")
     part, shown = object.__new__(Part), object.__new__(Fit)

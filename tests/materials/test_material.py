@@ -25,7 +25,12 @@ def test_inside_the_range_nothing_happens():
     ("name", "nm", "where", "remedy"),
     [
         ("Si/Aspnes", [900, 300, 850], "206.6 to 826.6 nm, not at 850 to 900 nm", "range=(300, 826.6)"),
-        ("Si", [200, 500], "250 to 1450 nm, not at 200 nm", "range=(250, 500)"),
+        (
+            "Si",  # wavelengths of a simulation are no data to cut
+            [200, 500],
+            "250 to 1450 nm, not at 200 nm",
+            "keep to 250 to 500 nm, of data with `range=(250, 500)`",
+        ),
         ("Si", [300, 2000], "250 to 1450 nm, not at 2000 nm", "range=(300, 1450)"),
         (
             "Si",

@@ -65,6 +65,7 @@ def test_value_range_and_derivative(text):
         ("60 - core.thickness", "goes from -40 to 10"),
         ("top.thickness / (core.n - 1.33)", "divides by what may be 0"),
         ("top.thickness ** 400 / top.thickness ** 399", "too large"),
+        ("top.thickness * 1e400", "foot.thickness is tied to 'top.thickness * 1e400', which is not finite"),
         ("1" * 2000, "at most 1000 characters"),
     ],
 )

@@ -101,7 +101,7 @@ class Material(AbstractDispersion):
         source = "" if self.page == self.name else f" ({self.page})"
         remedies = []
         if nm.min() < high and nm.max() > low:
-            remedies.append(f"cut the data with `range=({max(low, nm.min()):g}, {min(high, nm.max()):g})`")
+            remedies.append(_within(max(low, nm.min()), min(high, nm.max())))
         others = index.covering(self.page, float(nm.min()), float(nm.max()))
         remedies.append(
             f"use a page that covers them all ({', '.join(others)})"
@@ -149,6 +149,11 @@ def materials_in(tree: Any) -> list[Material]:
     return list(materials.values())
 
 
+def _within(low: float, high: float) -> str:
+    """The remedy for wavelengths (nm) outside a range; a simulation has no data that could be cut."""
+    return f"keep to {low:g} to {high:g} nm, of data with `range=({low:g}, {high:g})`,"
+
+
 def common_range(tree: Any) -> tuple[float, float]:
     """Range (nm) in which every Material of a pytree has data; its ends are reversed where there is none.
 
@@ -190,7 +195,7 @@ def check_common_range(tree: Any, wavelengths: Any) -> None:
     if refused:
         (low, high), nm = common_range(tree), np.asarray(wavelengths, dtype=float)
         low, high = max(low, nm.min()), min(high, nm.max())
-        cut = f"cut the data with `range=({low:g}, {high:g})` or " if low < high else ""
+        cut = f"{_within(low, high)} or " if low < high else ""
         raise DataError(
             f"{limits(tree, nm)}, not from {nm.min():g} to {nm.max():g} nm: "
             f"{cut}give files of n and k, or models"

@@ -143,11 +143,11 @@ class _Binding:
             free = {x.label: x for x in (*self.leaves, *self.resolved.values()) if is_free(x) and x.label}
             ends = expressions.interval(tree, lambda label: (free[label].lower, free[label].upper))
             start = float(expressions.value(tree, lambda label: free[label].start))
+            self.resolved[i] = tied(*ends, start, Tie(tree, text))
         except UsageError as error:
             if any(words in str(error) for words in ("circle", "is tied", "must be")):
                 raise
             raise UsageError(f"{name} is tied to {text!r}, which {error}") from None
-        self.resolved[i] = tied(*ends, start, Tie(tree, text))
 
     def _check_name(self, word: str, name: str, text: str) -> None:
         if word in self.places:

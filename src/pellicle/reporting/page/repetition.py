@@ -42,8 +42,9 @@ def repetition(
         **described.get("reading", {}),
         **(sampler or {}),
     }.items():
-        flag = f"--{name.replace('_', '-')}"
-        words += [flag] if value is True else [flag, _word(value)]
+        flag = name.replace("_", "-")
+        words += [f"--no-{flag}"] if value is False else [f"--{flag}"]
+        words += [] if isinstance(value, bool) else [_word(value)]
     joint = ["--joint"] if len(files) > 1 and recipe is None else []
     result = [("Command", shlex.join([*words, *joint]))]
     result += [] if saved is None else [("Python", _program(saved, sampler))]
