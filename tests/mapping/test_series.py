@@ -16,7 +16,7 @@ import xarray
 import pellicle as pl
 from pellicle.cli import app
 from pellicle.errors import UsageError
-from pellicle.reporting.series import write_series
+from pellicle.reporting.series import draw, write_series
 
 NM, TIME = np.linspace(600, 700, 24), np.arange(80) * 10.0
 GROWN = 200 + 1800 * (1 - np.exp(-TIME / 500))
@@ -78,6 +78,7 @@ def test_a_jump_and_a_gap_are_told_and_nothing_after_them_is_wrong():
     assert np.isnan(left[20:30]).all()
     np.testing.assert_allclose(found.dataset.residual_rms[60], np.sqrt(np.mean(left[60] ** 2)), rtol=1e-5)
     assert 0.008 < float(left.std()) < 0.012
+    assert len(draw(found).axes[0].collections[0].get_paths()) == 3  # no band crosses a gap or a break
     index = np.searchsorted(found.times, found.dataset.time_worst)
     np.testing.assert_allclose(found.dataset.worst_data, data.R.values[index])
     np.testing.assert_allclose(found.dataset.worst_data - found.dataset.worst_fit, left[index], atol=1e-6)

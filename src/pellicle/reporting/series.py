@@ -120,15 +120,14 @@ def draw(series: Series) -> Figure:
     for name in [str(n) for n in data.data_vars if data[n].dims and f"{n}_stderr_noise" in data]:
         value, error = (data[key].values for key in (name, f"{name}_stderr"))
         label = labelled(name.replace("_", " "), str(data[name].attrs["units"]).removesuffix("1"))
-        lines = [
-            Line(np.insert(time, cut, np.nan), np.insert(value, cut, np.nan), "all times together", "fit")
-        ]
+        at, middle, width = (np.insert(x, cut, np.nan) for x in (time, value, 1.96 * error))
+        lines = [Line(at, middle, "all times together", "fit")]
         if name in series.map.dataset and of_spectra:
             alone = np.where(decided, np.asarray(series.map[name], float), np.nan)
             other = np.where(decided, np.nan, value)
             lines = [Line(time, alone, "each time alone", "data", "point"), *lines]
             lines += [Line(time, other, "not decided", "blue", "cross")] if np.isfinite(other).any() else []
-        band = Band(time, value - 1.96 * error, value + 1.96 * error, "95 %", "fit")
+        band = Band(at, middle - width, middle + width, "95 %", "fit")
         tall = 2.4 if name.endswith("thickness") else 1.6
         panels.append(Panel(label, lines, [band], tall, legend="" if panels else "above"))
     chi = np.asarray(data["chi2_reduced"].values, float)
