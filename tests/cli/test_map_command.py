@@ -117,12 +117,23 @@ def test_channels_with_a_gamma(pellicle, recipe, colours, tmp_path):
         (("--region", "1,1,2,2;3,3,2,2"), "one rectangle"),
         (("--chart", "c.csv"), "--chart"),
         (("--signal", "lab"), "srgb or rgb"),
+        (("--noise", "0"), "--noise must be a standard deviation above zero"),
     ],
 )
 def test_errors_name_flags(pellicle, recipe, colours, tmp_path, words, message):
     path = photo(tmp_path / "wedge.png", colours)
     ran = pellicle("map", path, "--recipe", recipe(), *words)
     assert ran.code in (2, 3)
+    assert message in ran.err
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("gone.png", "gone.png: no such file"), ("text.png", "no photograph (PNG, JPEG, TIFF)")],
+)
+def test_what_is_no_photograph_is_said_before_its_signal(pellicle, recipe, tmp_path, name, message):
+    (tmp_path / "text.png").write_text("no image")
+    ran = pellicle("map", tmp_path / name, "--recipe", recipe(), code=3)
     assert message in ran.err
 
 

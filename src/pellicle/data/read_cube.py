@@ -107,9 +107,12 @@ def read_cube(
     if isinstance(source, Cube):
         return source
     camera = {"dark_frame": dark_frame, "white_reflectance": white_reflectance, "saturation": saturation}
-    _check_arguments(signal, polarisation, white_frame, camera)
+    _check_arguments(polarisation, white_frame, camera)
     given, unit = (None, "") if wavelengths is None else checks.parse_wavelengths(wavelengths)
-    raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, signal), time_from)
+    known = signal if signal in SIGNALS else None
+    raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, known), time_from)
+    if signal != known:  # a missing file, or one of a photograph, is told first
+        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
     nm, notes = checks.in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
     bands, told = checks.chosen_bands(nm, range, without_bands, raw.good, raw.path)
     notes = [*raw.notes, *notes, *told]
@@ -153,12 +156,8 @@ def read_cube(
     return cube
 
 
-def _check_arguments(
-    signal: str | None, polarisation: str | None, white_frame: Any, camera: Mapping[str, Any]
-) -> None:
-    """Check the names that a cube can have, and that counts of a camera have a white reference."""
-    if signal is not None and signal not in SIGNALS:
-        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
+def _check_arguments(polarisation: str | None, white_frame: Any, camera: Mapping[str, Any]) -> None:
+    """Check the polarisation, and that counts of a camera have a white reference."""
     if polarisation is not None and polarisation not in POLARISATIONS:
         raise UsageError(f"`polarisation` must be one of {', '.join(POLARISATIONS)}, not {polarisation!r}")
     if white_frame is None and any(x is not None for x in camera.values()):
@@ -337,7 +336,10 @@ def read_raw(path: Path, asked: raw_cube.Asked) -> raw_cube.RawCube:
     for recognises, read in READERS.items():
         if recognises(path):
             return read(path, asked)
-    raise DataError(f"{path}: is no cube that pellicle reads ({READ}): convert it to one of these")
+    raise DataError(
+        f"{path}: is no cube that pellicle reads ({READ}) and no photograph (PNG, JPEG, TIFF):"
+        " convert it to one of these"
+    )
 
 
 def series_files(source: Any) -> Any:

@@ -20,6 +20,7 @@ from pellicle.fitting.film.camera_errors import channel_errors
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
+from pellicle.signals.limits import noise_of
 from pellicle.simulation.colours import colour_table, varied_layer
 
 EXPOSURE = (0.01, 100.0)
@@ -90,10 +91,10 @@ def map_photograph(
     exposed = linear / reference
     coded = seen.coding.encode(exposed, seen.coding.roots(exposed))
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
-    sigma = USUAL_NOISE[space] if noise is None else noise
+    sigma = USUAL_NOISE[space] if noise is None else noise_of("a photograph", noise)
     told = [*photograph.notes, *seen.notes, *notes, note, f"noise {sigma:.2g} of each channel"]
     if clipped > 0:
-        told.append(f"{100 * clipped:.2g} % of the positions are clipped in a channel")
+        told.append(f"{100 * clipped:.3g} % of the positions are clipped in a channel")
     spread = np.full(3, sigma)
     if space == "rgb":  # a camera's channels are linear, with the σ of their median
         middle = np.maximum(np.median(linear.reshape(-1, 3), axis=0), 1e-3)

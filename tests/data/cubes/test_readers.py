@@ -215,6 +215,9 @@ def test_refusals(values, refused, tmp_path):
     refused(tmp_path / "absent.npy", "no such file", error=DataError)
     refused(tmp_path, "without a table of positions", error=DataError)
     refused(42, "must be a path", error=UsageError)
+    refused(values, "one array without a name", error=UsageError, wavelengths=NM, variable="R")
+    refused(tmp_path / "gone.npy", "no such file", signal="srgb")
+    refused(values, "`signal` of a cube must be one of", error=UsageError, wavelengths=NM, signal="srgb")
 
 
 def test_larger_tiles_than_blocks(same, tmp_path):

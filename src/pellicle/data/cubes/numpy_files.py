@@ -196,6 +196,8 @@ def choose_variables(
     **Returns:** names by role ("values", "delta", "sigma", "delta_sigma"), and what they state, as arguments
     of a `RawCube`.
     """
+    if variable is not None and [*written] == [""]:
+        raise UsageError(f"{path}: is one array without a name: leave out `variable`, {variable!r}")
     if variable is not None and variable not in written:
         raise UsageError(
             f"{path}: has no variable {variable!r}{did_you_mean(variable, written)} of pixels and bands, but "
