@@ -17,6 +17,7 @@ from pellicle.dispersion.anisotropic import Anisotropic, principal_media, requir
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.effective_medium import MIXTURES
 from pellicle.dispersion.empirical import Constant
+from pellicle.dispersion.oscillators import AbstractOscillator
 from pellicle.errors import UsageError
 from pellicle.materials import Material, UnknownMaterial, material
 from pellicle.optics.pair import is_real
@@ -72,9 +73,11 @@ def medium(value: MediumLike) -> AbstractDispersion:
     if isinstance(value, complex | np.complexfloating):
         return Constant(float(value.real), float(value.imag))
     if value is None or isinstance(value, list | tuple | dict | eqx.Module):
+        kind = type(value).__name__
+        term = f": write Oscillators(1.0, ({kind}(...),))" if isinstance(value, AbstractOscillator) else ""
         raise UsageError(
             "a medium is a name ('SiO2'), an index (1.46, 2.9 + 0.1j), pl.Free(1.3, 1.7) or a dispersion,"
-            f" not {type(value).__name__}"
+            f" not {kind}{term}"
         )
     return Constant(value)
 
