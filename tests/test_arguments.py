@@ -35,7 +35,7 @@ CASES = {
     "pl.Layer('cauchy', 100.0)": ("UnknownMaterial", "dispersion model", "pl.dispersion.Cauchy"),
     "pl.Layer(scene, 100.0)": ("UsageError", "a medium is", "not Scene"),
     "pl.Layer([1.4, 1.5], 100.0)": ("UsageError", "a medium is", "not list"),
-    "pl.Layer(pl.dispersion.Lorentz(1, 4, 0.1), 9.0)": ("UsageError", "a medium", "Oscillators(1.0, (Lorentz("),
+    "pl.Layer(pl.dispersion.Lorentz(1, 4, 0.1), 9.0)": ("UsageError", "a medium", "Oscillators(1.0, ("),
     "pl.Layer('SiO2', '100')": ("UsageError", "`thickness`", "pl.Free(lower, upper)"),
     "pl.Layer('SiO2', (10, 100))": ("UsageError", "`thickness`", "pl.Free(lower, upper)"),
     "pl.Layer('SiO2', None)": ("UsageError", "`thickness`", "missing"),
