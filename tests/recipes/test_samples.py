@@ -85,7 +85,7 @@ def test_the_kept_recipe_shares_the_same_numbers(tmp_path):
     ("text", "said"),
     [
         ('[[sample]]\nname = "a"\n', "sample a has no files"),
-        ('[[sample]]\nname = "a"\nfiles = ["a.csv"]\n' * 2, "two samples have the name 'a'"),
+        ('[[sample]]\nname = "a"\nfiles = ["a.csv"]\n' * 2, "recipe.toml: two samples have the name"),
         ('[data]\nfiles = ["b.csv"]\n[[sample]]\nname = "a"\nfiles = ["a.csv"]\n', "exclude each other"),
         (
             '[[sample]]\nname = "a"\nfiles = ["a.csv"]\nfilm.thicknes = 3\n',
@@ -95,6 +95,11 @@ def test_the_kept_recipe_shares_the_same_numbers(tmp_path):
         (
             '[[sample]]\nname = "a"\nfiles = ["a.csv"]\n[[sample.layer]]\nname = "new"\nthickness = 3\n',
             "sample a: layer new: a layer has a material",
+        ),
+        (
+            '[[sample]]\nname = "a"\nfiles = ["a.csv"]\n[[sample.layer]]\nname = "new"\nafter = 9\n'
+            'material = "SiO2"\nthickness = 3\n',
+            "layer new: after: 9 layers cannot lie above it: there are 1",
         ),
     ],
 )

@@ -84,7 +84,8 @@ def first_error(error: ValidationError, table: type[BaseModel]) -> str:
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":
-        return f"{key}: {chosen.get('ctx', {}).get('error', chosen['msg'])}"
+        words = str(chosen.get("ctx", {}).get("error", chosen["msg"]))
+        return f"{key}: {words}" if key else words  # of the whole recipe
     return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
 
 

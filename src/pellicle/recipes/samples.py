@@ -40,6 +40,9 @@ def scene_table(scene: schema.SceneTable, sample: schema.SampleTable) -> schema.
         place = len(layers) if own.after is None else own.after
         if isinstance(place, str):
             place = 1 + next(i for i, one in enumerate(layers) if one.name == place)
+        if not 0 <= place <= len(layers):
+            above = f"{place} layers cannot lie above it: there are {len(layers)}"
+            raise UsageError(f"sample {sample.name}: layer {own.name}: after: {above}")
         layers.insert(place, _layer(given, sample))
     given = {"layer": [one for one in layers if one.name not in sample.without]}
     given |= {key: x for key in ("substrate", "ambient") if (x := getattr(sample, key)) is not None}
