@@ -1,8 +1,11 @@
 """`pellicle compare`: which recipe the data call for, against criteria computed by hand."""
 
+import importlib
 import math
 
 import pytest
+
+from pellicle.files import new_folder
 
 CAUCHY = "{ model = 'cauchy', A = { lower = 1.3, upper = 1.7 }, B = 0.0 }"
 
@@ -60,6 +63,23 @@ def test_bad_input_in_one_sentence_before_a_fit(pellicle, scene_recipe, spectrum
     ):
         flags = [word for each in recipes for word in ("--recipe", each)]
         pellicle("compare", path, *flags).refused(code, words)
+
+
+def test_each_file_has_a_folder_of_its_own(pellicle, scene_recipe, spectrum_file, tmp_path, monkeypatch):
+    """Files of one name too; and the same command may be repeated."""
+    made = []
+
+    def compared(candidates, position, paths, folder, *how):
+        made.append(new_folder(folder).name)
+        return 0
+
+    monkeypatch.setattr(importlib.import_module("pellicle.cli.fit"), "_compare", compared)
+    (tmp_path / "other").mkdir()
+    files = spectrum_file("film.csv"), spectrum_file("other/film.csv")
+    recipes = [word for name in ("a.toml", "b.toml") for word in ("--recipe", scene_recipe(name=name))]
+    for _ in range(2):
+        pellicle("compare", *files, *recipes, "--out", tmp_path / "out", code=0)
+    assert made == ["film", "film-2"] * 2
 
 
 def test_recipes_are_compared_where_all_their_media_are_known(

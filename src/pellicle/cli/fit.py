@@ -102,11 +102,13 @@ def compare(
     if out is not None:
         check_folder(out)
     start()
+    from pellicle.reporting.folders import folder_per_file
     from pellicle.reporting.page.repetition import comparison_again
 
-    worst, several = GOOD, len(groups[0]) > 1
-    for position, paths in enumerate(groups[0]):
-        folder = None if out is None else Path(out) / Path(paths[0]).stem if several else Path(out)
+    worst = GOOD
+    first = [paths[0] for paths in groups[0]]
+    folders = [None] * len(first) if out is None else folder_per_file(out, first)
+    for position, (paths, folder) in enumerate(zip(groups[0], folders, strict=True)):
         again = comparison_again(dict(zip(names, recipes, strict=True)), data, position)
         worst = max(worst, _compare(candidates, position, paths, folder, json, again))
     return worst
