@@ -14,6 +14,7 @@ from pellicle.cli import app
 from pellicle.colour.spaces import camera_encoding
 from pellicle.data.movies import frames_of, is_movie, read_movie
 from pellicle.errors import DataError, UsageError
+from pellicle.mapping.movie import _chosen
 from pellicle.mapping.movie_fit import levels_of
 from pellicle.mapping.movie_light import FilmLight, black_from, is_gone, noise_of, parts_of
 from pellicle.mapping.movie_paths import FAR, TURN, paths_of
@@ -254,6 +255,14 @@ def test_saturated_light_is_left_out(tmp_path):
     assert np.isnan(movie.light[50:60]).all()
     assert np.isfinite(movie.light[:50]).all()
     assert "saturated: left out" in " ".join(movie.notes)
+
+
+def test_points_outside_the_frames_are_refused(tmp_path):
+    frames = frames_of(written(tmp_path / "frames", seen(wedge(60.0))), frame_rate=2.0)
+    movie = read_movie(frames, camera_encoding(), strip_ends="3,0,3,15")
+    assert _chosen("0;15", movie) == (0, 15)
+    with pytest.raises(UsageError, match="'300' is no place of this movie: x is from 0 to 15"):
+        _chosen("3;300", movie)
 
 
 @pytest.mark.parametrize("name", ["a film.mp4", "b.gif", "c.AVI", "d.mov", "e.mkv", "f.webm"])

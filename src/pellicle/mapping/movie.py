@@ -307,6 +307,12 @@ def _chosen(points: Any, movie: Movie) -> tuple[int, ...]:
         if len(numbers) != len(axes):
             form = "x,y" if len(axes) == 2 else "x along the line"
             raise UsageError(f"`points` of this movie must be {form} in pixels, got {group!r}")
+        for (dim, axis), x in zip(movie.coords.items(), numbers[::-1], strict=True):
+            half = 0.5 * float(axis[1] - axis[0]) if len(axis) > 1 else np.inf
+            if not axis[0] - half <= x <= axis[-1] + half:
+                raise UsageError(
+                    f"`points` {group!r} is no place of this movie: {dim} is from {axis[0]:g} to {axis[-1]:g}"
+                )
         nearest = [int(np.argmin(np.abs(axis - x))) for axis, x in zip(axes, numbers[::-1], strict=True)]
         chosen.append(int(np.ravel_multi_index(nearest, movie.shape)))
     return tuple(dict.fromkeys(chosen))
