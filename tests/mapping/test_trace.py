@@ -1,7 +1,9 @@
 """Traces of simulated films that grow, turn and hide, by a simulator of its own, and the command."""
 
 import json
+import re
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,6 +155,8 @@ def test_a_trace_is_refused_where_it_says_too_little():
     data = trace(5 * FRINGE * TIME / 600)
     with pytest.raises(UsageError, match="24 times"):
         pl.series(data.isel(time=slice(0, 20)), scene())
+    with pytest.raises(UsageError, match="this has 0 besides 500 that are constant"):
+        pl.series(xarray.full_like(data, 0.3).assign_coords(data.coords), scene())
     with pytest.raises(UsageError, match="slowly, or is monotonic"):
         pl.series(data, scene(varies="freely"))
     with pytest.raises(ValueError, match="`first` is 3000, outside"):
@@ -176,6 +180,9 @@ def test_a_table_with_a_time_and_wavelengths_is_a_trace(tmp_path, capsys, monkey
     record = json.loads(capsys.readouterr().out)
     assert record["status"] == {"by-neighbours": 500}
     assert abs(record["parameters"]["gain_633_nm"]["value"] - 2.7) < 0.1
+    assert re.search(
+        r"gain_633_nm +2\.\d{3} ± 0\.\d{3}, the same", Path("grown/report.txt").read_text("utf-8")
+    )
     assert "residual_633_nm" in (tmp_path / "grown" / "series.csv").read_text().split("\n")[0]
     made = xarray.load_dataset("grown/series.nc")
     assert np.abs(made.thickness - grown).max() < LASER / 200

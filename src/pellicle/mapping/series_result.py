@@ -193,7 +193,7 @@ def _warnings(
     codes = result["status"].values
     if share := np.mean(codes[used] == CODES[str(Status.AMBIGUOUS)]):
         sentences.append(
-            f"the order of {100 * share:.3g} % of the times is not decided, by continuity neither"
+            f"the order of {100 * share:.3g} % of the times is not decided, not even by continuity"
         )
     if joined.turns:
         where = ", ".join(f"{x:.4g}" for x in joined.turns[:6])

@@ -60,9 +60,14 @@ class Light(NamedTuple):
 def light_of(cube: Cube, time: np.ndarray, known: tuple[float | None, float | None]) -> Light:
     """Return the light of a cube of one axis. Raises UsageError where it has too few values."""
     values = np.array(cube.pixels((slice(None),))["values"])
-    values[np.any([_outages(column) for column in values.T], axis=0)] = np.nan
-    if np.isfinite(values).all(axis=1).sum() < LEAST:
-        raise UsageError(f"{cube.path}: a trace needs {LEAST} times with values at least")
+    outages = np.any([_outages(column) for column in values.T], axis=0)
+    values[outages] = np.nan
+    if (left := np.isfinite(values).all(axis=1).sum()) < LEAST:
+        shut = f" besides {outages.sum()} that are constant, as of a closed shutter or a saturated detector"
+        raise UsageError(
+            f"{cube.path}: a trace needs {LEAST} times with values at least, and this has {left}"
+            f"{shut if outages.any() else ''}"
+        )
     second = np.abs(values[2:] - 2 * values[1:-1] + values[:-2])
     span = np.subtract(*np.nanpercentile(values, [99.5, 0.5], axis=0))
     noise = np.maximum(MAD_TO_SIGMA * np.nanmedian(second, axis=0) / np.sqrt(6), 1e-5 * span + 1e-12)

@@ -12,6 +12,7 @@ import numpy as np
 
 from pellicle.files import replacing, write_text
 from pellicle.fitting.batch.data import STATUSES
+from pellicle.fitting.status import with_error
 from pellicle.mapping.growth import TIME
 from pellicle.mapping.series_residuals import SHOWN, WAVELENGTH, WORST
 from pellicle.mapping.series_result import Series
@@ -206,7 +207,8 @@ def _value_rows(series: Series) -> list[tuple[str, str]]:
         value, error = np.asarray(data[name].values, float), np.asarray(data[f"{name}_stderr"].values, float)
         unit = str(data[name].attrs["units"]).removesuffix("1")
         if not data[name].dims:
-            rows.append((name, f"{value:.6g} ± {error:.2g} {unit}, the same at all times"))
+            known = f"{with_error(float(value), float(error))} {unit}".rstrip()
+            rows.append((name, f"{known}, the same at all times"))
             continue
         known = np.flatnonzero(np.isfinite(value))
         first, last = known[[0, -1]]
