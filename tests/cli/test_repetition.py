@@ -181,6 +181,21 @@ def test_a_flag_that_is_switched_off_is_repeated(folder):
     assert told(parsed(again.removeprefix("pellicle "))) == told(made)
 
 
+@pytest.mark.parametrize("tables", ["data.file", "sample"])
+def test_files_with_tables_in_the_recipe_are_not_repeated_in_the_command(tables, folder):
+    files = {
+        "data.file": "[data]\njoint = true\n[[data.file]]\npath = 'film.csv'\n",
+        "sample": "[[sample]]\nname = 'thin'\nfiles = ['film.csv']\n",
+    }
+    film = "[[scene.layer]]\nname = 'film'\nmaterial = 'SiO2'\nthickness = { lower = 10, upper = 800 }\n"
+    (folder / "own.toml").write_text(f"[scene]\nsubstrate = 'Si'\n{film}{files[tables]}", "utf-8")
+    made = parsed("fit --recipe own.toml")
+    part, shown = object.__new__(Part), object.__new__(Fit)
+    vars(part)["data"], vars(shown)["parts"] = made.files[0].read()[0], (part,)
+    (_, again), *_ = repetition(shown, made.described)
+    assert told(parsed(again.removeprefix("pellicle "))) == told(made)
+
+
 def test_a_posterior_is_repeated_by_its_own_command_and_program(folder, monkeypatch):
     made = parsed(f"fit {FILM} --tolerance 0.01")
     part, shown = object.__new__(Part), object.__new__(Fit)

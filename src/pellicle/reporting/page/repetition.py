@@ -1,6 +1,7 @@
 """Command, program in Python and recipe that repeat a fit, and the sources to cite with it."""
 
 import shlex
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -34,8 +35,9 @@ def repetition(
         return _written(fit)
     files = list(dict.fromkeys(part.data.path for part in fit.parts if part.data.path))
     sampler = described.get("sampler")
-    words = ["pellicle", "fit" if sampler is None else "sample", *files]
     recipe = described.get("recipe")
+    named = [] if recipe is not None and _has_tables_of_files(recipe) else files
+    words = ["pellicle", "fit" if sampler is None else "sample", *named]
     words += [] if recipe is None else ["--recipe", str(recipe)]
     for name, value in {
         **described.get("flags", {}),
@@ -58,6 +60,15 @@ def repetition(
     except (OSError, ValueError):  # it has gone since
         return result
     return result if len(text) > _LONGEST else [*result, (f"Recipe {Path(recipe).name}", text)]
+
+
+def _has_tables_of_files(recipe: str) -> bool:
+    """True of a recipe with [[sample]] or [[data.file]], beside which a command takes no files."""
+    try:
+        tables = tomllib.loads(Path(recipe).read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # of another program, or gone since
+        return False
+    return "sample" in tables or "file" in tables.get("data", {})
 
 
 def _program(recipe: Path, sampler: Mapping[str, Any] | None) -> str:
