@@ -262,3 +262,6 @@ def test_a_program_of_a_map_has_its_options_and_the_scenes_of_its_recipes(folder
     [((path, scene), how)] = seen
     assert fingerprint(scene, how.pop("lamp_reference")) == fingerprint(film, film)
     assert (path, how) == ("cube.nc", {"noise": 0.01, "range": (450.0, 700.0)})
+    assert "jax" not in program
+    white = {"white_reflectance": "lambda nm: pl.reflectance(nm, 0.0, 1.0, 'Si')"}
+    assert 'jax_enable_x64", True)\nscene' in map_program("map", "cube.nc", "film.toml", {}, white)

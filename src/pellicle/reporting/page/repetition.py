@@ -122,9 +122,12 @@ def map_program(
     """
     given = {name: repr(x) for name, x in options.items() if name not in _OF_RUN} | dict(written)
     words = "".join(f",\n    {name}={text}" for name, text in given.items())
+    imports, double = "import pellicle as pl", ""
+    if any("pl.reflectance" in text for text in written.values()):  # in double precision, as the command
+        imports, double = f"import jax\n{imports}", '\njax.config.update("jax_enable_x64", True)'
     return f"""\
-import pellicle as pl
-
+{imports}
+{double}
 scene = pl.read_recipe({recipe!r}).scene()
 result = pl.{verb}(
     {source!r},
