@@ -48,6 +48,10 @@ def blank():
     return np.zeros((HEIGHT, WIDTH), bool)
 
 
+def test_one_pixel_is_no_pixels():
+    assert "Parameters at the 1 pixel with status converged" in cube_report(made([[CODES["converged"]]]))
+
+
 def test_shares_are_those_of_pixels_with_data():
     status = image()
     status[:, :20] = CODES["no-data"]  # 1200 of 4800

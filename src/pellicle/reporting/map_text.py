@@ -148,7 +148,8 @@ def decided_in_words(made: MapSummary) -> str:
     if not made.decided:
         return "Parameters: no pixel has numbers that can be used"
     words = " or ".join(word for word in DECIDED if word in made.counts)
-    return f"Parameters at the {made.decided} {made.axes.points} with status {words}"
+    points = made.axes.points if made.decided > 1 else made.axes.points.removesuffix("s")
+    return f"Parameters at the {made.decided} {points} with status {words}"
 
 
 def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:

@@ -116,6 +116,8 @@ def test_dead_bands(values, refused):
     assert np.isnan(np.asarray(cube.arrays["values"])).sum() == 1
     chosen = read_cube(values, wavelengths=NM, range=(440, 760), without_bands="540:610,700")
     np.testing.assert_array_equal(chosen.wavelength, [450, 500, 650, 750])
+    one = read_cube(values, wavelengths=NM, without_bands="700")
+    assert "1 band left out, as asked" in one.notes
     for wrong, words in {"900:950": "no band at 900", "red": "LO:HI"}.items():
         refused(values, words, error=UsageError, wavelengths=NM, without_bands=wrong)
     refused(values, "no band is left", error=UsageError, wavelengths=NM, range=(900, 950))

@@ -180,7 +180,7 @@ def chosen_bands(
         used &= (nm >= range[0]) & (nm <= range[1])
     if good is not None and not np.all(good):
         used &= good
-        notes.append(f"{int(np.sum(~good))} bands left out, which the file marks as bad")
+        notes.append(f"{_bands(~good)} left out, which the file marks as bad")
     if without is not None:
         dead = np.zeros(nm.size, bool)
         step = np.median(np.abs(np.diff(nm))) if nm.size > 1 else 1.0
@@ -205,7 +205,7 @@ def chosen_bands(
                 )
             dead |= inside
         used &= ~dead
-        notes.append(f"{int(dead.sum())} bands left out, as asked")
+        notes.append(f"{_bands(dead)} left out, as asked")
     if not used.any():
         raise UsageError(
             f"{path}: no band is left of {nm.size} from {nm.min():g} to {nm.max():g} nm: widen `range`, or "
@@ -213,6 +213,12 @@ def chosen_bands(
         )
     order = np.argsort(nm, kind="stable")
     return order[used[order]], notes
+
+
+def _bands(which: np.ndarray) -> str:
+    """`1 band`, or `2 bands`."""
+    count = int(np.sum(which))
+    return f"{count} band" + "s" * (count != 1)
 
 
 def sample_blocks(sizes: tuple[int, ...], points: int) -> Iterator[tuple[slice, ...]]:
@@ -306,8 +312,7 @@ def live_bands(values: np.ndarray, pixels: int, path: str) -> tuple[np.ndarray, 
         measured = np.ones_like(measured)
     notes = []
     if not measured.all():
-        dead = int(np.sum(~measured))
-        notes.append(f"{dead} bands left out, NaN or zero in each of the {seen} pixels looked at")
+        notes.append(f"{_bands(~measured)} left out, NaN or zero in each of the {seen} pixels looked at")
     return measured, notes
 
 
