@@ -75,8 +75,9 @@ def _matching(file: str) -> list[str]:
     if path.is_dir():
         inside = [each for each in path.iterdir() if each.is_file() and not each.name.startswith((".", "~"))]
         found = [str(each) for each in inside if each.suffix.lower() not in _NO_DATA]
-        if len(found) < len(inside):
-            say(f"{file}: {len(found)} files of data; {len(inside) - len(found)} others are left out")
+        if left := len(inside) - len(found):
+            others = "1 other is" if left == 1 else f"{left} others are"
+            say(f"{file}: {len(found)} files of data; {others} left out")
     elif path.exists() or not any(mark in file for mark in "*?["):
         return [file]
     else:

@@ -74,7 +74,8 @@ def watch(
             _follow(arrivals, live, source, table, idle, json)
         except KeyboardInterrupt:
             say("")
-        say(f"{live.done} files fitted" + (f"; the same command goes on with {out}" if out else ""))
+        files = "1 file" if live.done == 1 else f"{live.done} files"
+        say(f"{files} fitted" + (f"; the same command goes on with {out}" if out else ""))
     return GOOD
 
 

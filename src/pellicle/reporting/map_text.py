@@ -104,7 +104,7 @@ def file_rows(made: MapSummary) -> list[tuple[str, str]]:
     rows.append(("data", f"{about.get('signal', 'R')}{bands}{between}; {pixels_in_words(made)}"))
     missing = made.counts.get(NO_DATA, 0)
     if missing:
-        text = f"{missing} {made.axes.points} ({share(missing, made.pixels)} %)"
+        text = f"{_points(missing, made)} ({share(missing, made.pixels)} %)"
         rows.append(("no data", f"{text} {made.places.get(NO_DATA, '')}".strip()))
     every = int(about.get("preview", 1))
     if every > 1:
@@ -148,8 +148,12 @@ def decided_in_words(made: MapSummary) -> str:
     if not made.decided:
         return "Parameters: no pixel has numbers that can be used"
     words = " or ".join(word for word in DECIDED if word in made.counts)
-    points = made.axes.points if made.decided > 1 else made.axes.points.removesuffix("s")
-    return f"Parameters at the {made.decided} {points} with status {words}"
+    return f"Parameters at the {_points(made.decided, made)} with status {words}"
+
+
+def _points(count: int, made: MapSummary) -> str:
+    """`1 pixel`, or `42 sites`."""
+    return f"{count} {made.axes.points if count != 1 else made.axes.points.removesuffix('s')}"
 
 
 def parameter_rows(p: ParameterSummary) -> list[tuple[str, str]]:

@@ -62,7 +62,7 @@ def test_sites_whose_files_do_not_exist(wafer, values, refused):
     read = np.asarray(cube.arrays["values"])
     assert np.isnan(read[0]).all()
     np.testing.assert_allclose(read[1:], values[1:3, 0], atol=1e-6)
-    assert "1 sites without data, whose files do not exist: site_0.csv" in cube.notes
+    assert "1 site without data, for lack of a file: site_0.csv" in cube.notes
     (wafer / "site_1.csv").unlink()
     refused(wafer, "2 of its 3 files", "site_0.csv", error=DataError)
 

@@ -57,7 +57,8 @@ def read_folder(path: Path, asked: Asked) -> RawCube:
             f"{table.parent / absent[0]}: check their names, which are relative to the table"
         )
     if absent:
-        notes.append(f"{len(absent)} sites without data, whose files do not exist: {_shortened(absent)}")
+        sites = "1 site" if len(absent) == 1 else f"{len(absent)} sites"
+        notes.append(f"{sites} without data, for lack of a file: {_shortened(absent)}")
     files = [table.parent / names[i] for i in there]
     read = partial(read_spectrum, signal=asked.signal, spectrum=asked.variable, wavelength_unit=asked.unit)
     spectra = [read(file) for file in files]
