@@ -19,7 +19,7 @@ from pellicle.fitting.minima import Minima, deviance_at, solve
 from pellicle.fitting.noise import student
 from pellicle.fitting.parameter import Parameter
 from pellicle.fitting.problem import Problem
-from pellicle.fitting.profile_likelihood import ONE_SIDED, Limits, Neighbourhood, flat_sides, limits
+from pellicle.fitting.profile_likelihood import FLAT, ONE_SIDED, Limits, Neighbourhood, flat_sides, limits
 from pellicle.fitting.result import Estimate, Profile, Rival, Status
 from pellicle.fitting.reweighting import RankedMinima, rank
 from pellicle.fitting.status import ORDER, RIVAL, Judged, judged, outside
@@ -76,7 +76,7 @@ def verdicts(
     more = np.maximum(discrepancy.variance - covariance.variance, 0.0)[..., : len(parameters)]
     # only the bounds limit it: the difference of two huge variances is rounding
     more = np.where(linear > upper - lower, 0.0, more)
-    every = _widened(noise, values, more, freedom[..., None], (lower, upper))
+    every = _widened(noise, values, linear, more, freedom[..., None], (lower, upper))
     noise, every = _without_film(parameters, values, ~np.asarray(misfit), noise, every)
     rivals = np.asarray(ranked.problem.values(ranked.minima.units[..., 1 : _MOST_RIVALS + 1, :]))
     apart = outside(values, every.stderr, rivals).any(axis=-1)
@@ -121,23 +121,29 @@ def _stretched(
 def _widened(
     limits: Limits,
     values: np.ndarray,
+    linear: np.ndarray,
     variance: np.ndarray,
     freedom: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
 ) -> Limits:
     """Limits with a further variance, and as Student's t has them, within the bounds.
 
-    Where the data do not see a side there is no variance to add: its limit is that of the noise.
+    Where the data do not see a side, the variance is added to the other limit if the misfit rises there as
+    the `linear` standard errors of the noise say, and there is no limit if that reaches the bound. Elsewhere
+    the variance would be linear in vain: the limit is that of the noise.
     """
     seen = np.isfinite(limits.stderr)
+    expected = np.sqrt(ONE_SIDED) * linear
     reach, wider = np.sqrt(ONE_SIDED * variance), student(freedom, ONE_SIDED)
-    lower = np.maximum(values - np.hypot(wider * (values - limits.lower), reach), bounds[0])
-    upper = np.minimum(values + np.hypot(wider * (limits.upper - values), reach), bounds[1])
-    return Limits(
-        np.sqrt(limits.stderr**2 + variance),
-        np.where(seen, lower, limits.lower),
-        np.where(seen, upper, limits.upper),
-    )
+    ends = []
+    for end, bound, side in zip(limits[1:], bounds, (-1, 1), strict=True):
+        distance, room = side * (end - values), side * (bound - values)
+        rises = (FLAT * expected < distance) & (distance < expected / FLAT)
+        widened = np.hypot(wider * distance, reach)
+        total = values + side * np.minimum(widened, room)
+        open_ = np.where(rises, np.where(widened < room, total, np.nan), end)
+        ends.append(np.where(seen, total, open_))
+    return Limits(np.sqrt(limits.stderr**2 + variance), *ends)
 
 
 def _without_film(
