@@ -27,6 +27,16 @@ def test_names(write, header):
     assert "psi and delta in degrees" in spectrum.notes
 
 
+@pytest.mark.parametrize(
+    "name", ["Einfallswinkel (°)", "Incidence angle", "angle d'incidence [deg]", "入射角"]
+)
+def test_angles_of_incidence_by_their_names(write, name):
+    spectrum = read_spectrum(
+        write(f"wl,{name},psi,delta\n400,65,20,90\n500,65,20,95\n400,70,21,80\n500,70,21,85\n")
+    )
+    np.testing.assert_array_equal(spectrum.angle, [65, 70, 65, 70])
+
+
 def test_delta_is_stored_from_0_to_below_360(write):
     spectrum = read_spectrum(write("wl,psi,delta\n400,20,-180\n500,20,-0.5\n600,20,360\n"))
     np.testing.assert_array_equal(spectrum.delta, [180, 359.5, 0])

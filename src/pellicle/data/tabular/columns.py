@@ -60,7 +60,11 @@ NAMES: dict[str, tuple[str, ...]] = {
     "reference counts": ("reference counts",),
     "dark counts": ("dark counts",),
     "sigma": ("sigma", "σ"),
-    "angle": ("angle", "aoi", "angle of incidence", "angle_of_incidence"),
+    "angle": (
+        *("angle", "aoi", "angle of incidence", "angle_of_incidence", "incidence angle", "incident angle"),
+        *("einfallswinkel", "angle d'incidence", "angle d’incidence", "ángulo de incidencia"),
+        *("angolo di incidenza", "angolo d'incidenza", "入射角"),
+    ),
     "azimuth": ("azimuth", "sample azimuth", "sample_azimuth", "sample rotation"),
     "psi": ("psi", "ψ"),
     "delta": ("delta", "δ"),
