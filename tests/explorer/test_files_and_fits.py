@@ -203,7 +203,7 @@ def test_a_fit_is_stopped_and_others_wait(session, monkeypatch):
     (session.folder / "film.toml").write_text(answer["toml"])
     again = pl.read_recipe(session.folder / "film.toml").scene()
     assert (again.layers[0].thickness, again.instrument.bandwidth) == (layer.thickness, width)
-    assert answer["commands"]["toml"] == "Run it: pellicle fit recipe.toml, saved beside film.csv"
+    assert answer["commands"]["toml"] == "Run it: pellicle fit --recipe recipe.toml, saved beside film.csv"
 
 
 @pytest.mark.slow

@@ -261,6 +261,6 @@ class Session:
 def _commands(verb: str, files: str, fitted: bool) -> dict[str, str]:
     """Sentences that say how to run a recipe and a program that are saved beside the files that they name."""
     place = f", saved beside {files}" if files else ""
-    out = "" if verb == "fit" else " --out film.csv"
-    toml, python = f"Run it: pellicle {verb} recipe.toml{out}{place}", "Run it: python film.py"
+    words = "--recipe recipe.toml" if verb == "fit" else "recipe.toml --out film.csv"
+    toml, python = f"Run it: pellicle {verb} {words}{place}", "Run it: python film.py"
     return {"toml": toml, "python": f"{python}, saved beside recipe.toml" if fitted else python}
