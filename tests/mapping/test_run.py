@@ -55,6 +55,10 @@ def test_workers_read_a_cube_on_disk_themselves(workers, cube, scene, fake_fits,
     here = run_map(on_disk, scene, tmp_path / "here.zarr", fit=fake_fits.fit)
     there = run_map(on_disk, scene, tmp_path / "there.zarr", scheduler=workers, fit=fake_fits.fit)
     same_files(here.path, there.path)
+    assert here.run is not None
+    assert there.run is not None
+    assert here.run.workers == 1
+    assert there.run.workers <= 2  # processes, not blocks
     mean = 1000 * np.where(cube.mask[..., None], cube.arrays["values"], np.nan).mean(axis=2)
     np.testing.assert_allclose(there.thickness, mean)
 

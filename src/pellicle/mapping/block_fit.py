@@ -1,5 +1,7 @@
 """Fit of one block of pixels of a map: read from the cube, fitted, and written into the store."""
 
+import os
+import platform
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -22,11 +24,13 @@ class Job(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """A block that is in the store: its number of pixels, seconds of its fits, and of compilation."""
+    """A block that is in the store: its number of pixels, seconds of its fits, and of compilation, and the
+    process that fitted it."""
 
     pixels: int
     seconds: float
     compiling: float
+    process: str
 
 
 def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fitted:
@@ -53,4 +57,5 @@ def fit_block(job: Job, place: tuple[int, ...], block: Cube | None = None) -> Fi
         monitoring.unregister_event_duration_listener(listen)
     job.store.write(place, fits)
     seconds = sum(compiling)
-    return Fitted(job.store.blocks.count(place), time.monotonic() - began - seconds, seconds)
+    process = f"{platform.node()}:{os.getpid()}"
+    return Fitted(job.store.blocks.count(place), time.monotonic() - began - seconds, seconds, process)

@@ -161,10 +161,13 @@ def _fit_blocks(job: Job, workers: int | None, scheduler: str | None, progress: 
         progress("pixels", done, total)
         workers = workers_for(len(todo) * first.seconds)
     used = 1 if scheduler is None and (workers or 1) == 1 else min(workers or len(todo), len(todo))
+    processes = set()
     for fitted in _fitted(job, todo, used, scheduler, progress):
         done += fitted.pixels
+        processes.add(fitted.process)
         compiling = max(compiling, fitted.compiling)
         progress("pixels", done, total)
+    used = used if scheduler is None else len(processes)
     return Run(done - earlier, earlier, used, 0.0, compiling)
 
 
