@@ -178,8 +178,14 @@ def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, scene_recipe)
 
 
 def test_a_file_that_cannot_be_read_is_not_waited_for(pellicle, spectrum_file, scene, tmp_path):
-    ran = pellicle("fit", spectrum_file(), tmp_path / "gone.csv", *scene, "--repeats", "--json", code=3)
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "repeats.txt").write_text("of an earlier run")
+    (out / "result.json").write_text('{"schema": "pellicle.fits/1"}')
+    flags = ("--repeats", "--json", "--out", out)
+    ran = pellicle("fit", spectrum_file(), tmp_path / "gone.csv", *scene, *flags, code=3)
     assert "repeats need two usable fits" in ran.err
+    assert not (out / "repeats.txt").exists()
     failed = ran.objects[-1]
     assert (failed["schema"], failed["status"]) == ("pellicle.repeats/1", "failed")
 

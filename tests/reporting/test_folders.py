@@ -123,6 +123,16 @@ def test_a_second_fit_replaces_the_first_and_leaves_the_rest(fit, tmp_path):
     assert strictly((tmp_path / "result.json").read_text())["rms"] == 0.5
 
 
+def test_tables_of_another_scene_do_not_stay_beside_a_fit(fit, tmp_path):
+    write_fit(tmp_path, fit)
+    table = (tmp_path / "nk.csv").read_text("utf-8")
+    (tmp_path / "nk_ordinary.csv").write_text(table.replace("layer", "layer (ordinary)", 1), "utf-8")
+    (tmp_path / "profile.csv").write_text("# profiles at 650 nm against depth\n", "utf-8")
+    (tmp_path / "nk_gold.csv").write_text("wavelength_nm,n,k\n", "utf-8")  # the user's
+    write_fit(tmp_path, fit)
+    assert sorted(os.listdir(tmp_path)) == sorted([*FILES, "nk_gold.csv"])
+
+
 @pytest.mark.parametrize("name", ["diary.txt", "figure.png", "fit.csv", "summary.csv"])
 def test_a_folder_of_the_users_stays_as_it_is(fit, tmp_path, name, refuses):
     (tmp_path / name).write_text("mine")

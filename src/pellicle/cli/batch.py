@@ -81,7 +81,7 @@ class Batch:
 
     def run(self) -> int:
         """Fit every group of files, print and write each result, and return the largest exit code."""
-        from pellicle.reporting.folders import SUMMARY, folder_per_file, write_index, write_summary
+        from pellicle.reporting.folders import REPEATS, SUMMARY, folder_per_file, write_index, write_summary
 
         if self.sampler is not None and self.inputs.loss != LEAST_SQUARES:
             raise UsageError("a posterior needs least squares: leave the loss out, or the posterior")
@@ -127,6 +127,9 @@ class Batch:
                 " of the same data, scene, settings and version; --refit fits them, too"
             )
         compared = self._compare() if self.inputs.repeats and worst != INTERRUPTED else None
+        if self.out is not None and compared is None and worst != INTERRUPTED:
+            for name in REPEATS:  # of earlier files
+                (Path(self.out) / name).unlink(missing_ok=True)
         if self.out is not None and len(groups) > 1 and self.records:
             worst = max(worst, written(partial(write_index, self.out, self.records, folders, compared)))
         return worst

@@ -73,6 +73,7 @@ def write_fit(
     if profiles := fitted_profiles(fit):
         contents["profile.csv"] = profile_csv(fit, profiles)
     target = write_result(folder, record, contents | {"figure.png": draw_fit(fit)})
+    _remove_tables_of_another_scene(target, contents)
     saved = None
     if recipe is not None:
         with suppress(UsageError):  # of a scene that no recipe can express
@@ -86,6 +87,15 @@ def write_fit(
     if fingerprint:
         write_text(target / MARKER, indented(record | {FINGERPRINT: fingerprint}), overwrite=True)
     return target
+
+
+def _remove_tables_of_another_scene(target: Path, written: Iterable[str]) -> None:
+    """Remove tables of an earlier fit that this one does not have, as of two indices; none of the user's."""
+    for table in (target / "nk.csv", target / "profile.csv", *target.glob("nk_*.csv")):
+        if table.name not in written and table.is_file():
+            first = table.read_text(encoding="utf-8", errors="replace")[:40]
+            if first.startswith(("# n and k of the fitted layer", "# profiles at ")):
+                table.unlink()
 
 
 def _write_posterior(target: Path, posterior: Posterior) -> dict[str, bytes]:
