@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.optics import coherent, interface, orders, plate, response
 from pellicle.optics.anisotropy import Principal, each_index, mixes_polarisations, seen_by
 from pellicle.optics.gradient import Gradient, gauss_points
 from pellicle.optics.layer_rows import StackedLayers, stack_numbers
-from pellicle.optics.pair import Pair, imag, is_real, real
+from pellicle.optics.pair import Pair, imag, is_real, joined, namespace, real
 from pellicle.optics.repeats import Repeats
 from pellicle.scene.film import CoherentLayers, Scene, groups, thickness_spread
 from pellicle.scene.graded import Graded
@@ -60,13 +61,13 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     described, plates = groups(scene)
     if not plan.on("back-face"):
         described, plates = described[:1], ()
-    angle = jnp.deg2rad(scene.light.angle) if plan.on("oblique") else None
+    angle = namespace(scene.light.angle).deg2rad(scene.light.angle) if plan.on("oblique") else None
     thick = [scene.ambient.index(wavelength)]
     a = interface.transverse(thick[0], angle)[0]
     for group in described:
         index = group.below.index(wavelength)
         opened = plan.on("tunnelling") and not mixes_polarisations(index)
-        thick.append(interface.allow_tunnelling(index) if opened else index)
+        thick.append(joined(interface.allow_tunnelling(index) if opened else index))
     evaluated = []
     for i, group in enumerate(described):
         internal, collected = None, None
@@ -77,7 +78,7 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
             collected = plate.Collection(*part) if any(x is not None for x in part) else None
         layers, phases = _layers_and_phases(plan, group.layers, wavelength)
         smooth = all(face is None for face in group.roughness)
-        rough = [0.0 if face is None else 2 * jnp.pi / wavelength * face for face in group.roughness]
+        rough = [0.0 if face is None else 2 * np.pi / wavelength * face for face in group.roughness]
         evaluated.append(
             CoherentGroup(
                 above=thick[i],
@@ -100,7 +101,7 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
 
 def _layers_and_phases(plan: Plan, layers: Sequence[Layer], wavelength: Any) -> tuple[Any, Any]:
     """Indices and phases of layers; of many homogeneous ones in rows of arrays."""
-    k0 = 2 * jnp.pi / wavelength
+    k0 = 2 * np.pi / wavelength
     if len(layers) <= coherent.FEW or plan.on("anisotropy") or plan.on("gradient") or jnp.ndim(k0) != 1:
         return [_layer_index(plan, x, wavelength) for x in layers], [k0 * x.thickness for x in layers]
     indices = _index_rows(plan, [layer.material for layer in layers], wavelength)
@@ -120,9 +121,10 @@ def _index_rows(plan: Plan, materials: Sequence[Any], wavelength: Any) -> Stacke
         place: row for row, place in enumerate((kind, key) for kind, own in kinds.items() for key in own)
     }
     rows = [_index_of_kind(kind[0], [*own.values()], wavelength) for kind, own in kinds.items()]
-    re = jnp.concatenate([real(x) for x in rows])
+    xp = namespace(rows)
+    re = xp.concatenate([real(x) for x in rows])
     lossless = not plan.on("absorption") or all(map(is_real, rows))
-    distinct = re if lossless else Pair(re, jnp.concatenate([imag(x) + 0.0 * real(x) for x in rows]))
+    distinct = re if lossless else Pair(re, xp.concatenate([imag(x) + 0.0 * real(x) for x in rows]))
     return StackedLayers(distinct, tuple(order[place] for place in places))
 
 
@@ -146,7 +148,7 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Any:
         points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
         return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
     index = layer.material.index(wavelength)
-    return index if plan.on("absorption") else each_index(real, index)
+    return joined(index) if plan.on("absorption") else each_index(real, index)
 
 
 def _internal(medium: Any, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:

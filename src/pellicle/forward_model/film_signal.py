@@ -210,6 +210,31 @@ def build(plan: Plan) -> Simulate:
     first wavelength, then of the next, or with the other rows of its kind of signal. `scene` contains numbers
     only (see `scene.free.insert`). The function is pure and can be traced.
     """
+    kind, each = plan.kind, _rows(plan)
+
+    def simulate(scene: Scene) -> Any:
+        signal = each(scene)
+        return stack_rows(signal).T.reshape(-1) if kind.ellipsometric else kind.of_power(signal[0])
+
+    return simulate if plan.reference is None else _against(simulate, build(plan.reference))
+
+
+def is_elementary(plan: Plan) -> bool:
+    """True where NumPy evaluates a plan: plane waves, isotropic homogeneous layers, no averages."""
+    more = ("angle-spread", "orders", "gradient", "anisotropy")
+    return plan.reference is None and not plan.row("coherence").count and not any(map(plan.on, more))
+
+
+def of_numbers(plan: Plan, scene: Scene) -> list[np.ndarray]:
+    """Signals of an elementary plan, as of `build`, of a scene whose numbers are columns (signals, 1)."""
+    rows, kind = np.broadcast_arrays(*_rows(plan)(scene)), plan.kind
+    if not kind.ellipsometric:
+        return [np.asarray(kind.of_power(power)) for power in rows[0]]
+    return [*np.stack(rows, axis=-1).reshape(len(rows[0]), -1)]
+
+
+def _rows(plan: Plan) -> Callable[[Scene], Sequence[Any]]:
+    """The rows (..., wavelengths) of the signal of a scene, without the reference of a contrast."""
     kind, ellipsometric = plan.kind, plan.kind.ellipsometric
     rows = partial(_stokes_rows if ellipsometric else _power_rows, plan)
     finish = _normalised_rows if ellipsometric else _mean
@@ -241,16 +266,15 @@ def build(plan: Plan) -> Simulate:
         mix = turned_stokes if ellipsometric else partial(mixed_powers, plan.polarisation)
         intensities = over_cone(intensities, cone.count, cone.around, mix)
 
-    def simulate(scene: Scene) -> Any:
+    def simulate(scene: Scene) -> Sequence[Any]:
         scene = turned(_shifted(scene))
         for remove in plan.left_out:
             scene = remove(scene)
         signal = finish(intensities(scene)) if averaged else intensities(scene)
         # behind the averages, whose slopes then have three rows
-        signal = kind.isotropic(signal) if ellipsometric and not mixed else signal
-        return stack_rows(signal).T.reshape(-1) if ellipsometric else kind.of_power(signal[0])
+        return kind.isotropic(signal) if ellipsometric and not mixed else signal
 
-    return simulate if plan.reference is None else _against(simulate, build(plan.reference))
+    return simulate
 
 
 def _against(simulate: Simulate, reference: Simulate) -> Simulate:

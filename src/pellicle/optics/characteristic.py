@@ -12,11 +12,22 @@ Source: Born and Wolf, Principles of Optics, section 1.6.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from pellicle.optics.hoisting import hoist
-from pellicle.optics.pair import Number, Pair, abs2, imag, real, sqrt, times_i, where
+from pellicle.optics.pair import (
+    Number,
+    Pair,
+    abs2,
+    custom_jvp,
+    imag,
+    namespace,
+    real,
+    sqrt,
+    times_i,
+    to_complex,
+    where,
+)
 from pellicle.optics.special import exp_and_expm1, sincos
 
 
@@ -29,7 +40,7 @@ class Characteristic(NamedTuple):
     df_dk: Number  # for derivatives only: cos(kq), or e^{2ikq} where the scale varies
 
 
-@jax.custom_jvp
+@custom_jvp
 def matrix_elements(Q: Number, k: Any) -> Characteristic:
     """Return c and f times e^{ikq}: c = 1 + M/2 and f = −iM/2q with M = e^{2ikq} − 1.
 
@@ -59,29 +70,31 @@ def half_expm1(q: Number, k: Any) -> tuple[Number, Any]:
     scale_square, m = exp_and_expm1(k * hoist(-2 * imag(q), k))
     sine, cosine = sincos(k * hoist(real(q), k))
     square, product = sine * sine, sine * cosine
-    join = Pair if isinstance(q, Pair) else jax.lax.complex
+    join = Pair if isinstance(q, Pair) else lambda re, im: to_complex(Pair(re, im))
     return join(m * (0.5 - square) - square, product + m * product), scale_square
 
 
 def _real_elements(Q: Any, k: Any) -> Characteristic:
     """`matrix_elements` of a real Q: the propagating and the evanescent branch, selected by its sign."""
-    q = jnp.sqrt(jnp.abs(Q))
+    xp = namespace(Q, k)
+    q = xp.sqrt(xp.abs(Q))
     zero = q == 0
-    propagating, inverse, q = Q >= 0, hoist(1 / jnp.where(zero, 1.0, q), k), hoist(q, k)
+    propagating, inverse, q = Q >= 0, hoist(1 / xp.where(zero, 1.0, q), k), hoist(q, k)
     sine, cosine = sincos(k * q)
-    scale_square, m = exp_and_expm1(jnp.where(propagating, 0.0, -2 * (k * q)))
-    c = jnp.where(propagating, cosine, 1 + 0.5 * m)
-    f = jnp.where(zero, k, jnp.where(propagating, sine, -0.5 * m) * inverse)
-    df_dk = jnp.where(propagating | _near_zero(Q, k), c, scale_square)
+    scale_square, m = exp_and_expm1(xp.where(propagating, 0.0, -2 * (k * q)))
+    c = xp.where(propagating, cosine, 1 + 0.5 * m)
+    f = xp.where(zero, k, xp.where(propagating, sine, -0.5 * m) * inverse)
+    df_dk = xp.where(propagating | _near_zero(Q, k), c, scale_square)
     return Characteristic(c, f, scale_square, df_dk)
 
 
-@jax.custom_jvp
+@custom_jvp
 def propagating_elements(Q: Any, k: Any) -> Characteristic:
     """Return c and f of a real and positive Q, where the wave propagates without loss; the scale is 1."""
-    q = jnp.sqrt(Q)
+    xp = namespace(Q, k)
+    q = xp.sqrt(Q)
     sine, cosine = sincos(k * hoist(q, k))
-    return Characteristic(cosine, sine * hoist(1 / q, k), jnp.ones_like(cosine), cosine)
+    return Characteristic(cosine, sine * hoist(1 / q, k), xp.ones_like(cosine), cosine)
 
 
 def _near_zero(Q: Number, k: Any) -> Any:
@@ -122,7 +135,7 @@ def element_slopes(
     return values, slopes
 
 
-@jax.custom_jvp
+@custom_jvp
 def scale_exponent(Q: Number, k: Any) -> Number:
     """Return ikq, the logarithm of the scale of `matrix_elements`, whose derivative is that of the scale.
 

@@ -36,7 +36,16 @@ from pellicle.optics.interface import (
     zero_where,
 )
 from pellicle.optics.layer_rows import LayerRows, StackedLayers, full, layer_rows, repeated
-from pellicle.optics.pair import Number, abs2, is_real, times_i
+from pellicle.optics.pair import (
+    Number,
+    abs2,
+    inverse_root,
+    is_real,
+    namespace,
+    scan,
+    stop_gradient,
+    times_i,
+)
 from pellicle.optics.repeats import Repeats, matrix_power
 from pellicle.optics.response import Amplitudes, Response
 
@@ -63,7 +72,8 @@ def stack(
 
     bottom, top, q_top = (full(number, shape, dtype) for number in (substrate, ambient, q0))
     q_bottom: Any = stored_by_cpu(normal(bottom, a))
-    empty = equal_media(top, bottom) & jnp.all(equal_media(top, *rows.points), axis=0)
+    xp = namespace(rows, top, bottom, q_top)
+    empty = equal_media(top, bottom) & xp.all(equal_media(top, *rows.points), axis=0)
     points = jax.tree.map(lambda x: x[::-1], rows.points[::-1])
     upside_down = LayerRows(points, rows.depth[::-1], None, rows.runs[::-1])
     letters = polarisations[:1] if angle is None else polarisations
@@ -74,9 +84,9 @@ def stack(
         upper, lower = both
         faces_above: list[Any] = [q_top[None], normal(lower, a)]
         faces_below: list[Any] = [normal(upper, a), q_bottom[None]]
-        q, q_ = stored_by_cpu((jnp.concatenate(faces_above), jnp.concatenate(faces_below)))
-        weight = jnp.concatenate([e0[:, None], _weight(lower, letters)], axis=1)
-        weight_ = jnp.concatenate([_weight(upper, letters), e2[:, None]], axis=1)
+        q, q_ = stored_by_cpu((xp.concatenate(faces_above), xp.concatenate(faces_below)))
+        weight = xp.concatenate([e0[:, None], _weight(lower, letters)], axis=1)
+        weight_ = xp.concatenate([_weight(upper, letters), e2[:, None]], axis=1)
         down_faces = _rough_faces(q, weight, q_, weight_, rows.rough)[:, :, ::-1]
         up_faces = _rough_faces(q_, weight_, q, weight, rows.rough)
     # all polarisations at once: the elements of an isotropic layer are the same for s and p
@@ -105,7 +115,7 @@ def _weight(index: Any, polarisations: str) -> Any:
     """Return the divisor of q in the boundary condition, (polarisations, ...): 1 for s, ε for p."""
     permittivity: Any = tangential_permittivity(index)
     p = np.array([letter == "p" for letter in polarisations])
-    return jnp.where(p.reshape(-1, *[1] * permittivity.ndim), permittivity, 1)
+    return namespace(permittivity).where(p.reshape(-1, *[1] * permittivity.ndim), permittivity, 1)
 
 
 def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: Any) -> Any:
@@ -117,31 +127,32 @@ def _rough_faces(q: Any, weight: Any, q_below: Any, weight_below: Any, rough: An
     t exp(k₀²σ² (q − q′)²/2). In terms of fields this is diagonal, with the entire function
     (1 − e^−x)/x, so that a smooth face, or one at a critical angle, is no special case.
     """
-    square = rough * rough
+    square, xp = rough * rough, namespace(rough, q, q_below, weight, weight_below)
     damping, passed = stored_by_cpu(
-        (square * _expm1_ratio(2 * square * q * q_below), jnp.exp(-0.5 * square * (q - q_below) ** 2))
+        (square * _expm1_ratio(2 * square * q * q_below), xp.exp(-0.5 * square * (q - q_below) ** 2))
     )
     E = 1 + damping * q_below * (q_below * weight / weight_below - q)
     H = 1 + damping * q * (q * weight_below / weight - q_below)
-    return stored_by_cpu(jnp.stack([E * passed, H * passed]))
+    return stored_by_cpu(xp.stack([E * passed, H * passed]))
 
 
 def _expm1_ratio(x: Any) -> Any:
     """Return (1 − e^−x)/x, by its Taylor series near 0."""
-    near = abs2(x) < 0.01
-    small, far = jnp.where(near, x, 0), jnp.where(near, 1, x)
-    taylor = jnp.ones_like(x)
+    xp, near = namespace(x), abs2(x) < 0.01
+    small, far = xp.where(near, x, 0), xp.where(near, 1, x)
+    taylor = xp.ones_like(x)
     for j in range(12, 1, -1):
         taylor = 1 - small * taylor / j
-    return jnp.where(near, taylor, (1 - jnp.exp(-far)) / far)
+    return xp.where(near, taylor, (1 - xp.exp(-far)) / far)
 
 
 def _scaled_fields(rows: LayerRows, admittance: Any, faces: Any, a: Any, polarisations: str) -> Any:
     """Return (E, H) at the far face for a unit wave in the last medium, the first row first, and |scale|²."""
     if rows.runs:
         return _repeated_fields(rows, admittance, a, polarisations)
-    start = (jnp.ones_like(admittance), admittance), jnp.ones_like(jnp.real(admittance))
-    inner = None if faces is None else jnp.moveaxis(faces[:, :, :-1], 2, 0)
+    xp = namespace(admittance, faces)
+    start = (xp.ones_like(admittance), admittance), xp.ones_like(admittance.real)
+    inner = None if faces is None else xp.moveaxis(faces[:, :, :-1], 2, 0)
     ((E, H), scale_square), _ = _through(start, rows, inner, a, polarisations)
     return ((E, H) if faces is None else (E * faces[0, :, -1], H * faces[1, :, -1])), scale_square
 
@@ -166,12 +177,12 @@ def _through(start: Any, rows: LayerRows, faces: Any, a: Any, polarisations: str
             c, f, layer_scale, _ = stored_by_cpu(matrix_elements(square, k))
             E, H = E * (c + f * skew) - 1j * (H * (f * alpha)), H * (c - f * skew) - 1j * (E * (f * beta))
         E, H = stored_by_cpu((E, H))
-        size = jax.lax.stop_gradient(abs2(E) + abs2(H))
-        size = jnp.sum(size, axis=0) if columns else size
-        shrink = jax.lax.rsqrt(size)
+        size = stop_gradient(abs2(E) + abs2(H))
+        size = size.sum(axis=0) if columns else size
+        shrink = inverse_root(size)
         return ((E * shrink, H * shrink), scale_square * layer_scale / size), None
 
-    return jax.lax.scan(through_layer, start, (rows.points, rows.depth, faces))
+    return scan(through_layer, start, (rows.points, rows.depth, faces))
 
 
 def _repeated_fields(rows: LayerRows, admittance: Any, a: Any, polarisations: str) -> Any:

@@ -24,7 +24,20 @@ import jax
 import jax.numpy as jnp
 
 from pellicle.optics.hoisting import compute_once, slopes_once
-from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real, to_complex, to_pair
+from pellicle.optics.pair import (
+    Number,
+    Pair,
+    abs2,
+    conj,
+    custom_jvp,
+    imag,
+    namespace,
+    real,
+    stop_gradient,
+    to_complex,
+    to_pair,
+    where,
+)
 from pellicle.optics.response import Response, transmittance
 
 
@@ -54,18 +67,18 @@ def transmitted_stokes(s: Response, p: Response) -> Stokes:
     those of the electric field, and the phase of 1/denominator.
     """
     powers = transmittance(s), transmittance(p)
-    product = jnp.conj(to_complex(s.denominator)) * to_complex(p.denominator)
-    cross = _root(powers[0] * powers[1]) * product / jnp.abs(product)
+    product = conj(to_complex(s.denominator)) * to_complex(p.denominator)
+    cross = _root(powers[0] * powers[1]) * product / abs(product)
     return stokes_from_sums(*powers, cross)
 
 
 def _root(power: Any) -> Any:
     """Return the square root, with a finite slope where nothing is transmitted."""
-    some = power > 0
-    return jnp.where(some, jnp.sqrt(jnp.where(some, power, 1.0)), 0.0)
+    xp, some = namespace(power), power > 0
+    return xp.where(some, xp.sqrt(xp.where(some, power, 1.0)), 0.0)
 
 
-@jax.custom_jvp
+@custom_jvp
 def _amplitude(reflected: Number, denominator: Number) -> Any:
     """Return r = reflected / denominator, stored as a complex array that one loop computes.
 
@@ -97,28 +110,28 @@ def cross_products(s: Response, p: Response) -> CrossProducts:
     1/denominator.
     """
     ds, dp = to_complex(s.denominator), to_complex(p.denominator)
-    product = jnp.conj(ds) * dp
-    phase = product / jnp.abs(product)
+    product = conj(ds) * dp
+    phase = product / abs(product)
     powers = transmittance(p) * transmittance(s)
     return CrossProducts(
-        jnp.conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
+        conj(to_complex(p.reflected) / dp) * (to_complex(s.reflected) / ds),
         _root(powers) * phase,
         powers * phase * phase,
-        jnp.conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
+        conj(to_complex(p.below) / dp) * (to_complex(s.below) / ds),
     )
 
 
 def stokes_from_sums(s: Any, p: Any, cross: Any) -> Stokes:
     """Return the Stokes sums from sums over orders of |x_s|², |x_p|² and conj(x_p) x_s (thick plates)."""
-    return Stokes(s - p, 2 * jnp.real(cross), 2 * jnp.imag(cross), s + p)
+    return Stokes(s - p, 2 * real(cross), 2 * imag(cross), s + p)
 
 
 def normalised(sums: Stokes) -> tuple[Any, Any, Any]:
     """Return N, C, S on the unit sphere; all 0 where nothing is reflected and Ψ and Δ are undefined."""
     dark = sums.intensity < jnp.finfo(jnp.result_type(sums.intensity)).tiny
     # scaled first: the derivative of 1/x contains 1/x², which overflows where little is reflected
-    size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, sums.intensity)))
-    inverse = jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, sums.intensity * size))
+    size = stop_gradient(where(dark, 0.0, 1 / where(dark, 1.0, sums.intensity)))
+    inverse = where(dark, 0.0, 1 / where(dark, 1.0, sums.intensity * size))
     n, c, s = (x * size * inverse for x in sums[:3])
     return n, c, s
 
@@ -197,5 +210,5 @@ def inverse_intensity(intensity: Any) -> Any:
     """Return 1/m11; 0 where there is no light."""
     dark = intensity < jnp.finfo(intensity.dtype).tiny
     # scaled first: the derivative of 1/x contains 1/x², which overflows where there is little light
-    size = jax.lax.stop_gradient(jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, intensity)))
-    return size * jnp.where(dark, 0.0, 1 / jnp.where(dark, 1.0, intensity * size))
+    size = stop_gradient(where(dark, 0.0, 1 / where(dark, 1.0, intensity)))
+    return size * where(dark, 0.0, 1 / where(dark, 1.0, intensity * size))

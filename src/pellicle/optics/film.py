@@ -32,7 +32,7 @@ from pellicle.optics.interface import (
     transverse,
     zero_where,
 )
-from pellicle.optics.pair import Number, abs2, conj, is_real, real, times_i, where
+from pellicle.optics.pair import Number, abs2, conj, custom_jvp, is_real, namespace, real, times_i, where
 from pellicle.optics.response import Amplitudes, Response
 from pellicle.optics.special import sincos, sincos_squares
 
@@ -44,7 +44,7 @@ class AmplitudesAndSquares(NamedTuple):
     squares: Amplitudes
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(3,))
+@partial(custom_jvp, nondiff_argnums=(3,))
 def _amplitudes(
     sides: tuple[Amplitudes, ...], Q: Number, k: Any, propagating: bool
 ) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
@@ -76,7 +76,8 @@ def _propagating_amplitudes(
     sides: tuple[Amplitudes, ...], Q: Any, k: Any
 ) -> tuple[tuple[AmplitudesAndSquares, ...], Any]:
     """Amplitudes in a lossless layer: |A c − iB f|² of real A and B is a sum of two squares."""
-    q = jnp.sqrt(Q)
+    xp = namespace(Q, k)
+    q = xp.sqrt(Q)
     phase = k * hoist(q, k)
     sine, cosine = sincos(phase)
     sine_square, cosine_square = sincos_squares(phase)
@@ -90,7 +91,7 @@ def _propagating_amplitudes(
         squares = Amplitudes(*(a * cosine_square + b * sine_square for a, b in weights))
         return AmplitudesAndSquares(both.values, squares)
 
-    return tuple(one(side) for side in sides), jnp.ones_like(cosine)
+    return tuple(one(side) for side in sides), xp.ones_like(cosine)
 
 
 def _grid_amplitudes(pairs: list[tuple[Number, Number]], half: Number, k: Any) -> AmplitudesAndSquares:
@@ -108,9 +109,9 @@ def _grid_amplitudes(pairs: list[tuple[Number, Number]], half: Number, k: Any) -
 def _rotated(A: Number, C: Number) -> tuple[Number, Any]:
     """Return A e^{−iθ} and |C|, θ the phase of C; where C is 0, θ may be anything."""
     square = abs2(C)
-    zero = square == 0
-    size = jnp.sqrt(jnp.where(zero, 1.0, square))
-    return where(zero, A + 0.0 * C, A * conj(C) / size), jnp.where(zero, 0.0, size)
+    xp, zero = namespace(square), square == 0
+    size = xp.sqrt(xp.where(zero, 1.0, square))
+    return where(zero, A + 0.0 * C, A * conj(C) / size), xp.where(zero, 0.0, size)
 
 
 def _amplitude_slopes(propagating: bool, primal: Any, tangent: Any) -> Any:

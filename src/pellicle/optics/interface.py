@@ -9,6 +9,7 @@ isotropic medium of index n_y (`principal_axes.seen_by`).
 """
 
 from functools import reduce
+from operator import and_
 from typing import Any, NamedTuple
 
 import jax
@@ -17,7 +18,18 @@ import numpy as np
 from jax.core import Tracer
 
 from pellicle.optics.anisotropy import Index, Medium, Principal, each_index, tangential_permittivity
-from pellicle.optics.pair import Number, Pair, abs2, conj, is_real, real, sqrt, where
+from pellicle.optics.pair import (
+    Number,
+    Pair,
+    abs2,
+    conj,
+    is_real,
+    namespace,
+    real,
+    sqrt,
+    stop_gradient,
+    where,
+)
 
 _NUMBERS = int | float | complex | np.ndarray | np.generic | jax.Array
 
@@ -47,10 +59,11 @@ def transverse(ambient: Any, angle: Any) -> tuple[Any, Any]:
     if isinstance(angle, Inside):
         return angle.a, normal(ambient, angle.a)
     # the cosine of a float32 π/2 is negative, and would bring T below 0 and R above 1
-    cosine = jnp.cos(angle)
+    xp = namespace(angle)
+    cosine = xp.cos(angle)
     least = float(jnp.finfo(cosine.dtype).eps) ** 1.25
-    cosine = cosine + jax.lax.stop_gradient(jnp.maximum(least - cosine, 0.0))
-    a, q0 = ambient * jnp.sin(angle), ambient * cosine
+    cosine = cosine + stop_gradient(xp.maximum(least - cosine, 0.0))
+    a, q0 = ambient * xp.sin(angle), ambient * cosine
     return Transverse(a, ambient, q0 * q0 / (ambient + a)), q0
 
 
@@ -88,13 +101,13 @@ def equal_media(ambient: Index, *others: Index) -> Any:
             pairs += [(one.x, another.x), (one.z, another.z)]
         else:
             pairs.append((other, ambient))
-    return reduce(jnp.logical_and, [abs2(a - b) == 0 for a, b in pairs])
+    return reduce(and_, [abs2(a - b) == 0 for a, b in pairs])
 
 
 def zero_where(test: Any, amplitude: Number) -> Number:
     """Set an amplitude to exactly 0 where `test` is true, without a rounding error; its slope stays."""
     exact = where(test, amplitude, 0.0 * amplitude)
-    return amplitude - jax.tree.map(jax.lax.stop_gradient, exact)
+    return amplitude - jax.tree.map(stop_gradient, exact)
 
 
 def propagates(medium: Any, ambient: Any, angle: Any) -> bool:
@@ -117,7 +130,8 @@ def allow_tunnelling(index: Medium) -> Any:
     """Turn a real index into a `Pair`, which does not promise that the wave propagates."""
     if isinstance(index, tuple):
         return each_index(allow_tunnelling, index)
-    return Pair(index, jnp.zeros_like(jnp.asarray(index) * 1.0)) if is_real(index) else index
+    xp = namespace(index)
+    return Pair(index, xp.zeros_like(xp.asarray(index) * 1.0)) if is_real(index) else index
 
 
 def fresnel(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: str) -> Number:
@@ -155,7 +169,7 @@ def incident_factor(index: Index, q: Number, polarisation: str) -> Any:
     amplitude = q if polarisation == "s" else tangential_permittivity(index) * q
     flux = normal_flux(index, q, polarisation)
     zero = flux == 0
-    return jnp.where(zero, 0.0, 4 * abs2(amplitude) / jnp.where(zero, 1.0, flux))
+    return where(zero, 0.0, 4 * abs2(amplitude) / where(zero, 1.0, flux))
 
 
 def reflectance(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: str) -> Any:
@@ -173,4 +187,4 @@ def transmittance(n1: Index, q1: Number, n2: Index, q2: Number, polarisation: st
     else:
         e1, e2 = tangential_permittivity(n1), tangential_permittivity(n2)
         amplitude = 4 * abs2(e1 * q1) / abs2(e2 * q1 + e1 * q2)
-    return jnp.where(zero, 0.0, amplitude * ratio)
+    return where(zero, 0.0, amplitude * ratio)

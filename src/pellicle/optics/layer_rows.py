@@ -15,7 +15,7 @@ import numpy as np
 
 from pellicle.optics.anisotropy import Index, Principal
 from pellicle.optics.gradient import Gradient
-from pellicle.optics.pair import Number, Pair, imag, is_real, real, to_complex
+from pellicle.optics.pair import Number, Pair, imag, is_real, namespace, real, to_complex
 from pellicle.optics.repeats import Repeats, places
 
 
@@ -46,7 +46,8 @@ def stacked(layers: Sequence[Number], like: Any) -> StackedLayers:
     position = {key: row for row, key in enumerate(dict.fromkeys(keys))}
     distinct = [layers[first[key]] for key in position]
     shape = jnp.broadcast_shapes(*map(jnp.shape, jax.tree.leaves(distinct)))
-    parts = ([jnp.broadcast_to(part(x), shape) for x in distinct] for part in (real, imag))
+    xp = namespace(distinct, like)
+    parts = ([xp.broadcast_to(part(x), shape) for x in distinct] for part in (real, imag))
     re, im = (stack_numbers(part, like) for part in parts)
     joined = re if all(map(is_real, distinct)) else Pair(re, im)
     return StackedLayers(joined, tuple(position[key] for key in keys))
@@ -54,8 +55,8 @@ def stacked(layers: Sequence[Number], like: Any) -> StackedLayers:
 
 def stack_numbers(numbers: Sequence[Any], like: Any) -> Any:
     """Return numbers of any shapes as an array (numbers, ...), in the precision of `like` or a higher one."""
-    dtype = jnp.result_type(*numbers, like)
-    return jnp.stack([x.astype(dtype) for x in jnp.broadcast_arrays(*numbers)])
+    dtype, xp = jnp.result_type(*numbers, like), namespace(*numbers)
+    return xp.stack([x.astype(dtype) for x in xp.broadcast_arrays(*numbers)])
 
 
 class LayerRows(NamedTuple):
@@ -89,15 +90,16 @@ def layer_rows(
     leaves = jax.tree.leaves((media, plain, roughness))
     shape = jnp.broadcast_shapes(*map(jnp.shape, leaves), *(jnp.shape(x)[1:] for x in rowed))
     dtype = jnp.promote_types(precision, jnp.complex64)
+    xp = namespace(media, layers, phases, roughness)
 
     def in_rows(number: Number) -> Any:
         """A complex number for each row, (rows, ...)."""
         rows = to_complex(number).astype(dtype)
         lacking = (1,) * (len(shape) + 1 - rows.ndim)
-        return jnp.broadcast_to(rows.reshape(rows.shape[0], *lacking, *rows.shape[1:]), (len(rows), *shape))
+        return xp.broadcast_to(rows.reshape(rows.shape[0], *lacking, *rows.shape[1:]), (len(rows), *shape))
 
     def joined(blocks: Sequence[Any]) -> Any:
-        return jnp.concatenate(blocks) if blocks else jnp.zeros((0, *shape), dtype)
+        return xp.concatenate(blocks) if blocks else xp.zeros((0, *shape), dtype)
 
     def index_at(point: int) -> Any:
         if isinstance(layers, StackedLayers):
@@ -110,7 +112,7 @@ def layer_rows(
         each = [in_rows(x[point]) if isinstance(x, Gradient) else full(x, shape, dtype)[None] for x in layers]
         return joined(each)
 
-    depth = jnp.real(in_rows(phases) if counts else joined([]))
+    depth = real(in_rows(phases) if counts else joined([]))
     if max(counts, default=1) > 1:
         share = np.array(counts, depth.dtype).reshape(-1, *[1] * len(shape))
         depth = jnp.repeat(depth / share, np.array(counts), 0, total_repeat_length=sum(counts))
@@ -121,11 +123,11 @@ def layer_rows(
     if roughness is None:
         return LayerRows(points, depth, None)
     faces = [i for i, x in enumerate(roughness) if not (isinstance(x, float) and x == 0)]
-    rough = jnp.zeros((sum(counts) + 1, *shape), depth.dtype)
-    if faces:
-        own = jnp.real(in_rows(stack_numbers([roughness[i] for i in faces], like)))
-        rough = rough.at[np.cumsum([0, *counts])[faces]].set(own)
-    return LayerRows(points, depth, rough)
+    smooth = xp.zeros((1, *shape), depth.dtype)
+    own = real(in_rows(stack_numbers([roughness[i] for i in faces], like))) if faces else smooth
+    where = dict(zip(np.cumsum([0, *counts])[faces].tolist(), own, strict=False))
+    rough = [where[i][None] if i in where else smooth for i in range(sum(counts) + 1)]
+    return LayerRows(points, depth, xp.concatenate(rough))
 
 
 def slice_counts(layers: Sequence[Any]) -> list[int]:
@@ -159,4 +161,5 @@ def full(number: Index, shape: tuple[int, ...], dtype: Any) -> Any:
     """Return an index as complex arrays of a shape."""
     if isinstance(number, Principal):
         return Principal(*(full(x, shape, dtype) for x in number))
-    return jnp.broadcast_to(to_complex(number).astype(dtype), shape)
+    number = to_complex(number).astype(dtype)
+    return namespace(number).broadcast_to(number, shape)

@@ -32,8 +32,8 @@ def namespace(*arrays: Any) -> Any:
 class custom_jvp:
     """`jax.custom_jvp`, which calls the function itself with NumPy arrays."""
 
-    def __init__(self, function: Callable[..., Any]):
-        self.function, self.traced = function, jax.custom_jvp(function)
+    def __init__(self, function: Callable[..., Any], nondiff_argnums: tuple[int, ...] = ()):
+        self.function, self.traced = function, jax.custom_jvp(function, nondiff_argnums=nondiff_argnums)
         self.defjvp = self.traced.defjvp
         update_wrapper(self, function)
 
@@ -48,6 +48,25 @@ def fori_loop(lower: int, upper: int, step: Callable[[Any, Any], Any], state: An
     for i in range(lower, upper):
         state = step(i, state)
     return state
+
+
+def scan(step: Callable[[Any, Any], Any], state: Any, rows: Any) -> tuple[Any, Any]:
+    """`jax.lax.scan`, or a loop in Python over NumPy's rows, of a step without outputs of its own."""
+    if namespace(state, rows) is not np:
+        return jax.lax.scan(step, state, rows)
+    for i in range(len(jax.tree_util.tree_leaves(rows)[0])):
+        state, _ = step(state, jax.tree_util.tree_map(lambda x, i=i: x[i], rows))
+    return state, None
+
+
+def inverse_root(x: Any) -> Any:
+    """Return 1/√x of a real array."""
+    return 1 / np.sqrt(x) if namespace(x) is np else jax.lax.rsqrt(x)
+
+
+def stop_gradient(x: Any) -> Any:
+    """`jax.lax.stop_gradient`; NumPy's arrays have none."""
+    return x if namespace(x) is np else jax.lax.stop_gradient(x)
 
 
 if TYPE_CHECKING:
@@ -208,9 +227,16 @@ def to_pair(z: Number) -> Number:
 def to_complex(z: Number) -> Any:
     """Convert any number to one complex array, as public functions return it."""
     re, im = parts(z)
+    if namespace(re, im) is np:
+        return np.asarray(_or_zero(re) + 1j * _or_zero(im))
     dtype = jnp.promote_types(jnp.result_type(_or_zero(re), _or_zero(im)), jnp.float32)
     re, im = jnp.broadcast_arrays(jnp.asarray(_or_zero(re)), jnp.asarray(_or_zero(im)))
     return jax.lax.complex(re.astype(dtype), im.astype(dtype))
+
+
+def joined(z: Any) -> Any:
+    """Convert a `Pair` of NumPy's arrays, which compute faster with complex ones; keep anything else."""
+    return to_complex(z) if isinstance(z, Pair) and namespace(z) is np else z
 
 
 def where(test: Any, yes: Number, no: Number) -> Number:

@@ -4,7 +4,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
+import numpy as np
+
+from pellicle.optics.pair import namespace
 
 
 class Face(NamedTuple):
@@ -23,12 +25,16 @@ def internal_transmittance(normal_extinction: Any, thickness_mm: Any, wavelength
     >>> round(float(internal_transmittance(1e-6, 1.0, 500.0)), 6)
     0.97518
     """
-    return jnp.exp(-4e6 * jnp.pi * normal_extinction * thickness_mm / wavelength)
+    return namespace(normal_extinction, thickness_mm, wavelength).exp(
+        -4e6 * np.pi * normal_extinction * thickness_mm / wavelength
+    )
 
 
 def internal_absorptance(normal_extinction: Any, thickness_mm: Any, wavelength: Any) -> Any:
     """Return what one passage absorbs, 1 − `internal_transmittance`, to full precision where it is small."""
-    return -jnp.expm1(-4e6 * jnp.pi * normal_extinction * thickness_mm / wavelength)
+    return -namespace(normal_extinction, thickness_mm, wavelength).expm1(
+        -4e6 * np.pi * normal_extinction * thickness_mm / wavelength
+    )
 
 
 @jax.tree_util.register_dataclass
@@ -105,7 +111,7 @@ def geometric_sum(ratio: Any, count: int) -> Any:
     >>> float(geometric_sum(0.5, 3))
     1.75
     """
-    total = jnp.ones_like(ratio)
+    total = namespace(ratio).ones_like(ratio)
     for _ in range(count - 1):
         total = 1 + ratio * total
     return total

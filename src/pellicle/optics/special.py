@@ -45,6 +45,8 @@ def sincos(x: Any) -> tuple[Any, Any]:
 
     **Source:** coefficients of Cephes (S. Moshier), sin.c and sinf.c.
     """
+    if namespace(x) is np:
+        return np.sin(x), np.cos(x)
     number = x.dtype.type
     quarter, r = _reduce_argument(x)
     z = r * r
@@ -68,6 +70,8 @@ def sincos_squares(x: Any) -> tuple[Any, Any]:
     With the reduced argument |r| ≤ π/4, sin² r = Σ (−1)ⁿ⁺¹ 2²ⁿ⁻¹ r²ⁿ/(2n)!, and cos² r = 1 − sin² r
     loses no digits, for it is at least ½. Of the number of quarter turns only the parity counts.
     """
+    if namespace(x) is np:
+        return np.sin(x) ** 2, np.cos(x) ** 2
     quarter, r = _reduce_argument(x)
     z = r * r
     terms = 10 if x.dtype == jnp.float64 else 6
@@ -97,6 +101,8 @@ def exp_and_expm1(x: Any) -> tuple[Any, Any]:
     1.2e-7 in float32, larger only next to underflow, where eˣ is 1e-290 (1e-30) or less. The power of two
     is written into the exponent's bits and has no derivative of its own.
     """
+    if namespace(x) is np:
+        return np.exp(x), np.expm1(x)
     double = x.dtype == jnp.float64
     number, whole = x.dtype.type, jnp.int64 if double else jnp.int32
     bias, bits, terms = (1023, 52, 13) if double else (127, 23, 7)

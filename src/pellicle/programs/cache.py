@@ -22,6 +22,7 @@ import tempfile
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import lru_cache, wraps
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_type_hints
 
@@ -232,12 +233,18 @@ class _Places(NamedTuple):
         return jax.tree_util.tree_unflatten(self.structure, [arrays[row] for row in self.order])
 
 
-def kept(function: Program, *, calls: Calls = "some") -> Program:
+UNCOMPILED = 8
+"""Calls of a program that `kept` leaves to the same formulas without a program. Compilation takes as long as
+20 to 60 of them (`benchmarks/cold_start.py`)."""
+
+
+def kept(function: Program, *, calls: Calls = "some", at_first: Program | None = None) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
     its `repr` says all that the program depends on. The arrays are NumPy's. With many `calls` it is compiled
-    to run fast, with few in a short time.
+    to run fast, with few in a short time. `at_first`, of the same arguments and results, takes the first
+    `UNCOMPILED` calls of a program that is not kept yet: it returns None where it cannot.
     """
 
     @lru_cache(maxsize=1)
@@ -257,11 +264,17 @@ def kept(function: Program, *, calls: Calls = "some") -> Program:
         own = dict(zip(keys, leaves, strict=True))
         rows = {key: row for row, key in enumerate(own)}
         places = _Places(structure, tuple(rows[key] for key in keys))
-        if not folder or "://" in folder:  # JAX can cache in a cloud, too
+        shapes = tuple((np.shape(x), np.result_type(x)) for x in own.values())
+        # JAX can cache in a cloud, too
+        program = function, calls, plan, places, shapes, None if "://" in str(folder) else folder
+        if at_first is not None and _is_new(program):
+            result = at_first(plan, *arguments)
+            if result is not None:
+                return result
+        if not program[-1]:
             return jax.device_get(jitted()(plan, places, *own.values()))
         arrays = [*map(np.asarray, own.values())]
-        shapes = tuple((a.shape, a.dtype) for a in arrays)
-        run, output = _load(function, calls, plan, places, shapes, folder)
+        run, output = _load(*program)
         # NumPy's arrays are views of the program's own, and cheaper to work on
         return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
 
@@ -277,7 +290,24 @@ def _load(
     def flat(*arrays: Any) -> list[Any]:
         return jax.tree_util.tree_leaves(function(plan, *places.filled(arrays)))
 
-    cache = Path(folder)
+    path, key = _place(function, calls, plan, places, shapes, folder)
+    inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
+    run = load(path, key) if jax.default_backend() == "cpu" else None
+    if run is None:
+        options = compiler_options(calls)  # found by compiling, which a kept program needs not
+        if jax.default_backend() == "cpu":
+            run = make(path, key, flat, inputs, Path(folder), options)
+        if run is None:
+            run = jax.jit(_traced(path.with_suffix(".export"), flat, inputs).call, compiler_options=options)
+    kind = get_type_hints(function)["return"]
+    return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
+
+
+@lru_cache(maxsize=256)
+def _place(
+    function: Program, calls: Calls, plan: Hashable, places: _Places, shapes: tuple, folder: str
+) -> tuple[Path, bytes]:
+    """The file of a program, and its key."""
     from jaxlib.version import __version__ as jaxlib
 
     about = function.__module__, function.__qualname__, calls, repr(plan), str(places), str(shapes)
@@ -285,17 +315,18 @@ def _load(
     settings = [jax.config.values[name] for name in ("jax_enable_x64", "jax_default_matmul_precision")]
     versions = jax.__version__, jaxlib, jax.default_backend(), _hardware(), os.environ.get("XLA_FLAGS", "")
     key = hashlib.sha256(repr((*about, (*versions, *settings), _sources())).encode()).digest()
-    path = cache / "programs" / key.hex()
-    inputs = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
-    run = load(path, key) if jax.default_backend() == "cpu" else None
-    if run is None:
-        options = compiler_options(calls)  # found by compiling, which a kept program needs not
-        if jax.default_backend() == "cpu":
-            run = make(path, key, flat, inputs, cache, options)
-        if run is None:
-            run = jax.jit(_traced(path.with_suffix(".export"), flat, inputs).call, compiler_options=options)
-    kind = get_type_hints(function)["return"]
-    return run, jax.tree_util.tree_structure(kind(*range(len(kind._fields))))
+    return Path(folder) / "programs" / key.hex(), key
+
+
+def _is_new(program: tuple) -> bool:
+    """True at the first `UNCOMPILED` calls of a program that no earlier process has kept."""
+    called = next(_calls_of(*program))
+    return called < UNCOMPILED and not (program[-1] and _place(*program)[0].exists())
+
+
+@lru_cache(maxsize=256)
+def _calls_of(*program: Any) -> Iterator[int]:
+    return count()
 
 
 def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Any:

@@ -6,14 +6,13 @@ Apart from the other modules of signals, which import no JAX.
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from pellicle.optics import ellipsometry
 from pellicle.optics.ellipsometry import inverse_intensity, mueller_elements
 from pellicle.optics.hoisting import stack_rows, stored
-from pellicle.optics.pair import Number, abs2, conj, imag, real
+from pellicle.optics.pair import Number, abs2, conj, imag, inverse_root, namespace, real, where
 
 Matrix = Sequence[Sequence[Any]]
 """Elements of a Mueller matrix, row by row."""
@@ -26,13 +25,13 @@ def columns(rows: Any, chosen: Sequence[int]) -> Any:
 
 def in_frame(frame: Any, rows: Any) -> Any:
     """Components of rows (points, channels) in a frame (points, channels, channels), if there is one."""
-    return rows if frame is None else jnp.einsum("pij,pj->pi", frame, rows)
+    return rows if frame is None else namespace(frame, rows).einsum("pij,pj->pi", frame, rows)
 
 
 def lengths(rows: Any, axis: int = 1, keep: bool = True) -> tuple[Any, Any]:
     """Squared length of N, C, S and its inverse root, 0 where nothing is reflected."""
-    square = jnp.sum(rows**2, axis=axis, keepdims=keep)
-    return square, jnp.where(square > 0, jax.lax.rsqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+    square = (rows**2).sum(axis=axis, keepdims=keep)
+    return square, where(square > 0, inverse_root(where(square > 0, square, 1.0)), 0.0)
 
 
 def with_depolarisation(rows: Any, count: int) -> Any:
@@ -82,7 +81,8 @@ def angles_of_sums(sums: Sequence[Any]) -> list[Any]:
 
 def isotropic_matrix(n: Any, c: Any, s: Any, m22: Any = None, m44: Any = None) -> Matrix:
     """The normalised Mueller matrix of an isotropic sample; m22 and m44 are of a cone of light."""
-    one, none = jnp.ones_like(n), jnp.zeros_like(n)
+    xp = namespace(n)
+    one, none = xp.ones_like(n), xp.zeros_like(n)
     m22, m44 = one if m22 is None else m22, c if m44 is None else m44
     return [[one, -n, none, none], [-n, m22, none, none], [none, none, c, s], [none, none, -s, m44]]
 
@@ -106,7 +106,8 @@ def angles(sphere: np.ndarray) -> np.ndarray:
 
 def without_mixing(rows: Sequence[Any]) -> list[Any]:
     """N, C, S of AnE, and of Aps and Asp where r_ps = r_sp = 0."""
-    one, none = jnp.ones_like(rows[0]), jnp.zeros_like(rows[0])
+    xp = namespace(rows[0])
+    one, none = xp.ones_like(rows[0]), xp.zeros_like(rows[0])
     return [*rows, *(one, none, none) * 2]
 
 

@@ -26,7 +26,7 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
-from pellicle.forward_model.film_signal import depolarises
+from pellicle.forward_model.film_signal import depolarises, is_elementary, of_numbers
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.coherent import FEW
 from pellicle.programs.cache import kept
@@ -62,7 +62,18 @@ def _simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values:
     return Simulated(jax.lax.map(lambda each: form.simulate(insert(scene, each), data), values))
 
 
-simulated, simulated_once = kept(_simulated), kept(_simulated, calls="few")
+def _of_numbers(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulated | None:
+    """The same by NumPy; None for a plan that it does not evaluate."""
+    if not (isinstance(form, SpectrumForm) and is_elementary(form.plan)):
+        return None
+    rows, each = np.unique(values, axis=0, return_inverse=True)  # without those that are padding
+    columns = insert(scene, list(rows.T[:, :, None]))
+    signals = [form.compared(signal, scene, data) for signal in of_numbers(form.plan, columns)]
+    return Simulated(np.stack(signals)[each.ravel()])
+
+
+simulated = kept(_simulated, at_first=_of_numbers)
+simulated_once = kept(_simulated, calls="few", at_first=_of_numbers)
 
 
 class Number(NamedTuple):

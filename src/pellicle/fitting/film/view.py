@@ -40,7 +40,11 @@ class SpectrumForm:
 
     def simulate(self, scene: Scene, data: Data) -> Any:
         """The measured channels of the signal, (points · channels,)."""
-        rows = build(self.plan)(scene).reshape(scene.light.wavelength.size, -1)
+        return self.compared(build(self.plan)(scene), scene, data)
+
+    def compared(self, signal: Any, scene: Scene, data: Data) -> Any:
+        """The measured channels (points · channels,) of a signal of the plan."""
+        rows = signal.reshape(scene.light.wavelength.size, -1)
         return self.signal.compared(rows, data.frame, depolarises(self.plan))
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
