@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares as scipy_least_squares
 
-from pellicle.fitting.lanes import least_squares
+from pellicle.fitting.lanes import least_squares, minimise_by_numpy
+from pellicle.fitting.levenberg_marquardt import normal_equations
 
 GRID = np.linspace(0.0, 1.0, 40)
 STARTS = np.random.default_rng(0).uniform(0.05, 0.95, (9, 2))
@@ -97,3 +98,31 @@ def test_a_start_without_a_number_ends_and_the_others_go_on(three):
     assert result.steps[2] == 1
     rest = np.arange(9) != 2
     np.testing.assert_allclose(result.y[rest], three.y[rest], atol=1e-9)
+
+
+@pytest.mark.parametrize("coarse", [0.0, 1e-3])
+def test_the_same_minima_by_steps_of_numpy(coarse):
+    """Of single starts the steps are the same; beside others, hopeless ones may end a step earlier."""
+
+    @jax.jit
+    @jax.vmap
+    def equations(y, target):
+        return normal_equations(residual, y, target)
+
+    starts = np.random.default_rng(5).uniform(0.02, 0.98, (40, 2))
+    targets = np.tile([0.3, 0.5], (len(starts), 1))
+
+    def evaluated(y, which):
+        return jax.device_get(equations(y, targets[which]))
+
+    ours = minimise_by_numpy(evaluated, starts, steps=200, coarse=coarse)
+    theirs = run(3, 40, starts, targets, coarse=coarse)
+    best = theirs.cost < theirs.cost.min() + 1e-6
+    assert ours.converged[best].all()
+    np.testing.assert_allclose(ours.y[best], theirs.y[best], atol=1e-9)
+    if coarse == 0:
+        np.testing.assert_allclose(ours.cost, theirs.cost, atol=1e-9)
+        assert ours.steps.tolist() == theirs.steps.tolist()
+    else:
+        full = minimise_by_numpy(evaluated, starts, steps=200)
+        assert ours.steps[~best].sum() < 0.75 * full.steps[~best].sum()

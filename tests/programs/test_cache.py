@@ -140,9 +140,14 @@ scaled = kept(plain_scaled)
 def new_process():
     """Forget the programs of this process, as a new one would."""
     TRACED.clear()
-    program_cache._load.cache_clear()
-    yield program_cache._load.cache_clear
-    program_cache._load.cache_clear()
+
+    def clear():
+        for remembered in (program_cache._load, program_cache._place, program_cache._calls_of):
+            remembered.cache_clear()
+
+    clear()
+    yield clear
+    clear()
 
 
 @pytest.fixture
@@ -159,6 +164,35 @@ def test_a_program_is_traced_once_in_all_processes(cache, new_process):
         assert scaled(2, np.arange(4.0)).total == 12
         new_process()
     assert TRACED == [2]
+
+
+def test_formulas_without_a_program_take_the_first_calls(cache, new_process, monkeypatch):
+    """Until as many of one program were made, or another process has kept it."""
+    monkeypatch.setattr(program_cache, "UNCOMPILED", 3)
+    given = []
+
+    def by_numpy(factor, x):
+        given.append(factor)
+        return Sum(factor * np.sum(x)) if factor < 10 else None
+
+    either = kept(plain_scaled, at_first=by_numpy)
+    assert [float(either(2, np.arange(4.0)).total) for _ in range(5)] == [12.0] * 5
+    assert (given, TRACED) == ([2, 2, 2], [2])
+    assert either(2, np.arange(5.0)).total == 20  # another program
+    assert len(given) == 4
+    assert either(10, np.arange(4.0)).total == 60  # nothing without a program
+    assert TRACED == [2, 10]
+    new_process()
+    given.clear()
+    assert either(2, np.arange(4.0)).total == 12
+    assert (given, TRACED) == ([], [2, 10])
+
+
+def test_formulas_take_the_first_calls_without_a_cache(cache, new_process, monkeypatch):
+    jax.config.update("jax_compilation_cache_dir", None)
+    monkeypatch.setattr(program_cache, "UNCOMPILED", 1)
+    either = kept(plain_scaled, at_first=lambda factor, x: Sum(-factor * np.sum(x)))
+    assert [float(either(5, np.arange(4.0)).total) for _ in range(3)] == [-30.0, 30.0, 30.0]
 
 
 def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_process, monkeypatch):

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.fitting.coordinates import Box
+from pellicle.fitting.levenberg_marquardt import Evaluated, normal_equations
 from pellicle.fitting.problem import Blocked, Explained, Form, Member, Problem, Static
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.programs.cache import kept
@@ -120,21 +121,72 @@ def polished(
     return Polished(solutions.y, solutions.aux, solutions.converged, solutions.steps)
 
 
-polish = kept(polished)
+def _by_numpy(
+    static: tuple[tuple[Member, ...], int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
+) -> Polished:
+    """The same by steps of NumPy, around a program that compiles in a third of the time."""
+    from pellicle.fitting.lanes import minimise_by_numpy
+
+    family, lanes = static
+    member, count = family[int(until.member)], int(until.count)
+    own = box.of_first(member.size)
+
+    def evaluated(at: np.ndarray, which: np.ndarray) -> Evaluated:
+        rows = np.resize(which, len(units))
+        bounded = own._replace(lower=own.lower[rows], upper=own.upper[rows])
+        points = at[np.resize(np.arange(len(at)), len(units))]
+        every = equations((member.static, lanes), arrays, bounded, points, np.int64(len(which)))
+        return Evaluated(*(x[: len(which)] for x in every))
+
+    options = {"steps": int(until.steps), "atol": float(until.atol), "coarse": float(until.coarse)}
+    found = minimise_by_numpy(evaluated, units[:count, : member.size], **options)
+    result = Polished(np.array(units), *(np.zeros(len(units), kind) for kind in (float, bool, int)))
+    result.units[:count, : member.size] = found.y
+    for column, rows in zip(result[1:], (found.aux, found.converged, found.steps), strict=True):
+        column[:count] = rows
+    return result
 
 
-def _member_equations(member: Member, arrays: tuple[Any, ...], box: Box, unit: Any) -> tuple[Any, ...]:
+polish = kept(polished, at_first=_by_numpy)
+
+
+@kept
+def equations(
+    static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, count: Any
+) -> Evaluated:
+    """Normal equations and deviances at the first `count` points `units` (points, parameters) of the unit
+    cube.
+
+    `static` has the static part of a problem, and how many points are evaluated side by side.
+    """
+    problem, lanes = static
+    size, groups = units.shape[1], len(units) // lanes
+
+    def of_group(k, result):
+        own = [jax.lax.dynamic_slice_in_dim(x, k * lanes, lanes) for x in (box.lower, box.upper, units)]
+
+        def one(lower, upper, unit):
+            return _equations(problem, arrays, box._replace(lower=lower, upper=upper), unit)
+
+        new = jax.vmap(one)(*own)
+        return jax.tree.map(
+            lambda old, rows: jax.lax.dynamic_update_slice_in_dim(old, rows, k * lanes, 0), result, new
+        )
+
+    zeros = jnp.zeros(len(units))
+    nothing = Evaluated(zeros, 0 * units, jnp.zeros((len(units), size, size)), zeros)
+    return jax.lax.fori_loop(0, jnp.minimum((count + lanes - 1) // lanes, groups), of_group, nothing)
+
+
+def _member_equations(member: Member, arrays: tuple[Any, ...], box: Box, unit: Any) -> Evaluated:
     """The equations of one problem, with zeros for the parameters that others have more."""
     more = len(unit) - member.size
-    cost, gradient, hessian, deviance = _equations(
-        member.static, arrays, box.of_first(member.size), unit[: member.size]
-    )
-    return cost, jnp.pad(gradient, (0, more)), jnp.pad(hessian, (0, more)), deviance
+    own = _equations(member.static, arrays, box.of_first(member.size), unit[: member.size])
+    return own._replace(gradient=jnp.pad(own.gradient, (0, more)), hessian=jnp.pad(own.hessian, (0, more)))
 
 
-def _equations(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> tuple[Any, ...]:
+def _equations(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> Evaluated:
     """Normal equations at one point of the unit cube, and the deviance; see `normal_equations`."""
-    from pellicle.fitting.levenberg_marquardt import normal_equations
 
     def residual(unit, about):
         arrays, box = about
@@ -153,7 +205,8 @@ def _equations(static: Static, arrays: tuple[Any, ...], box: Box, unit: Any) -> 
         return jax.tree.map(jnp.add, total, normal_equations(residual, unit, ((blocks.at(k),), own)))
 
     zero = jnp.zeros((), unit.dtype)
-    return jax.lax.fori_loop(0, blocks.count, add, (zero, 0 * unit, jnp.zeros((len(unit),) * 2), zero))
+    nothing = Evaluated(zero, 0 * unit, jnp.zeros((len(unit),) * 2), zero)
+    return jax.lax.fori_loop(0, blocks.count, add, nothing)
 
 
 def scanned(problem: Problem, units: np.ndarray, progress: Progress = quiet) -> np.ndarray:

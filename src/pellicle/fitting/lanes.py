@@ -2,7 +2,7 @@
 
 A vmapped solver runs until its slowest lane has settled; in searches with false minima half of that work and
 more is spent on lanes that have ended. Here a lane that has ended takes the next start in the same compiled
-loop.
+loop. Until that loop is compiled, the same steps are made by NumPy, around a program of the residuals alone.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
-from pellicle.fitting.levenberg_marquardt import advance, begin, ended, normal_equations
+from pellicle.fitting.levenberg_marquardt import Evaluated, State, advance, begin, ended, normal_equations
 
 _LEAST, _SETTLING = 4, 0.1
 """Evaluations before a lane is given up, and the share of the promise before to which that of a step falls in
@@ -39,7 +40,7 @@ def least_squares(
 
 
 def minimise(
-    equations: Callable[[Any, Any], tuple[Any, Any, Any, Any]],
+    equations: Callable[[Any, Any], Evaluated],
     starts: Any,
     args: Any,
     count: Any,
@@ -62,11 +63,11 @@ def minimise(
     size, bounds = len(starts), (jnp.zeros_like(starts[0]), jnp.ones_like(starts[0]))
 
     def begun(y):
-        return begin(y, bounds, aux)
+        return begin(y, bounds, jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), aux))
 
     def advanced(y, state, which):
         own = jax.tree.map(lambda leaf: leaf[jnp.minimum(which, size - 1)], args)
-        y, state = advance(equations, y, own, bounds, state)
+        y, state = advance(equations(state.y_eval, own), y, bounds, state)
         found = ended(y, state, rtol, atol)
         return y, state, found.ended, ~(found.diverged | found.lost)
 
@@ -76,8 +77,7 @@ def minimise(
         y, state, done, success = jax.vmap(advanced)(y, state, which)
         active, used = which < count, used + 1
         best = jnp.minimum(jnp.min(results.cost), jnp.min(jnp.where(active, state.cost, jnp.inf)))
-        settling = state.promise <= _SETTLING * before
-        hopeless = (used >= _LEAST) & settling & (state.promise <= coarse * (state.cost - best))
+        hopeless = _hopeless(state, before, used, best, coarse)
         over = active & (done | hopeless | (used >= steps))
         at = jnp.where(over, which, size)  # out of range: dropped
         new = Solutions(y, state.cost, state.aux, hopeless | (done & success), used)
@@ -104,3 +104,46 @@ def minimise(
     )
     carry = start, state, first, jnp.zeros(lanes, int), jnp.asarray(lanes), empty
     return jax.lax.while_loop(lambda carry: jnp.any(carry[2] < count), proceed, carry)[-1]
+
+
+def minimise_by_numpy(
+    equations: Callable[[np.ndarray, np.ndarray], Evaluated],
+    starts: np.ndarray,
+    *,
+    steps: int = 100,
+    rtol: float = 1e-8,
+    atol: float = 0.0,
+    coarse: float = 0.0,
+) -> Solutions:
+    """`minimise` with steps of NumPy: `equations(y, which)` evaluates points y (some, parameters) of the
+    starts `which` (some,), with one auxiliary number of each."""
+    count, bounds, used = len(starts), (0.0, 1.0), 0
+    results = Solutions(
+        np.array(starts),
+        np.full(count, np.inf),
+        np.full(count, np.nan),
+        np.zeros(count, bool),
+        np.zeros(count, int),
+    )
+    y, which = np.array(starts), np.arange(count)
+    with np.errstate(all="ignore"):  # of points without a number
+        state = begin(y, bounds, np.zeros(count))
+        while len(which):
+            before, used = state.promise, used + 1
+            y, state = advance(equations(state.y_eval, which), y, bounds, state)
+            found = ended(y, state, rtol, atol)
+            hopeless = _hopeless(state, before, used, min(results.cost.min(), state.cost.min()), coarse)
+            over = found.ended | hopeless | (used >= steps)
+            success = hopeless | (found.ended & ~(found.diverged | found.lost))
+            new = y, state.cost, state.aux, success, np.full(len(y), used)
+            for column, rows in zip(results, new, strict=True):
+                column[which[over]] = rows[over]
+            y, which, state = y[~over], which[~over], State(*(x[~over] for x in state))
+    return results
+
+
+def _hopeless(state: State, before: Any, used: Any, best: Any, coarse: Any) -> Any:
+    """Starts that cannot become the best: an undamped step promises less than the share `coarse` of the
+    distance to the best cost, and the promise falls."""
+    settling = state.promise <= _SETTLING * before
+    return (used >= _LEAST) & settling & (state.promise <= coarse * (state.cost - best))

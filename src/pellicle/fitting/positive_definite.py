@@ -2,38 +2,45 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+
+from pellicle.optics.pair import fori_loop, namespace
 
 
 def solve_positive(matrix, b, least=0.0):
-    """x with `matrix` x = b, and whether the matrix of a few rows is positive definite.
+    """x (..., n) with `matrix` (..., n, n) x = `b`, and whether each small matrix is positive definite.
 
     A pivot below the share `least` of its diagonal element is held there, and the matrix is not positive
-    definite: x is then of no use, a large step, but never a NaN.
+    definite: x is then of no use, a large step, but never a NaN. Arrays of NumPy or of JAX.
 
     Eliminated in a loop of the compiled program, which an unrolled form makes half as long again.
     """
-    n, position, tiny = len(b), jnp.arange(len(b)), jnp.finfo(matrix.dtype).tiny
-    floor = jnp.maximum(least * jnp.abs(jnp.diagonal(matrix)), tiny)
+    xp, n = namespace(matrix), b.shape[-1]
+    position, tiny = np.arange(n), np.finfo(matrix.dtype).tiny
+    floor = xp.maximum(least * xp.abs(xp.diagonal(matrix, axis1=-2, axis2=-1)), tiny)
 
-    def at(array, k, axis=0):
+    def at(array, k, axis=-1):
+        if xp is np:
+            return array.take(k, axis)
         return jax.lax.dynamic_index_in_dim(array, k, axis, keepdims=False)
 
     def eliminated(k, carry):
         rest, positive = carry
-        row, least = at(rest, k), at(floor, k)
+        row, least = at(rest, k, -2), at(floor, k)
         pivot = at(row, k)
-        below = jnp.where(position > k, at(rest, k, 1), 0) / jnp.maximum(pivot, least)
-        return rest - below[:, None] * row, positive & (pivot > least)
+        below = xp.where(position > k, at(rest, k), 0) / xp.maximum(pivot, least)[..., None]
+        return rest - below[..., None] * row[..., None, :], positive & (pivot > least)
 
     def substituted(i, x):
         k = n - 1 - i
-        row = at(rest, k)
-        x_k = (row[n] - row[:n] @ x) / jnp.maximum(at(row, k), at(floor, k))
-        return jnp.where(position == k, x_k, x)
+        row = at(rest, k, -2)
+        known = xp.sum(row[..., :n] * x, axis=-1)
+        x_k = (row[..., n] - known) / xp.maximum(at(row, k), at(floor, k))
+        return xp.where(position == k, x_k[..., None], x)
 
-    system = jnp.concatenate([matrix, b[:, None]], axis=1)
-    rest, positive = jax.lax.fori_loop(0, n, eliminated, (system, jnp.array(True)))
-    return jax.lax.fori_loop(0, n, substituted, jnp.zeros_like(b)), positive
+    system = xp.concatenate([matrix, b[..., None]], axis=-1)
+    rest, positive = fori_loop(0, n, eliminated, (system, xp.ones(b.shape[:-1], bool)))
+    return fori_loop(0, n, substituted, xp.zeros_like(b)), positive
 
 
 def nonnegative(matrix, b, bounded, slack: float, free=None):

@@ -233,7 +233,7 @@ class _Places(NamedTuple):
         return jax.tree_util.tree_unflatten(self.structure, [arrays[row] for row in self.order])
 
 
-UNCOMPILED = 8
+UNCOMPILED = 32
 """Calls of a program that `kept` leaves to the same formulas without a program. Compilation takes as long as
 20 to 60 of them (`benchmarks/cold_start.py`)."""
 

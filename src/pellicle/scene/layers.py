@@ -32,7 +32,7 @@ MOST_REFLECTIONS = 100
 METRE = 1e9
 """Largest length in nm that a layer can have."""
 
-Quantity = float | Free | Tied | jax.Array
+Quantity = float | Free | Tied | np.ndarray | jax.Array
 """A number, a parameter to be fitted, one tied to others, or a traced number."""
 
 MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any

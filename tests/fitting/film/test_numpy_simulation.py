@@ -1,0 +1,78 @@
+"""Changed signals of a scene by NumPy: those of the compiled program, for the plans that it evaluates."""
+
+import jax
+import numpy as np
+import pytest
+
+import pellicle as pl
+from pellicle.fitting.film import extended_scene
+from pellicle.fitting.film.fit import measurements
+from pellicle.fitting.film.problem import make
+from pellicle.fitting.film.systematic_effects import simulated_effects
+from pellicle.scene.free import insert
+
+NM = np.linspace(420.0, 880.0, 40)
+FREE = pl.Free(200, 400)
+AT = np.array([310.0])
+PLATE = pl.Substrate("BK7", back="air")
+STACK = [pl.Layer("SiO2", FREE), *(pl.Layer(n, 60.0) for n in ("TiO2", "SiO2", "TiO2", "SiO2", "TiO2"))]
+
+
+def scene(layers, substrate, signal="R", angle=0.0, polarisation="unpolarised", **more):
+    light = pl.Light(signal=signal, angle=angle, polarisation=polarisation)
+    return pl.Scene(layers, substrate, light=light, **more)
+
+
+ELEMENTARY = {
+    "R": scene(pl.Layer("SiO2", FREE), "Si"),
+    "two layers, p": scene([pl.Layer(1.4 + 0.02j, 90.0), pl.Layer("TiO2", FREE)], "Au", "R", 50.0, "p"),
+    "psi and delta": scene(pl.Layer("Si3N4", FREE), "Si", "psi-delta", 65.0),
+    "T of a plate": scene(pl.Layer("TiO2", FREE), PLATE, "T"),
+    "psi and delta of a plate": scene(pl.Layer("SiO2", FREE), PLATE, "psi-delta", 58.0),
+    "Mueller elements": scene(pl.Layer("SiO2", FREE), "Si", "mueller", 58.0),
+    "six layers": scene(STACK, "BK7", "psi-delta", 50.0),
+    "total reflection": scene(pl.Layer(1.33, FREE), "Au", "R", 70.0, "s", ambient=1.5),
+}
+OTHERS = {
+    "cone": scene(pl.Layer("SiO2", FREE), "Si", instrument=pl.Instrument(numerical_aperture=0.5)),
+    "bandwidth": scene(pl.Layer("SiO2", FREE), "Si", instrument=pl.Instrument(bandwidth=10.0)),
+    "birefringent": scene(pl.Layer(pl.Anisotropic(1.6, 1.7), FREE), "Si", "R", 50.0),
+}
+QUICK = ("R", "two layers, p", "psi and delta")
+
+
+def simulations(sample, monkeypatch):
+    """Arguments of the programs that simulate the effects of a fit, and what NumPy has for each."""
+    calls = []
+
+    def by_numpy(*arguments):
+        calls.append((arguments, extended_scene._of_numbers(*arguments)))
+        rows, points = len(arguments[-1]), len(arguments[2].values)
+        return extended_scene.Simulated(np.zeros((rows, points)))
+
+    for name in ("simulated", "simulated_once"):
+        monkeypatch.setattr(extended_scene, name, by_numpy)
+    data = pl.simulate(insert(sample, AT), NM)
+    [target] = measurements(data, sample)
+    with jax.enable_x64(True):
+        [view] = make(*measurements(data, sample)).views
+        simulated_effects(view, AT, target.scene, AT)
+    return calls
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in ELEMENTARY]
+)
+def test_numpy_and_the_program_simulate_the_same(name, monkeypatch):
+    calls = simulations(ELEMENTARY[name], monkeypatch)
+    assert calls
+    for arguments, found in calls:
+        with jax.enable_x64(True):
+            expected = jax.jit(extended_scene._simulated, static_argnums=0)(*arguments).signal
+        assert isinstance(found.signal, np.ndarray)
+        np.testing.assert_allclose(found.signal, expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_plan_of_averages_or_of_birefringent_layers_takes_the_program(name, monkeypatch):
+    assert all(found is None for _, found in simulations(OTHERS[name], monkeypatch))
