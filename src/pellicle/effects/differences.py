@@ -14,6 +14,7 @@ import numpy as np
 from pellicle.dispersion.anisotropic import isotropic_in_plane, principal_media
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
+from pellicle.forward_model import film_signal
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import Number, abs2, imag, real
@@ -100,16 +101,17 @@ def _corners(scene: Any) -> list[tuple[float, ...]]:
 
 
 def _ratio(scene: Scene) -> float:
-    nm = jnp.asarray(scene.light.wavelength, dtype=float)
+    nm = np.asarray(scene.light.wavelength, dtype=float)
     group = next(group for group in groups(scene)[0] if group.layers)
     media = (group.above, group.layers[0].material, group.below)
     above, layer, below = (medium.index(nm) for medium in media)
     squares, shift = [], upper(scene.instrument.angle_shift)
     # None is normal incidence
-    angles: list[Any] = [None if normal_incidence(scene) else jnp.deg2rad(scene.light.angle + shift)]
+    oblique = None if normal_incidence(scene) else np.deg2rad(np.asarray(scene.light.angle + shift))
+    angles: list[Any] = [oblique]
     if scene.instrument.has_cone:
         half = scene.instrument.largest_half_angle(least_ambient(scene))
-        angles.append(jnp.minimum(half + (0.0 if angles[0] is None else angles[0]), jnp.pi / 2))
+        angles.append(np.minimum(half + (0.0 if oblique is None else oblique), np.pi / 2))
     for angle in angles:
         a, _ = interface.transverse(scene.ambient.index(nm), angle)
         inside = None if angle is None else interface.Inside(a)
@@ -125,6 +127,8 @@ Build = Callable[[Plan], Callable[[Any], Any]]
 POINTS = 256
 CORNERS = 64
 _BATCH = 16
+_BY_NUMPY = 2**18
+"""Values of a signal up to which NumPy takes less time than the compilation of a program."""
 TIMING_SECONDS, FEWEST_ROUNDS = 0.3, 5
 """Seconds for which plans are timed in turns, and the least number of rounds."""
 
@@ -196,6 +200,9 @@ class Evaluation(NamedTuple):
 def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
     each wavelength (and ratio), for a surface the channels of each pair of directions."""
+    few = len(points) * np.size(getattr(scene.light, "wavelength", ())) <= _BY_NUMPY
+    if few and build is film_signal.build and film_signal.is_elementary(plan):
+        return np.stack(film_signal.by_numpy(plan, scene, points))
     return np.asarray(_signals(build, plan.static_key, False, *_split(scene, points)), dtype=float)
 
 

@@ -28,7 +28,7 @@ from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
-from pellicle.scene.free import Content, free_leaves
+from pellicle.scene.free import Content, free_leaves, insert
 from pellicle.scene.layers import Interface, Layer
 
 Intensities = Callable[[Scene], Any]
@@ -225,12 +225,14 @@ def is_elementary(plan: Plan) -> bool:
     return plan.reference is None and not plan.row("coherence").count and not any(map(plan.on, more))
 
 
-def of_numbers(plan: Plan, scene: Scene) -> list[np.ndarray]:
-    """Signals of an elementary plan, as of `build`, of a scene whose numbers are columns (signals, 1)."""
-    rows, kind = np.broadcast_arrays(*_rows(plan)(scene)), plan.kind
+def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
+    """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
+    (candidates, numbers)."""
+    numbers = jax.tree.map(np.asarray, insert(scene, [*np.transpose(candidates)[:, :, None]]))
+    rows, kind = np.broadcast_arrays(np.empty((len(candidates), 1)), *_rows(plan)(numbers))[1:], plan.kind
     if not kind.ellipsometric:
         return [np.asarray(kind.of_power(power)) for power in rows[0]]
-    return [*np.stack(rows, axis=-1).reshape(len(rows[0]), -1)]
+    return [*np.stack(rows, axis=-1).reshape(len(candidates), -1)]
 
 
 def _rows(plan: Plan) -> Callable[[Scene], Sequence[Any]]:

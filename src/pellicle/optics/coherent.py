@@ -188,8 +188,9 @@ def _through(start: Any, rows: LayerRows, faces: Any, a: Any, polarisations: str
 def _repeated_fields(rows: LayerRows, admittance: Any, a: Any, polarisations: str) -> Any:
     """`_scaled_fields` of smooth rows, some of which are repeated: the matrix of a run to the power of its
     repeats, by squaring, divided by its norm at each step."""
-    one, zero = jnp.ones_like(admittance), jnp.zeros_like(admittance)
-    (E, H), scale_square = (one, admittance), jnp.ones_like(jnp.real(admittance))
+    xp = namespace(admittance, rows)
+    one, zero = xp.ones_like(admittance), xp.zeros_like(admittance)
+    (E, H), scale_square = (one, admittance), xp.ones_like(admittance.real)
     first = 0
     for count, length in rows.runs:
         points, depth = jax.tree.map(lambda x: x[first : first + length], (rows.points, rows.depth))  # noqa: B023
@@ -197,12 +198,12 @@ def _repeated_fields(rows: LayerRows, admittance: Any, a: Any, polarisations: st
         if count == 1:
             ((E, H), scale_square), _ = _through(((E, H), scale_square), own, None, a, polarisations)
             continue
-        identity = (jnp.stack([one, zero]), jnp.stack([zero, one])), jnp.ones_like(scale_square)
+        identity = (xp.stack([one, zero]), xp.stack([zero, one])), xp.ones_like(scale_square)
         period = _through(identity, own, None, a, polarisations)[0]
         ((e, h), (e_, h_)), scale = matrix_power(identity, period, count)
         E, H = e * E + h * H, e_ * E + h_ * H
-        size = jax.lax.stop_gradient(abs2(E) + abs2(H))
-        E, H, scale_square = (*(x * jax.lax.rsqrt(size) for x in (E, H)), scale_square * scale / size)
+        size = stop_gradient(abs2(E) + abs2(H))
+        E, H, scale_square = (*(x * inverse_root(size) for x in (E, H)), scale_square * scale / size)
     return (E, H), scale_square
 
 

@@ -20,7 +20,6 @@ F. A. Modine, Appl. Opt. 36, 8184 (1997) for the signs of Mueller matrices.
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from pellicle.optics.hoisting import compute_once, slopes_once
@@ -144,16 +143,16 @@ def psi_delta(n: Any, c: Any, s: Any) -> tuple[Any, Any]:
     >>> [round(float(x), 1) for x in psi_delta(0.0, -1.0, 0.0)]
     [45.0, 180.0]
     """
-    square = c * c + s * s
+    xp, square = namespace(n, c, s), c * c + s * s
     pole = square == 0
     dark = pole & (n == 0)
-    across = jnp.sqrt(jnp.where(pole, 1.0, square)) * jnp.where(pole, 0.0, 1.0)
-    psi = 0.5 * jnp.arctan2(across, jnp.where(dark, 1.0, n))
-    delta = jnp.arctan2(jnp.where(pole, 0.0, s), jnp.where(pole, 1.0, c))
-    wrapped = jnp.mod(jnp.rad2deg(delta), 360.0)
+    across = xp.sqrt(xp.where(pole, 1.0, square)) * xp.where(pole, 0.0, 1.0)
+    psi = 0.5 * xp.arctan2(across, xp.where(dark, 1.0, n))
+    delta = xp.arctan2(xp.where(pole, 0.0, s), xp.where(pole, 1.0, c))
+    wrapped = xp.mod(xp.rad2deg(delta), 360.0)
     # −1e-17 + 360 rounds to 360: such a Δ is 0, with its slope unchanged
-    full_turn = jax.lax.stop_gradient(jnp.where(wrapped >= 360.0, wrapped, 0.0))
-    return jnp.rad2deg(psi), wrapped - full_turn
+    full_turn = stop_gradient(xp.where(wrapped >= 360.0, wrapped, 0.0))
+    return xp.rad2deg(psi), wrapped - full_turn
 
 
 def alpha_beta(n: Any, c: Any, analyser: Any) -> tuple[Any, Any]:

@@ -149,10 +149,11 @@ def repeated(rows: LayerRows, repeats: Repeats, layers: Sequence[Any]) -> LayerR
         return rows._replace(runs=tuple((count, len(own)) for count, own in runs))
     order = np.concatenate([np.tile(own, count) for count, own in runs])
     place = np.concatenate([np.repeat(places(count), len(own)) for count, own in runs])
-    drift = [jnp.broadcast_to(0.0 if x is None else x, rows.depth.shape[1:]) for x in repeats.drift]
-    change = jnp.repeat(jnp.stack(drift), np.array(counts), 0, total_repeat_length=len(rows.depth))
+    xp = namespace(rows, repeats.drift)
+    drift = [xp.broadcast_to(0.0 if x is None else x, rows.depth.shape[1:]) for x in repeats.drift]
+    change = xp.stack(drift)[np.repeat(np.arange(len(counts)), counts)]
     factor = 1 + change[order] * place.reshape(-1, *[1] * (change.ndim - 1))
-    rough = None if rows.rough is None else jnp.concatenate([rows.rough[:-1][order], rows.rough[-1:]])
+    rough = None if rows.rough is None else xp.concatenate([rows.rough[:-1][order], rows.rough[-1:]])
     points = jax.tree.map(lambda x: x[order], rows.points)
     return LayerRows(points, rows.depth[order] * factor.astype(rows.depth.dtype), rough)
 

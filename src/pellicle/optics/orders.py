@@ -17,7 +17,7 @@ import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Index, seen_by, tangential_permittivity
 from pellicle.optics.interface import fresnel, incident_factor, normal, normal_flux, transverse
-from pellicle.optics.pair import Number, Pair, abs2, conj, imag, real
+from pellicle.optics.pair import Number, Pair, abs2, conj, imag, namespace, real
 from pellicle.optics.special import sincos
 
 Window = Callable[[int], Any]
@@ -54,7 +54,7 @@ def airy_series(
     return AirySeries(
         upper=fresnel(ambient, q0, layer, q1, polarisation),
         lower=fresnel(layer, q1, substrate, q2, polarisation),
-        damping=jnp.exp(-2 * phase * imag(q1)),
+        damping=namespace(phase, q1).exp(-2 * phase * imag(q1)),
         phase=2 * phase * real(q1),
         direct=flux,
     )

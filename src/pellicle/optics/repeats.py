@@ -10,10 +10,9 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from pellicle.optics.pair import abs2
+from pellicle.optics.pair import abs2, inverse_root, scan, stop_gradient, where
 
 
 class Repeats(eqx.Module):
@@ -43,16 +42,15 @@ def matrix_power(identity: Any, matrix: Any, count: int) -> Any:
     def step(power: Any, bit: Any) -> tuple[Any, None]:
         square = _times(power, power)
         more = _times(square, matrix)
-        return jax.tree.map(lambda x, y: jnp.where(bit, x, y), more, square), None
+        return jax.tree.map(lambda x, y: where(bit, x, y), more, square), None
 
-    bits = jnp.array([digit == "1" for digit in f"{count:b}"])
-    return jax.lax.scan(step, identity, bits)[0]
+    return scan(step, identity, np.array([digit == "1" for digit in f"{count:b}"]))[0]
 
 
 def _times(first: Any, second: Any) -> Any:
     ((a, b), (c, d)), scale = first
     (E, H), other = second
     E, H = a * E + b * H, c * E + d * H
-    size = jax.lax.stop_gradient(jnp.sum(abs2(E) + abs2(H), axis=0))
-    shrink = jax.lax.rsqrt(size)
+    size = stop_gradient((abs2(E) + abs2(H)).sum(axis=0))
+    shrink = inverse_root(size)
     return (E * shrink, H * shrink), scale * other / size

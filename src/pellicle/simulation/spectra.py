@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import plan
 from pellicle.errors import UsageError
-from pellicle.forward_model.film_signal import build, depolarises, tabulated
+from pellicle.forward_model.film_signal import build, by_numpy, depolarises, is_elementary, tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.materials import common_range
 from pellicle.scene.film import Scene, with_wavelength
@@ -121,7 +121,11 @@ def simulate_signal(
         instrument = replace(fixed.instrument, scale=scale, offset=offset)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, instrument)
         chosen = plan(fixed, tolerance)
-        signal = np.asarray(jax.jit(build(chosen))(tabulated(fixed, chosen.on("coherence"))))
+        known = tabulated(fixed, chosen.on("coherence"))
+        if is_elementary(chosen):
+            [signal] = by_numpy(chosen, known, np.empty((1, 0)))
+        else:
+            signal = np.asarray(jax.jit(build(chosen))(known))
     rows = (float(scale) * signal + float(offset)).reshape(len(wavelength), -1)
     kind, share, share_noise = kind or scene.light.kind, None, 0.0
     values, clean = kind.synthetic(rows, noise, seed)

@@ -46,7 +46,7 @@ def simulations(sample, monkeypatch):
     calls = []
 
     def by_numpy(*arguments):
-        calls.append((arguments, extended_scene._of_numbers(*arguments)))
+        calls.append((arguments, extended_scene._by_numpy(*arguments)))
         rows, points = len(arguments[-1]), len(arguments[2].values)
         return extended_scene.Simulated(np.zeros((rows, points)))
 

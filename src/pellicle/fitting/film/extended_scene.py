@@ -26,7 +26,7 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
-from pellicle.forward_model.film_signal import depolarises, is_elementary, of_numbers
+from pellicle.forward_model.film_signal import by_numpy, depolarises, is_elementary
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.coherent import FEW
 from pellicle.programs.cache import kept
@@ -62,18 +62,17 @@ def _simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values:
     return Simulated(jax.lax.map(lambda each: form.simulate(insert(scene, each), data), values))
 
 
-def _of_numbers(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulated | None:
+def _by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulated | None:
     """The same by NumPy; None for a plan that it does not evaluate."""
     if not (isinstance(form, SpectrumForm) and is_elementary(form.plan)):
         return None
     rows, each = np.unique(values, axis=0, return_inverse=True)  # without those that are padding
-    columns = insert(scene, list(rows.T[:, :, None]))
-    signals = [form.compared(signal, scene, data) for signal in of_numbers(form.plan, columns)]
+    signals = [form.compared(signal, scene, data) for signal in by_numpy(form.plan, scene, rows)]
     return Simulated(np.stack(signals)[each.ravel()])
 
 
-simulated = kept(_simulated, at_first=_of_numbers)
-simulated_once = kept(_simulated, calls="few", at_first=_of_numbers)
+simulated = kept(_simulated, at_first=_by_numpy)
+simulated_once = kept(_simulated, calls="few", at_first=_by_numpy)
 
 
 class Number(NamedTuple):
@@ -88,7 +87,15 @@ class SideBySide(NamedTuple):
     signal: Any
 
 
-@partial(kept, calls="many")
+def _many_by_numpy(form: Any, scene: Scene, data: Any, frame: Any, values: np.ndarray) -> SideBySide | None:
+    """The same by NumPy, where all pixels have one frame."""
+    simulated = (
+        None if frame is not None else _by_numpy(form, scene, data, values.reshape(-1, values.shape[-1]))
+    )
+    return None if simulated is None else SideBySide(simulated.signal.reshape(*values.shape[:2], -1))
+
+
+@partial(kept, calls="many", at_first=_many_by_numpy)
 def simulated_side_by_side(
     form: SpectrumForm | ColourForm, scene: Scene, data: Any, frame: Any, values: Any
 ) -> SideBySide:
