@@ -185,7 +185,8 @@ def test_a_free_profile(scene_of):
         ('{ graded = ["SiO2", "Si3N4"], mix = "brugeman" }', "did you mean 'bruggeman'"),
         ('{ graded = ["SiO2", "Si3N4"], top = 1.5 }', "top is a volume fraction, 0 to 1, got 1.5"),
         ('{ graded = ["SiO2", "Si3N4"], profile = "spline" }', "needs values"),
-        ('{ graded = ["SiO2"] }', "graded"),
+        ('{ graded = ["SiO2"] }', r"material\.graded must be two media, as in .*, got \['SiO2'\]"),
+        ("{ model = 3 }", r"material\.model must be a text, got 3"),
     ],
 )
 def test_graded_layers_that_are_refused(scene_of, material, message, refuses):

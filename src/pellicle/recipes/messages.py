@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -79,14 +79,24 @@ def first_error(error: ValidationError, table: type[BaseModel]) -> str:
         known = list(tables[where[-1]].model_fields) if where[-1] in tables else []
         return f"{key} is a table{' of ' * bool(known)}{', '.join(known)}, not {chosen['input']!r}"
     if chosen["type"] == "string_type" and isinstance(chosen["input"], dict):
-        kinds = "model, mix (host, inclusion, fraction), graded, ordinary and extraordinary, or x, y and z"
-        return f"{key}: the table of a material has the key {kinds}, not {', '.join(chosen['input'])}"
+        return _of_material(key, chosen, errors)
     if chosen["type"] == "missing":
         return f"{key} is missing"
     if chosen["type"] == "value_error":
         words = str(chosen.get("ctx", {}).get("error", chosen["msg"]))
         return f"{key}: {words}" if key else words  # of the whole recipe
     return f"{key}: {chosen['msg'][0].lower()}{chosen['msg'][1:]}, got {chosen['input']!r}"
+
+
+def _of_material(key: str, chosen: Mapping[str, Any], errors: Sequence[Mapping[str, Any]]) -> str:
+    """One sentence on the table of a material: the key that has a wrong value, else that it is of no kind."""
+    given, at = chosen["input"], chosen["loc"][:-1]
+    for wrong in errors:
+        if wrong["loc"][:-2] == at and (name := wrong["loc"][-1]) in given:
+            expected = 'two media, as in ["SiO2", "Si3N4"]' if name == "graded" else "a text"
+            return f"{key}.{name} must be {expected}, got {wrong['input']!r}"
+    kinds = "model, mix (host, inclusion, fraction), graded, ordinary and extraordinary, or x, y and z"
+    return f"{key}: the table of a material has the key {kinds}, not {', '.join(given)}"
 
 
 def _tables_by_key(table: type[BaseModel], key: str = "") -> dict[str, type[BaseModel]]:
