@@ -121,7 +121,9 @@ def test_the_command_goes_on_where_it_was_and_loses_nothing(tmp_path, capsys, mo
         write(data / f"f_{i:03d}s.csv", 300.0 + 5 * i, 0.002)
     (data / "broken_007s.csv").write_text("nothing")
     assert app(words) == 0
-    records = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    told = capsys.readouterr()
+    assert "5 files, 1 of them not fitted; the same" in told.err
+    records = [json.loads(line) for line in told.out.splitlines()]
     assert [record["status"] for record in records].count("failed") == 1
     assert records[0]["schema"] == "pellicle.watch/1"
     fitted = {r["time"]["value"]: r["parameters"]["thickness"] for r in records if "error" not in r}
@@ -156,6 +158,8 @@ def test_what_cannot_be_watched_is_refused(tmp_path, monkeypatch):
         (["nowhere"], "is no folder"),
         ([".", "--idle", "0"], "--idle must be above zero"),
         ([".", "--out", "."], "another folder|did not write"),
+        ([".", "--time-from", "gone.csv"], "--time-from gone.csv: is no file"),
+        ([".", "--signal", "Q"], "`signal` of a cube must be one of"),
     ):
         with pytest.raises(ValueError, match=told):
             app(["watch", *words, "--recipe", "film.toml"])

@@ -75,7 +75,8 @@ def watch(
         except KeyboardInterrupt:
             say("")
         files = "1 file" if live.done == 1 else f"{live.done} files"
-        say(f"{files} fitted" + (f"; the same command goes on with {out}" if out else ""))
+        told = f"{files}, {live.failed} of them not fitted" if live.failed else f"{files} fitted"
+        say(told + (f"; the same command goes on with {out}" if out else ""))
     return GOOD
 
 

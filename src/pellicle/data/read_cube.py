@@ -111,8 +111,7 @@ def read_cube(
     given, unit = (None, "") if wavelengths is None else checks.parse_wavelengths(wavelengths)
     known = signal if signal in SIGNALS else None
     raw = _raw(source, raw_cube.Asked(given, wavelength_unit or unit or None, variable, known), time_from)
-    if signal != known:  # a missing file, or one of a photograph, is told first
-        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
+    check_signal(signal)  # after a missing file, or one of a photograph, is told
     nm, notes = checks.in_nm(raw.wavelength, raw.unit, wavelength_unit, raw.path)
     bands, told = checks.chosen_bands(nm, range, without_bands, raw.good, raw.path)
     notes = [*raw.notes, *notes, *told]
@@ -154,6 +153,12 @@ def read_cube(
     cube = _with_fingerprint(cube, raw, [x for x in (white_frame, dark_frame) if x is not None], facts)
     log.info("%s", cube)
     return cube
+
+
+def check_signal(signal: str | None) -> None:
+    """Raise UsageError for a signal that a cube cannot have."""
+    if signal is not None and signal not in SIGNALS:
+        raise UsageError(f"`signal` of a cube must be one of {', '.join(SIGNALS)}, not {signal!r}")
 
 
 def _check_arguments(polarisation: str | None, white_frame: Any, camera: Mapping[str, Any]) -> None:

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pellicle.data.cube import Cube
-from pellicle.data.cubes.time_series import BY_DATE, BY_HEADER, rows_on_grid
-from pellicle.data.read_cube import read_cube
+from pellicle.data.cubes.time_series import BY_DATE, BY_HEADER, check_time_from, rows_on_grid
+from pellicle.data.read_cube import check_signal, read_cube
 from pellicle.errors import DataError, UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, ORDERS, STATUSES, BatchFits
 from pellicle.fitting.batch.polish import FEW
@@ -75,13 +75,14 @@ def _time(minima: _Minima) -> float:
 
 
 class LiveSeries:
-    """Fits of files as they arrive, in any order of their times: `fits` by name, `done` in this process.
+    """Fits of files as they arrive, in any order of their times: `fits` by name, `done` in this process,
+    `failed` of these without a fit.
 
     **Arguments:** `scene`, with free parameters; `time_from` and `reading`, as `pellicle.read_cube` takes
     them. Times by dates count from the `origin`, that of the first file by default; `unit` is that of the
     times, by default of the first file.
 
-    **Raises:** UsageError where nothing is free.
+    **Raises:** UsageError where nothing is free, and for a signal or source of times that there is not.
     """
 
     def __init__(
@@ -96,11 +97,14 @@ class LiveSeries:
         self.scene, self.parameters = scene, parameters(scene)
         if not self.parameters:
             raise UsageError("nothing varies in this series: free a thickness")
+        check_signal(reading.get("signal"))
+        if time_from is not None:
+            check_time_from(time_from)
         uncalibrated = isinstance(scene.instrument.scale, Drift)
         self.reading: dict[str, Any] = {"calibrated": False} if uncalibrated else {}
         self.reading |= reading | {"time_from": time_from}
         self.origin = origin if time_from in (BY_DATE, BY_HEADER) else 0.0
-        self.unit, self.done = unit, 0
+        self.unit, self.done, self.failed = unit, 0, 0
         self.fits: dict[str, LiveFit] = {}
         self._latest: list[_Minima] = []
         self._models: list[tuple[Cube, PixelModel]] = []
@@ -132,6 +136,7 @@ class LiveSeries:
             made = LiveFit(path.name, size, error=str(error).removeprefix(f"{path}: "))
         self.fits[path.name] = made
         self.done += 1
+        self.failed += bool(made.error)
         return made
 
     def _fit(self, path: Path, size: int) -> LiveFit:

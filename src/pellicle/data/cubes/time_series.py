@@ -99,10 +99,14 @@ def file_times(files: Sequence[Path], time_from: str) -> tuple[Any, str, str]:
     if time_from == BY_HEADER:
         stamps = np.array([_date(file) for file in files])
         return *_since_first(stamps, None), "the dates in the files"
-    table = Path(time_from)
-    if not table.is_file():
+    check_time_from(time_from)
+    return *_stated([file.name for file in files], time_from, files[0]), Path(time_from).name
+
+
+def check_time_from(time_from: str) -> None:
+    """Raise UsageError for a source of times that is neither a word nor a table."""
+    if time_from not in (BY_NAME, BY_DATE, BY_HEADER) and not Path(time_from).is_file():
         raise UsageError(f"--time-from {time_from}: is no file, and not name, mtime or header")
-    return *_stated([file.name for file in files], time_from, files[0]), table.name
 
 
 def _since_first(stamps: np.ndarray, zone: datetime.timezone | None) -> tuple[np.ndarray, str]:
