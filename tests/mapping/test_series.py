@@ -16,6 +16,7 @@ import xarray
 import pellicle as pl
 from pellicle.cli import app
 from pellicle.errors import UsageError
+from pellicle.fitting.batch.data import STATUSES
 from pellicle.reporting.series import draw, write_series
 
 NM, TIME = np.linspace(600, 700, 24), np.arange(80) * 10.0
@@ -125,6 +126,20 @@ def test_a_series_with_dates_counts_from_the_first(grown, tmp_path):
     assert np.abs(made.time.values - dates).max() <= np.timedelta64(1, "us")
     raw = xarray.load_dataset(tmp_path / "out" / "series.nc", decode_times=False)
     assert raw.time.attrs["units"] == "minutes since 2026-05-04T12:30:00.000"
+
+
+def test_a_closed_shutter_is_left_out():
+    data = cube(GROWN, seed=6)
+    data.R[50] = 0.02
+    found = pl.series(data, SCENE)
+    assert np.isnan(found["thickness"][50])
+    assert STATUSES[int(found.dataset.status[50])] in ("misfit", "not-converged")
+    assert not found.breaks
+    assert f"the spectra at {TIME[50] / 60:g} min: they are left out" in found.warnings[0]
+    known = np.arange(len(TIME)) != 50
+    rate = 60 * 1800 / 500 * np.exp(-TIME / 500)
+    assert (np.abs(found["thickness"] - GROWN)[known] < 5).all()
+    assert (np.abs(found["rate"] - rate)[known] < 4 * found["rate_stderr"][known]).all()
 
 
 def test_what_is_no_series_is_refused(tmp_path):

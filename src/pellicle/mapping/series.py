@@ -31,7 +31,7 @@ from pellicle.mapping.order_path import order_path
 from pellicle.mapping.pixels import PixelModel, prepare
 from pellicle.mapping.run import map_cube
 from pellicle.mapping.series_residuals import residuals
-from pellicle.mapping.series_result import SURE, Joined, Series, series_of
+from pellicle.mapping.series_result import SURE, UNEXPLAINED, Joined, Series, series_of
 from pellicle.mapping.series_spectra import Spectra
 from pellicle.mapping.state_space import Quadratics, Smoothed, smooth
 from pellicle.mapping.store import variable_name
@@ -52,6 +52,9 @@ _PASSES, _SETTLED = 8, 0.05
 """Most passes of the smoother, and the change of all values, in standard errors, that ends them."""
 _ORDERS = 12
 """Minima of each spectrum that continuity chooses from."""
+_FEW, _WORSE = 0.2, 5.0
+"""Largest share of the spectra that is left out because the scene does not explain them, and how many times
+the usual rms of residuals theirs must be: with noise of 1 % one of 80 good spectra is a misfit by chance."""
 _DRIFT = 1.0
 """Standard deviation of how much of its size a systematic effect drifts from the middle of the series to an
 end: with 0.5 an index that drifts by 0.003 left 6 % of the true rates outside two errors."""
@@ -156,7 +159,7 @@ def _joined(
     noise = np.stack([np.asarray(dataset[f"{name}_stderr_noise"], float) for name in names], axis=-1)
     delta = np.asarray(dataset["order_delta_chi2"], float)
     delta = np.where(np.isfinite(minima[..., depth]) & np.isfinite(delta), delta, np.inf)
-    used = np.flatnonzero(np.isfinite(delta).any(axis=1))
+    used = _explained(np.flatnonzero(np.isfinite(delta).any(axis=1)), dataset)
     if used.size < 3:
         raise UsageError(f"a series needs spectra at three times at least, and {used.size} have data")
     time, minima, noise, spectra = time[used], minima[used], noise[used], Spectra(model, cube, used)
@@ -187,6 +190,17 @@ def _joined(
     pushes = np.concatenate([lasting * pushes, drift * pushes], axis=2)
     smoothed = smooth(time, quadratics._replace(pushes=pushes), *about[1:], smoothed)
     return Joined(path, smoothed, kinds, used, beside=lamp.variables(smoothed, used, len(dataset[TIME])))
+
+
+def _explained(used: np.ndarray, dataset: Dataset) -> np.ndarray:
+    """The times `used`, without those of a few spectra that the scene does not explain, as of a closed
+    shutter: they would bend the film at all times near them."""
+    rms, wrong = (np.asarray(dataset[name])[used] for name in ("rms", "status"))
+    wrong = np.isin(wrong, UNEXPLAINED)
+    if wrong.all():
+        return used
+    wrong &= rms > _WORSE * np.median(rms[~wrong])
+    return used[~wrong] if wrong.mean() <= _FEW else used
 
 
 def _settled(

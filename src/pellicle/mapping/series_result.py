@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 SURE = 12.0
 """Least Δχ² of the best path through another minimum for an order that continuity decides."""
+UNEXPLAINED = CODES[str(Status.MISFIT)], CODES[str(Status.NOT_CONVERGED)]
+"""Codes of spectra that the scene does not explain."""
 ERRORS = "", "_stderr", "_stderr_noise"
 """Ends of the names of a value and its errors."""
 
@@ -191,6 +193,10 @@ def _warnings(
     gaps = [(time[a], time[b]) for a, b in pairwise(used) if time[b] - time[a] > 5 * usual]
     sentences += [f"no data between {a:g} and {b:g} {unit}" for a, b in gaps[:6]]
     codes = result["status"].values
+    out = np.setdiff1d(np.flatnonzero(np.isin(codes, UNEXPLAINED)), used)
+    if out.size:
+        where = ", ".join(f"{x:g}" for x in time[out[:6]]) + (" and others" if out.size > 6 else "")
+        sentences.append(f"the scene does not explain the spectra at {where} {unit}: they are left out")
     if share := np.mean(codes[used] == CODES[str(Status.AMBIGUOUS)]):
         sentences.append(
             f"the order of {100 * share:.3g} % of the times is not decided, not even by continuity"
