@@ -320,3 +320,15 @@ def test_more_free_numbers_than_a_fit_takes(refused):
     knots = [400.0 + 5 * i for i in range(50)]
     spline = f'{{ model = "spline", knots = {knots}, n = {N}, k = {K} }}'
     refused(film(spline), "101 parameters are free, more than the 64 that a fit takes")
+
+
+def test_an_index_is_added_to_a_model_whose_own_numbers_are_free():
+    freed = media.medium("cauchy(1.40,3600)", ["B=0:9000", "n"])
+    swapped = media.medium("cauchy(1.40,3600)", ["n", "B=0:9000"])
+    assert isinstance(freed, Shifted)
+    assert isinstance(swapped, Shifted)
+    assert isinstance(freed.base, Cauchy)
+    assert free_part(freed.base.B) == (4500, 0, 9000)
+    # B starts at 4500 there and at 3600 here; the sum stays at least 1
+    assert freed.n.lower == pytest.approx(1 - (1.40 + 4500 / 780**2), abs=1e-12)
+    assert swapped.n.lower == pytest.approx(1 - (1.40 + 3600 / 780**2), abs=1e-12)

@@ -14,7 +14,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant, Shifted
 from pellicle.errors import UsageError, did_you_mean
 from pellicle.recipes import dispersion_models as models
-from pellicle.scene.free import Free, check_parts, is_free
+from pellicle.scene.free import Free, check_parts, insert, is_free, start_values
 from pellicle.scene.graded import Graded
 
 _LIKE_AN_INDEX = 0.9
@@ -128,6 +128,7 @@ def _free_shift(dispersion: AbstractDispersion) -> Free:
     wavelength = np.linspace(max(low, 250.0), min(high, 1700.0), 64)
     rises = wavelength[0] < wavelength[-1]
     with jax.enable_x64(True):  # the same bounds wherever the scene is built, as a recipe is checked by them
-        least = float(np.nanmin(np.real(dispersion(wavelength)))) if rises else 1.0
+        index = insert(dispersion, start_values(dispersion))(wavelength) if rises else 1.0
+    least = float(np.nanmin(np.real(index)))
     lowest = 1.0 - least if least >= 1 else -0.9 * least
     return Free(max(-0.5, lowest), 0.5, start=0.0, limits=(lowest, 2.0))
