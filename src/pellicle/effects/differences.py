@@ -200,8 +200,8 @@ class Evaluation(NamedTuple):
 def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
     each wavelength (and ratio), for a surface the channels of each pair of directions."""
-    few = len(points) * np.size(getattr(scene.light, "wavelength", ())) <= _BY_NUMPY
-    if few and build is film_signal.build and film_signal.is_elementary(plan):
+    of_film = build is film_signal.build and film_signal.is_elementary(plan)
+    if of_film and len(points) * np.size(scene.light.wavelength) <= _BY_NUMPY:
         return np.stack(film_signal.by_numpy(plan, scene, points))
     return np.asarray(_signals(build, plan.static_key, False, *_split(scene, points)), dtype=float)
 
