@@ -9,7 +9,8 @@ deviance.
 
 The other tables are of whole fits of simulated files with random true values (`whole_fits`). The first has
 `pl.fit`: the first call of a new process with an empty cache of compiled programs, which compiles, and with
-a filled one; then the median of the next calls, each of another file. The second has it, and its search
+a filled one; the median of the few calls after it, each of another file, and that of calls after all programs
+are compiled. The second has it, and its search
 alone, beside SciPy and lmfit with the film in vectorised NumPy, in turns: least squares from the best local
 minima of a scan of the thickness or from random starts, and differential evolution, each with the fewest
 starts or the smallest population that is right in 95 % of the files; the third has the ratios. A fit is

@@ -1,9 +1,10 @@
 """Pellicle and the other programs in turn on the files of a case, in a process of their own.
 
 The first call of pellicle is timed in two new processes: one with an empty cache of compiled programs, one
-with the cache that the first has filled. The second process then fits every file with every program, in
-turns. The other programs get the least effort (starts, or size of the population) with which they find the
-right answer in 95 % of the files; the search for it is not timed.
+with the cache that the first has filled. The second process then fits a few files as it does before programs
+pay (`programs.cache.UNCOMPILED`), and every file with every program, in turns, with all programs compiled.
+The other programs get the least effort (starts, or size of the population) with which they find the right
+answer in 95 % of the files; the search for it is not timed.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ reached from the true values: within two standard errors. In pellicle the drift 
 moves the minimum of soap films by up to 2; otherwise right answers agree within 0.1."""
 FEWEST_RIGHT = 0.95
 TUNING_FILES = 20
+_EARLY = 6
+"""Files of the first calls of a process."""
 PELLICLE, SEARCH = "pl.fit", "its search"
 
 
@@ -56,14 +59,15 @@ class Result(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """The results of a case, those of `pl.fit` and of its search first, and the first calls of `pl.fit` with
-    an empty and with a filled cache."""
+    """The results of a case, those of `pl.fit` and of its search first, the first calls of `pl.fit` with
+    an empty and with a filled cache, and the median of the few calls after it."""
 
     case: str
     target: float
     rows: int
     compiles: Time
     loads: Time
+    early: Time
     results: list[Result]
 
 
@@ -79,10 +83,10 @@ def compared(chosen: int, files: int | None) -> Compared:
     case = cases()[chosen]
     with tempfile.TemporaryDirectory() as folder:
         compiles = _in_new_process(first_call, chosen, folder)
-        loads, results = _in_new_process(all_files, chosen, folder, files or case.files)
+        loads, early, results = _in_new_process(all_files, chosen, folder, files or case.files)
     [view] = case.points[:1]
     rows = view.size * (2 if case.scene.light.signal == "psi-delta" else 1)
-    return Compared(case.name, case.target, rows, compiles, loads, results)
+    return Compared(case.name, case.target, rows, compiles, loads, early, results)
 
 
 def _in_new_process(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -97,10 +101,15 @@ def first_call(chosen: int, folder: str) -> Time:
     return timed(lambda: _by_pellicle(case, measurement(case, 0).spectrum))[0]
 
 
-def all_files(chosen: int, folder: str, files: int) -> tuple[Time, list[Result]]:
-    """The first call of pellicle with a filled cache, and all programs on all files."""
+def all_files(chosen: int, folder: str, files: int) -> tuple[Time, Time, list[Result]]:
+    """The first call of pellicle with a filled cache, the few after it, and all programs on all files."""
+    from pellicle.programs import cache
+
     loads, case = first_call(chosen, folder), cases()[chosen]
     measured = [measurement(case, seed) for seed in range(files)]
+    early = [timed(lambda one=one: _by_pellicle(case, one.spectrum))[0] for one in measured[1:_EARLY]]
+    cache.UNCOMPILED = 0
+    _by_pellicle(case, measured[0].spectrum)  # compiles
     problems = [Problem(case, one) for one in measured]
     least = [_chi2(problem, polished(problem, problem.truth)) for problem in problems]
     efforts = [_least_effort(each, problems, least) for each in COMPETITORS]
@@ -121,11 +130,19 @@ def all_files(chosen: int, folder: str, files: int) -> tuple[Time, list[Result]]
             unit = (answer - problem.lower) / problem.width if ours else answer
             right[name] += bool(_chi2(problem, unit) < least[seed] + RIGHT_CHI2)
     words = ["", "", *(f"{n} {each.unit}" for n, each in zip(efforts, COMPETITORS, strict=True))]
-    medians = [Time(*(statistics.median(column) for column in zip(*times[n], strict=True))) for n in names]
-    return loads, [
-        Result(name, spent, word, right[name], files)
-        for name, spent, word in zip(names, medians, words, strict=True)
-    ]
+    medians = [_median(times[name]) for name in names]
+    return (
+        loads,
+        _median(early),
+        [
+            Result(name, spent, word, right[name], files)
+            for name, spent, word in zip(names, medians, words, strict=True)
+        ],
+    )
+
+
+def _median(times: list[Time]) -> Time:
+    return Time(*(statistics.median(column) for column in zip(*times, strict=True)))
 
 
 def _start(folder: str) -> None:

@@ -10,7 +10,8 @@ WITHOUT_SCAN, SIXTEEN = ("SciPy, random", "SciPy, evolution"), "SciPy, 16 minima
 def calls(some: list[Compared]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and lines of the table of pellicle's calls."""
     header = (
-        *("pellicle", "numbers", "first call, s", "first call, filled cache, s", "next calls, ms"),
+        *("pellicle", "numbers", "first call, s", "first call, filled cache, s", "then, ms"),
+        "compiled, ms",
         *("wall, ms", "right", "target, ms", "met"),
     )
     return header, [_call(one) for one in some]
@@ -23,6 +24,7 @@ def _call(one: Compared) -> tuple[str, ...]:
         str(one.rows),
         f"{one.compiles.processor:.2f}",
         f"{one.loads.processor:.2f}",
+        _ms(one.early.processor),
         _ms(ours.time.processor),
         _ms(ours.time.wall),
         f"{ours.right}/{ours.files}",
