@@ -67,7 +67,7 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
     for group in described:
         index = group.below.index(wavelength)
         opened = plan.on("tunnelling") and not mixes_polarisations(index)
-        thick.append(joined(interface.allow_tunnelling(index) if opened else index))
+        thick.append(each_index(joined, interface.allow_tunnelling(index) if opened else index))
     evaluated = []
     for i, group in enumerate(described):
         internal, collected = None, None
@@ -148,7 +148,7 @@ def _layer_index(plan: Plan, layer: Layer, wavelength: Any) -> Any:
         points = [layer.material.at(z, wavelength) for z in gauss_points(plan.row("gradient").count)]
         return Gradient(*(point if plan.on("absorption") else real(point) for point in points))
     index = layer.material.index(wavelength)
-    return joined(index) if plan.on("absorption") else each_index(real, index)
+    return each_index(joined if plan.on("absorption") else real, index)
 
 
 def _internal(medium: Any, a: Any, below: Plate, wavelength: Any, polarisation: str) -> Any:

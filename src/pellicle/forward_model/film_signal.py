@@ -26,6 +26,7 @@ from pellicle.optics import ellipsometry, plate
 from pellicle.optics.coherent import FEW
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
+from pellicle.optics.pair import namespace
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
 from pellicle.scene.free import Content, free_leaves, insert
@@ -35,9 +36,12 @@ Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
 
 
-def _weighted_mean(weights: Any, rows: list[Any]) -> list[Any]:
-    """Σ weights · row over the first axis of each row."""
-    return [jnp.tensordot(weights, row, 1) for row in rows]
+def _mean_over(weights: Any, at: Callable[..., list[Any]], *nodes: Any) -> list[Any]:
+    """Σ weights · row of the rows at each of the nodes, (nodes, ...)."""
+    if namespace(weights) is not np:
+        return [jnp.tensordot(weights, row, 1) for row in jax.vmap(at)(*nodes)]
+    each = [at(*node) for node in zip(*nodes, strict=True)]
+    return [sum(w * row for w, row in zip(weights, rows, strict=True)) for rows in zip(*each, strict=True)]
 
 
 def over_normal(
@@ -56,7 +60,8 @@ def over_normal(
             where, value = shifted(scene, node)
             return simulate(eqx.tree_at(where, scene, value))
 
-        return _weighted_mean(jnp.asarray(weights, like), jax.vmap(at)(jnp.asarray(nodes, like)))
+        xp = namespace(scene)
+        return _mean_over(xp.asarray(weights, like), at, xp.asarray(nodes, like))
 
     return average
 
@@ -70,7 +75,8 @@ def _of_bandwidth(scene: Scene, node: Any) -> tuple[Callable[[Any], Any], Any]:
 def _of_thickness(position: int, scene: Scene, node: Any) -> tuple[Callable[[Any], Any], Any]:
     """A thickness within the spread of one layer, 0 at least."""
     layer: Any = scene.layers[position]
-    uneven = jnp.maximum(layer.thickness + node * thickness_spread(scene, layer), 0.0)
+    uneven = layer.thickness + node * thickness_spread(scene, layer)
+    uneven = namespace(uneven).maximum(uneven, 0.0)
     return lambda s: s.layers[position].thickness, uneven
 
 
@@ -79,7 +85,8 @@ def cone_sine(scene: Scene) -> Any:
     aperture, spread = scene.instrument.numerical_aperture, scene.instrument.angle_spread
     if aperture is not None:
         return aperture / scene.ambient.index(scene.light.wavelength)
-    return jnp.sin(jnp.deg2rad(spread))  # pyright: ignore[reportArgumentType]
+    xp: Any = namespace(spread)
+    return xp.sin(xp.deg2rad(spread))
 
 
 def over_cone(
@@ -90,17 +97,15 @@ def over_cone(
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
         pupil = cone_sine(scene), count, around, scene.instrument.apodisation
-        rays = cone_rays(jnp.deg2rad(scene.light.angle), *pupil)
+        xp = namespace(scene)
+        rays = cone_rays(namespace(scene.light.angle).deg2rad(scene.light.angle), *pupil)
 
         def at(angle, cosine, square):
-            inclined = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
+            inclined = eqx.tree_at(lambda s: s.light.angle, scene, namespace(angle).rad2deg(angle))
             return mix(simulate(inclined), cosine, square)
 
-        shape = jnp.shape(rays.angle)
-        turns = (jnp.broadcast_to(jnp.asarray(x, like), shape) for x in (rays.cosine, rays.square))
-        return _weighted_mean(
-            jnp.asarray(rays.weight, like), jax.vmap(at)(jnp.asarray(rays.angle, like), *turns)
-        )
+        turns = (xp.broadcast_to(xp.asarray(x, like), rays.angle.shape) for x in (rays.cosine, rays.square))
+        return _mean_over(xp.asarray(rays.weight, like), at, xp.asarray(rays.angle, like), *turns)
 
     return average
 
@@ -127,7 +132,7 @@ def over_lens(of_ray: Callable[[Turn], Intensities], count: int, around: int) ->
         numbers = (rays.angle, rays.azimuth, *rays.turn)
         rings = [jnp.asarray(x, like).reshape(count, around, -1) for x in numbers]
         weights = jnp.asarray(rays.weight, like).reshape(count, around).sum(axis=1)
-        return _weighted_mean(weights, jax.lax.map(of_ring, rings))
+        return [jnp.tensordot(weights, row, 1) for row in jax.lax.map(of_ring, rings)]
 
     return average
 
@@ -220,9 +225,10 @@ def build(plan: Plan) -> Simulate:
 
 
 def is_elementary(plan: Plan) -> bool:
-    """True where NumPy evaluates a plan: plane waves, isotropic homogeneous layers, no averages."""
-    more = ("angle-spread", "orders", "gradient", "anisotropy")
-    return plan.reference is None and not plan.row("coherence").count and not any(map(plan.on, more))
+    """True where NumPy evaluates a plan: homogeneous layers in which s and p stay apart, without sums over
+    orders of interference."""
+    mixed = plan.row("anisotropy").count >= GENERAL or _birefringent_on_plates(plan)
+    return plan.reference is None and not (mixed or plan.on("orders") or plan.on("gradient"))
 
 
 def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
