@@ -44,6 +44,7 @@ DATA = [
     (NONE, "nm,angle,R\n400,30,0.1\n400,60,0.1\n400,60,0.2\n", "line 4", "400 of line 3", "within one angle"),
     *((NONE, f"wl,R\n{value},0.1\n{GOOD}", "line 2", "not above zero", "delete") for value in (0, -500)),
     (NONE, "wavelength,R\n0.4,0.1\n0.5,0.2\n0.6,0.3\n", "is unlike nm", "`wavelength_unit="),
+    ({"wavelength_unit": "eV"}, f"wavelength,R\n{GOOD}", "600 eV, which is no wavelength of light"),
     (NONE, "wl,R\n400,12\n500,49.5\n", "line 3, column", "49.5 is above 1.5", '`signal_unit="percent"`'),
     ({"signal_unit": "fraction"}, "wavelength,R\n400,1\n500,49.5\n", "line 3", "above 1.5", "`range`"),
     (NONE, "wl,T (%)\n400,12\n500,151\n", "line 3", "1.51 is above 1.5 for a transmittance", "`range`"),
