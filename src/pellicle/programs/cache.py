@@ -264,7 +264,7 @@ def kept(function: Program, *, calls: Calls = "some", at_first: Program | None =
         own = dict(zip(keys, leaves, strict=True))
         rows = {key: row for row, key in enumerate(own)}
         places = _Places(structure, tuple(rows[key] for key in keys))
-        shapes = tuple((np.shape(x), np.result_type(x)) for x in own.values())
+        shapes = tuple((np.shape(x), _dtype(x)) for x in own.values())
         # JAX can cache in a cloud, too
         program = function, calls, plan, places, shapes, None if "://" in str(folder) else folder
         if at_first is not None and _is_new(program):
@@ -279,6 +279,10 @@ def kept(function: Program, *, calls: Calls = "some", at_first: Program | None =
         return jax.tree_util.tree_unflatten(output, [np.asarray(leaf) for leaf in run(*arrays)])
 
     return call
+
+
+def _dtype(x: Any) -> Any:
+    return x.dtype if hasattr(x, "dtype") else np.result_type(x)
 
 
 @lru_cache(maxsize=128)
