@@ -253,8 +253,8 @@ def _with_secant(state: State, step: Any, gradient: Any, hessian: Any) -> Any:
     xp = namespace(step)
     missing = gradient - state.gradient - _times(hessian + state.curvature, step)
     along = xp.sum(missing * step, axis=-1)
-    size = xp.sqrt(xp.sum(missing**2, axis=-1) * xp.sum(step**2, axis=-1))
+    size = xp.sqrt(xp.sum(missing**2, axis=-1)) * xp.sqrt(xp.sum(step**2, axis=-1))
     defined = ~state.first & (xp.abs(along) > _RANK_ONE * size)
-    update = missing[..., None] * (missing / xp.where(defined, along, 1)[..., None])[..., None, :]
+    update = missing[..., :, None] * missing[..., None, :] / xp.where(defined, along, 1)[..., None, None]
     taken = defined & xp.all(xp.isfinite(update), axis=(-2, -1))
     return state.curvature + xp.where(taken[..., None, None], update, 0)
