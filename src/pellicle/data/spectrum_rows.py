@@ -23,7 +23,7 @@ from pellicle.signals.registry import SIMULATED
 REMEDY = "correct or delete that row"
 NOISE_REPLACES = "the given noise replaces the columns of errors"
 _SHORTEST = 10.0
-"""An axis below this (nm) in the unit that is stated is not one of light: 500 nm taken for eV are 2.5 nm."""
+"""An axis below this (nm) in another unit that is stated is not one of light: 500 taken for eV are 2.5 nm."""
 SHORTEST_ASSUMED = 30.0
 """An axis below this (nm) whose unit is not stated is more likely in µm or eV."""
 LONGEST_ASSUMED = 3300.0
@@ -208,7 +208,7 @@ def read_axis(
             f'{values.max():g}, which is unlike nm; state its unit: {likely} or `wavelength_unit="nm"`'
         )
     converted = Axis(to_nm(values, unit or "nm"), angles, azimuths)
-    if unit is not None and converted.wavelength.max() < _SHORTEST:
+    if unit not in (None, "nm") and converted.wavelength.max() < _SHORTEST:
         raise DataError(
             f"{table.path}: {table.label(wavelength.position)} runs from {values.min():g} to "
             f"{values.max():g} {unit}, which is no wavelength of light; correct its unit, or leave out "
