@@ -102,7 +102,8 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
 def _layers_and_phases(plan: Plan, layers: Sequence[Layer], wavelength: Any) -> tuple[Any, Any]:
     """Indices and phases of layers; of many homogeneous ones in rows of arrays."""
     k0 = 2 * np.pi / wavelength
-    if len(layers) <= coherent.FEW or plan.on("anisotropy") or plan.on("gradient") or jnp.ndim(k0) != 1:
+    columns = jnp.ndim(k0) != 1 or any(jnp.ndim(layer.thickness) for layer in layers)
+    if len(layers) <= coherent.FEW or plan.on("anisotropy") or plan.on("gradient") or columns:
         return [_layer_index(plan, x, wavelength) for x in layers], [k0 * x.thickness for x in layers]
     indices = _index_rows(plan, [layer.material for layer in layers], wavelength)
     return indices, k0 * stack_numbers([layer.thickness for layer in layers], k0)[:, None]
@@ -130,6 +131,9 @@ def _index_rows(plan: Plan, materials: Sequence[Any], wavelength: Any) -> Stacke
 
 def _index_of_kind(structure: Any, numbers: Sequence[Sequence[Any]], wavelength: Any) -> Any:
     """Index (materials, wavelengths) of materials of one structure, by the numbers of each."""
+    if namespace(numbers, wavelength) is np:
+        each = [structure.unflatten(leaves).index(wavelength) for leaves in numbers]
+        return jax.tree.map(lambda *rows: np.stack(np.broadcast_arrays(*rows, wavelength)[:-1]), *each)
     columns = [*zip(*numbers, strict=True)]
     same = [all(x is column[0] for x in column) for column in columns]
     axes = tuple(None if alike else 0 for alike in same)

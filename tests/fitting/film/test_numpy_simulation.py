@@ -31,6 +31,7 @@ ELEMENTARY = {
     "psi and delta of a plate": scene(pl.Layer("SiO2", FREE), PLATE, "psi-delta", 58.0),
     "Mueller elements": scene(pl.Layer("SiO2", FREE), "Si", "mueller", 58.0),
     "six layers": scene(STACK, "BK7", "psi-delta", 50.0),
+    "R of six layers": scene(STACK, "BK7"),
     "cone": scene(pl.Layer("SiO2", FREE), "Si", instrument=pl.Instrument(numerical_aperture=0.5)),
     "oblique cone": scene(
         pl.Layer("SiO2", FREE), "Si", "psi-delta", 58.0, instrument=pl.Instrument(angle_spread=2.0)
@@ -83,3 +84,27 @@ def test_numpy_and_the_program_simulate_the_same(name, monkeypatch):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_plans_take_the_program(name, monkeypatch):
     assert all(found is None for _, found in simulations(OTHERS[name], monkeypatch))
+
+
+SIMULATED = {
+    "many layers": pl.Scene([pl.Layer(name, 60.0) for name in ("TiO2", "SiO2", "Si3N4") * 3], "BK7"),
+    "drift": pl.Scene(pl.Group([pl.Layer("TiO2", 60.0, drift=0.05), pl.Layer("SiO2", 90.0)], 5), "BK7"),
+    "periods": scene(pl.Group([pl.Layer("TiO2", 60.0), pl.Layer("SiO2", 90.0)], 5), PLATE, "R", 50.0),
+    "cone": ELEMENTARY["oblique cone"],
+}
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_simulation_compiles_nothing(name):
+    compiled = []
+
+    def listen(event, seconds, **_):
+        if event.startswith("/jax/core/compile/"):
+            compiled.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    try:
+        pl.simulate(SIMULATED[name], NM)
+    finally:
+        jax.monitoring.unregister_event_duration_listener(listen)
+    assert not compiled
