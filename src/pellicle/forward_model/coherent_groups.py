@@ -102,11 +102,12 @@ def coherent_groups(plan: Plan, scene: Scene) -> list[CoherentGroup]:
 def _layers_and_phases(plan: Plan, layers: Sequence[Layer], wavelength: Any) -> tuple[Any, Any]:
     """Indices and phases of layers; of many homogeneous ones in rows of arrays."""
     k0 = 2 * np.pi / wavelength
-    columns = jnp.ndim(k0) != 1 or any(jnp.ndim(layer.thickness) for layer in layers)
+    thickness: list[Any] = [layer.thickness for layer in layers]
+    columns = jnp.ndim(k0) != 1 or any(map(jnp.ndim, thickness))
     if len(layers) <= coherent.FEW or plan.on("anisotropy") or plan.on("gradient") or columns:
-        return [_layer_index(plan, x, wavelength) for x in layers], [k0 * x.thickness for x in layers]
+        return [_layer_index(plan, x, wavelength) for x in layers], [k0 * x for x in thickness]
     indices = _index_rows(plan, [layer.material for layer in layers], wavelength)
-    return indices, k0 * stack_numbers([layer.thickness for layer in layers], k0)[:, None]
+    return indices, k0 * stack_numbers(thickness, k0)[:, None]
 
 
 def _index_rows(plan: Plan, materials: Sequence[Any], wavelength: Any) -> StackedLayers:
