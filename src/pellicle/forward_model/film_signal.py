@@ -32,6 +32,9 @@ from pellicle.scene.film import Scene, media, of_reference, thickness_spread, tu
 from pellicle.scene.free import Content, free_leaves, insert
 from pellicle.scene.layers import Interface, Layer
 
+_VALUES = 2**16
+"""Values of an array of NumPy: those of longer ones leave the cache of the processor."""
+
 Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
 
@@ -233,7 +236,11 @@ def is_elementary(plan: Plan) -> bool:
 
 def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
     """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
-    (candidates, numbers)."""
+    (candidates, numbers), as many side by side as have `_VALUES` values."""
+    most = max(1, _VALUES // np.size(scene.light.wavelength))
+    if len(candidates) > most:
+        parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
+        return [signal for part in parts for signal in by_numpy(plan, scene, part)]
     numbers = jax.tree.map(np.asarray, insert(scene, [*np.transpose(candidates)[:, :, None]]))
     rows, kind = np.broadcast_arrays(np.empty((len(candidates), 1)), *_rows(plan)(numbers))[1:], plan.kind
     if not kind.ellipsometric:

@@ -6,8 +6,9 @@ So formulas are written once, with the functions below, which accept a real arra
 absent: it is known to be zero when the program is traced, and nothing is computed for it.
 
 `namespace` chooses between NumPy and JAX. Refractive indices of known media are computed once, by NumPy,
-which compiles nothing: JAX takes 30 to 90 ms to trace and load even a program of a few operations. Within
-traced programs the same formulas use JAX.
+which compiles nothing: JAX takes 30 to 90 ms to trace and load even a program of a few operations. So are
+scenes that are simulated a few times (`forward_model.film_signal.by_numpy`). Within traced programs the same
+formulas use JAX.
 """
 
 from collections.abc import Callable
