@@ -127,6 +127,7 @@ def test_a_second_fit_of_the_same_kind_compiles_nothing(programs):
     """Other data, wavelengths, number of points, noise, bounds and constants; the padded length is one."""
     one = pl.simulate(film(1.5, 300.0), NM, noise=0.002)
     other = pl.simulate(film(1.46, 520.0, 2000.0, 3.7), NM[3:] + 7.0, noise=0.005, seed=1)
+    jax.jit(lambda x: x + 1)(1.0)
     assert programs  # the listener listens
     pl.fit(one, FREE)
     programs.clear()
