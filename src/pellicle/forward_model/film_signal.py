@@ -30,6 +30,7 @@ from pellicle.optics.pair import namespace
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
 from pellicle.scene.free import Content, free_leaves, insert
+from pellicle.scene.graded import Graded
 from pellicle.scene.layers import Interface, Layer
 
 _VALUES = 2**16
@@ -237,11 +238,14 @@ def is_elementary(plan: Plan) -> bool:
 def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
     """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
     (candidates, numbers), as many side by side as have `_VALUES` values."""
-    most = max(1, _VALUES // np.size(scene.light.wavelength))
+    # means over a graded medium have an axis of their own
+    graded = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
+    most = 1 if graded else max(1, _VALUES // np.size(scene.light.wavelength))
     if len(candidates) > most:
         parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
         return [signal for part in parts for signal in by_numpy(plan, scene, part)]
-    numbers = jax.tree.map(np.asarray, insert(scene, [*np.transpose(candidates)[:, :, None]]))
+    columns = candidates[0] if len(candidates) == 1 else np.transpose(candidates)[:, :, None]
+    numbers = jax.tree.map(np.asarray, insert(scene, [*columns]))
     rows, kind = np.broadcast_arrays(np.empty((len(candidates), 1)), *_rows(plan)(numbers))[1:], plan.kind
     if not kind.ellipsometric:
         return [np.asarray(kind.of_power(power)) for power in rows[0]]
