@@ -5,13 +5,10 @@ import numpy as np
 import pytest
 
 import pellicle as pl
-from pellicle.effects.film_plan import exact
 from pellicle.fitting.film import extended_scene
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import simulated_effects
-from pellicle.forward_model.film_signal import by_numpy
-from pellicle.scene.film import with_wavelength
 from pellicle.scene.free import insert
 
 NM = np.linspace(420.0, 880.0, 40)
@@ -87,18 +84,6 @@ def test_numpy_and_the_program_simulate_the_same(name, monkeypatch):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_plans_take_the_program(name, monkeypatch):
     assert all(found is None for _, found in simulations(OTHERS[name], monkeypatch))
-
-
-def test_candidates_of_the_mean_index_of_a_graded_layer():
-    """As where a plan leaves out the gradient."""
-    ends = pl.dispersion.Constant(pl.Free(1.4, 1.6)), pl.dispersion.Constant(1.9)
-    graded = with_wavelength(pl.Scene(pl.Layer(pl.Graded(*ends, pl.profile.Linear()), 90.0), "Si"), NM)
-    homogeneous = exact(with_wavelength(pl.Scene(pl.Layer(1.5, 90.0), "Si"), NM))
-    found = by_numpy(homogeneous, graded, np.array([[1.45], [1.55]]))
-    for n, signal in zip((1.45, 1.55), found, strict=True):
-        [alone] = by_numpy(homogeneous, graded, np.array([[n]]))
-        np.testing.assert_array_equal(signal, alone)
-        np.testing.assert_allclose(signal, pl.reflectance(NM, 90.0, 0.5 * (n + 1.9), "Si"), atol=0.01)
 
 
 SIMULATED = {
