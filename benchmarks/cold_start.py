@@ -7,15 +7,15 @@ their ratios to bare JAX, the least that any program of JAX takes.
 Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 3:
 
                                           wall s   cpu s  wall ratio  cpu ratio
-    bare JAX                                0.81    0.91        1.00       1.00
-    pellicle --help                         0.23    0.23        0.29       0.26
-    R by a recipe                           1.99    2.18        2.47       2.40
-    R, CSV by flags                         2.09    2.30        2.59       2.53
-    psi and delta, recipe                   2.08    2.19        2.58       2.41
-    R by a recipe, --out                    2.95    3.13        3.65       3.44
-    R by a recipe, empty cache              4.96    5.31        6.14       5.84
-    R, CSV by flags, empty cache            4.56    4.92        5.65       5.41
-    psi and delta, recipe, empty cache      5.70    5.96        7.06       6.56
+    bare JAX                                0.79    0.88        1.00       1.00
+    pellicle --help                         0.25    0.25        0.31       0.28
+    R by a recipe                           1.80    1.99        2.29       2.25
+    R, CSV by flags                         1.68    1.86        2.13       2.10
+    psi and delta, recipe                   1.83    1.93        2.32       2.18
+    R by a recipe, --out                    2.60    2.80        3.31       3.16
+    R by a recipe, empty cache              3.50    3.76        4.45       4.24
+    R, CSV by flags, empty cache            2.79    3.05        3.55       3.45
+    psi and delta, recipe, empty cache      3.87    4.03        4.91       4.55
 
 `--programs` has the programs of `pl.fit` of four scenes instead, each in a new process with an empty cache:
 lines of StableHLO and of optimised HLO, and processor time (s) of tracing with lowering and of compilation.
@@ -23,29 +23,23 @@ lines of StableHLO and of optimised HLO, and processor time (s) of tracing with 
 On the same machine:
 
                                      StableHLO       HLO   trace compile
-    R, thickness                                                    2.43
-        deviances                          283       720    0.06    0.06
-        polished                          1889      4214    0.49    0.56
-        local                              564      1339    0.09    0.05
-        _simulated                         848      2053    0.09    0.14
-        _simulated                        1291      5064    0.19    0.24
-    psi and delta, Cauchy                                           4.63
-        deviances                          730      1956    0.19    0.22
-        polished                          3159      7444    0.75    1.55
-        local                             1559      4332    0.39    0.17
-        _simulated                         924      2680    0.12    0.32
-        _simulated                        1191      4160    0.19    0.18
-    psi and delta, two layers                                       4.76
-        deviances                          974      2267    0.16    0.24
-        polished                          3571      8376    0.73    1.52
-        local                             1845      5200    0.40    0.24
-        _simulated                        1207      3127    0.11    0.28
-        _simulated                        1393      5178    0.20    0.23
-    tilted axis                                                    14.12
-        deviances                         2388      6714    0.36    1.58
-        polished                          8448     16419    1.95    4.72
-        local                             5266     13575    1.09    0.88
-        _simulated                        3327     12216    0.44    2.29
+    R, thickness                                                    1.15
+        deviances                          283       728    0.07    0.06
+        equations                          927      1889    0.31    0.26
+        local                              564      1350    0.11    0.05
+    psi and delta, Cauchy                                           2.68
+        deviances                          730      1969    0.17    0.25
+        equations                         1965      4915    0.49    0.67
+        local                             1559      4355    0.42    0.19
+    psi and delta, two layers                                       3.43
+        deviances                          974      2266    0.17    0.30
+        equations                         2377      5831    0.55    0.89
+        local                             1845      5207    0.40    0.31
+    tilted axis                                                    12.45
+        deviances                         2388      6713    0.30    1.70
+        equations                         7254     13873    1.59    3.49
+        local                             5266     13579    0.90    0.92
+        _simulated                        3327     12223    0.33    2.36
 """
 
 from __future__ import annotations
