@@ -15,6 +15,7 @@ from pellicle.dispersion.anisotropic import isotropic_in_plane, principal_media
 from pellicle.dispersion.base import AbstractDispersion, known_index
 from pellicle.dispersion.empirical import Tabulated
 from pellicle.forward_model import film_signal
+from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.plan import Plan
 from pellicle.optics import interface, orders
 from pellicle.optics.pair import Number, abs2, imag, real
@@ -200,9 +201,9 @@ class Evaluation(NamedTuple):
 def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndarray:
     """Signal at each point, (points, values): for a film its wavelengths, for ellipsometry N, C and S of
     each wavelength (and ratio), for a surface the channels of each pair of directions."""
-    of_film = build is film_signal.build and film_signal.is_elementary(plan)
+    of_film = build is film_signal.build and is_elementary(plan)
     if of_film and len(points) * np.size(scene.light.wavelength) <= _BY_NUMPY:
-        return np.stack(film_signal.by_numpy(plan, scene, points))
+        return np.stack(by_numpy(plan, scene, points))
     return np.asarray(_signals(build, plan.static_key, False, *_split(scene, points)), dtype=float)
 
 

@@ -124,7 +124,7 @@ def polished(
 def _by_numpy(
     static: tuple[tuple[Member, ...], int], arrays: tuple[Any, ...], box: Box, units: Any, until: Until
 ) -> Polished:
-    """The same by steps of NumPy, around a program that compiles in a third of the time."""
+    """Polish as `polished` does, by steps of NumPy around a program that compiles in a third of the time."""
     from pellicle.fitting.lanes import minimise_by_numpy
 
     family, lanes = static

@@ -29,12 +29,8 @@ from pellicle.optics.orders import FWHM
 from pellicle.optics.pair import namespace
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
-from pellicle.scene.free import Content, free_leaves, insert
-from pellicle.scene.graded import Graded
+from pellicle.scene.free import Content, free_leaves
 from pellicle.scene.layers import Interface, Layer
-
-_VALUES = 2**16
-"""Values of an array of NumPy: those of longer ones leave the cache of the processor."""
 
 Intensities = Callable[[Scene], Any]
 """A scene in numbers → rows of intensities, each (wavelengths,)."""
@@ -219,7 +215,7 @@ def build(plan: Plan) -> Simulate:
     first wavelength, then of the next, or with the other rows of its kind of signal. `scene` contains numbers
     only (see `scene.free.insert`). The function is pure and can be traced.
     """
-    kind, each = plan.kind, _rows(plan)
+    kind, each = plan.kind, signal_rows(plan)
 
     def simulate(scene: Scene) -> Any:
         signal = each(scene)
@@ -228,31 +224,7 @@ def build(plan: Plan) -> Simulate:
     return simulate if plan.reference is None else _against(simulate, build(plan.reference))
 
 
-def is_elementary(plan: Plan) -> bool:
-    """True where NumPy evaluates a plan: homogeneous layers in which s and p stay apart, without sums over
-    orders of interference."""
-    mixed = plan.row("anisotropy").count >= GENERAL or _birefringent_on_plates(plan)
-    return plan.reference is None and not (mixed or plan.on("orders") or plan.on("gradient"))
-
-
-def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
-    """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
-    (candidates, numbers), as many side by side as have `_VALUES` values."""
-    # means over a graded medium have an axis of their own
-    graded = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
-    most = 1 if graded else max(1, _VALUES // np.size(scene.light.wavelength))
-    if len(candidates) > most:
-        parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
-        return [signal for part in parts for signal in by_numpy(plan, scene, part)]
-    columns = candidates[0] if len(candidates) == 1 else np.transpose(candidates)[:, :, None]
-    numbers = jax.tree.map(np.asarray, insert(scene, [*columns]))
-    rows, kind = np.broadcast_arrays(np.empty((len(candidates), 1)), *_rows(plan)(numbers))[1:], plan.kind
-    if not kind.ellipsometric:
-        return [np.asarray(kind.of_power(power)) for power in rows[0]]
-    return [*np.stack(rows, axis=-1).reshape(len(candidates), -1)]
-
-
-def _rows(plan: Plan) -> Callable[[Scene], Sequence[Any]]:
+def signal_rows(plan: Plan) -> Callable[[Scene], Sequence[Any]]:
     """The rows (..., wavelengths) of the signal of a scene, without the reference of a contrast."""
     kind, ellipsometric = plan.kind, plan.kind.ellipsometric
     rows = partial(_stokes_rows if ellipsometric else _power_rows, plan)
@@ -269,7 +241,7 @@ def _rows(plan: Plan) -> Callable[[Scene], Sequence[Any]]:
         groups = coherent_groups(plan, scene)
         # slices have an axis of their own, along which nothing acts element by element; a program of the 4×4
         # method with its slopes in each number one by one takes a minute to compile
-        if plan.on("gradient") or mixed or _birefringent_on_plates(plan):
+        if plan.on("gradient") or mixed or birefringent_on_plates(plan):
             return at_each_wavelength(groups, **turn)
         return pointwise(at_each_wavelength, groups)
 
@@ -373,7 +345,7 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
     if len(groups) == 1:
         s, p = responses_of(plan, groups[0], "sp")
         return ellipsometry.transmitted_stokes(s, p) if through else ellipsometry.stokes(s, p)
-    if _birefringent_on_plates(plan):
+    if birefringent_on_plates(plan):
         if through:
             raise UsageError(mixed_polarisations.NO_PLATE)
         return mixed_polarisations.stokes(plan, groups)
@@ -381,7 +353,7 @@ def _stokes_rows(plan: Plan, groups: list[CoherentGroup]) -> ellipsometry.Stokes
     return ellipsometry.stokes_from_sums(s, p, _cross_product(plan, groups, through))
 
 
-def _birefringent_on_plates(plan: Plan) -> bool:
+def birefringent_on_plates(plan: Plan) -> bool:
     """True where s and p may cross the layers with different phases that the 2×2 method leaves out.
 
     Its amplitudes have a scale, which is real and the same for s and p in one layer without losses.

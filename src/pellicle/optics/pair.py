@@ -7,7 +7,7 @@ absent: it is known to be zero when the program is traced, and nothing is comput
 
 `namespace` chooses between NumPy and JAX. Refractive indices of known media are computed once, by NumPy,
 which compiles nothing: JAX takes 30 to 90 ms to trace and load even a program of a few operations. So are
-scenes that are simulated a few times (`forward_model.film_signal.by_numpy`). Within traced programs the same
+scenes that are simulated a few times (`forward_model.elementary_signal`). Within traced programs the same
 formulas use JAX.
 """
 

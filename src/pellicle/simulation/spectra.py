@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import plan
 from pellicle.errors import UsageError
-from pellicle.forward_model.film_signal import build, by_numpy, depolarises, is_elementary, tabulated
+from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
+from pellicle.forward_model.film_signal import build, depolarises, tabulated
 from pellicle.forward_model.plan import Plan
 from pellicle.materials import common_range
 from pellicle.scene.film import Scene, with_wavelength

@@ -26,7 +26,8 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
-from pellicle.forward_model.film_signal import by_numpy, depolarises, is_elementary
+from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
+from pellicle.forward_model.film_signal import depolarises
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.coherent import FEW
 from pellicle.programs.cache import kept
@@ -63,7 +64,7 @@ def _simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values:
 
 
 def _by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulated | None:
-    """The same by NumPy; None for a plan that it does not evaluate."""
+    """Signals as of `_simulated`, by NumPy; None for a plan that it does not evaluate."""
     if not (isinstance(form, SpectrumForm) and is_elementary(form.plan)):
         return None
     rows, each = np.unique(values, axis=0, return_inverse=True)  # without those that are padding
@@ -88,7 +89,7 @@ class SideBySide(NamedTuple):
 
 
 def _many_by_numpy(form: Any, scene: Scene, data: Any, frame: Any, values: np.ndarray) -> SideBySide | None:
-    """The same by NumPy, where all pixels have one frame."""
+    """Signals as of `simulated_side_by_side`, by NumPy, where all pixels have one frame."""
     simulated = (
         None if frame is not None else _by_numpy(form, scene, data, values.reshape(-1, values.shape[-1]))
     )

@@ -1,0 +1,42 @@
+"""Signals of elementary scenes by NumPy, which compiles nothing.
+
+The formulas are those of `film_signal`; many candidates of one scene are evaluated side by side.
+"""
+
+import jax
+import numpy as np
+
+from pellicle.forward_model.film_signal import birefringent_on_plates, signal_rows
+from pellicle.forward_model.plan import GENERAL, Plan
+from pellicle.scene.film import Scene
+from pellicle.scene.free import insert
+from pellicle.scene.graded import Graded
+from pellicle.scene.layers import Layer
+
+_VALUES = 2**16
+"""Values of an array of NumPy: those of longer ones leave the cache of the processor."""
+
+
+def is_elementary(plan: Plan) -> bool:
+    """True where NumPy evaluates a plan: homogeneous layers in which s and p stay apart, without sums over
+    orders of interference."""
+    mixed = plan.row("anisotropy").count >= GENERAL or birefringent_on_plates(plan)
+    return plan.reference is None and not (mixed or plan.on("orders") or plan.on("gradient"))
+
+
+def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
+    """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
+    (candidates, numbers), as many side by side as have `_VALUES` values."""
+    # means over a graded medium have an axis of their own
+    graded = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
+    most = 1 if graded else max(1, _VALUES // np.size(scene.light.wavelength))
+    if len(candidates) > most:
+        parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
+        return [signal for part in parts for signal in by_numpy(plan, scene, part)]
+    columns = candidates[0] if len(candidates) == 1 else np.transpose(candidates)[:, :, None]
+    numbers = jax.tree.map(np.asarray, insert(scene, [*columns]))
+    each, kind = np.empty((len(candidates), 1)), plan.kind
+    _, *rows = np.broadcast_arrays(each, *signal_rows(plan)(numbers))
+    if not kind.ellipsometric:
+        return [np.asarray(kind.of_power(power)) for power in rows[0]]
+    return [*np.stack(rows, axis=-1).reshape(len(candidates), -1)]
