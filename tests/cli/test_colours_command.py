@@ -80,6 +80,9 @@ def test_regions_of_a_photo_are_read_as_films(pellicle, photo):
         (["read", "photo.png", "--region", "1,1,9,9", "--range", "400:700"], 3, "--range: of spectra"),
         (["read", "photo.png", "--region", "1,1,9,9", "--chart", "a.csv"], 3, "--chart goes with"),
         (["read", "s.csv", "--region", "1,1,9,9"], 3, "only photographs have pixels"),
+        (["read", "photo.webp", "--region", "1,1,9,9"], 3, "an image of another kind; save it as PNG"),
+        (["read", "photo.webp", "--signal", "srgb", "--region", "1,1,9,9"], 3, "save it as PNG or TIFF"),
+        (["read", "photo.webp"], 3, "save it as PNG or TIFF"),
         (["read", "absent.png", "--region", "1,1,9,9"], 3, "no such file"),
         (["read", "photo.png", "--region", "1,1,9,9", "--gamma", "2"], 3, "--gamma goes with --signal rgb"),
         (["read", "c.csv", "--out", "o", "--to", "netcdf"], 2, "colours are written as csv"),
@@ -94,6 +97,7 @@ def test_errors_name_flags(pellicle, photo, tmp_path, monkeypatch, words, code, 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.csv").write_text("wavelength_nm,R\n500,0.2\n600,0.3\n")
     (tmp_path / "c.csv").write_text("name,R,G,B\na,0.1,0.2,0.3\n")
+    Image.open(photo[0]).save(tmp_path / "photo.webp")
     found = pellicle(*words)
     assert found.code == code
     assert message in found.err

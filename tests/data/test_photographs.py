@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import tifffile
-from PIL import Image, ImageCms
+from PIL import Image, ImageCms, ImageOps
 
 from pellicle.data.photographs import (
     Region,
@@ -73,6 +73,16 @@ def test_a_turned_photo_is_upright(tmp_path):
     np.testing.assert_allclose(read_photograph(path).pixels, np.rot90(PIXELS, -1) / 255, atol=1e-7)
 
 
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_turned_tiff_is_upright(tmp_path, orientation):
+    """As Pillow turns it; every orientation of TIFF 6.0."""
+    tag = [(274, 3, 1, orientation, True)]
+    path = by_tifffile(tmp_path / "a.tif", PIXELS, photometric="rgb", extratags=tag)
+    with Image.open(path) as image:
+        expected = np.asarray(ImageOps.exif_transpose(image))
+    np.testing.assert_allclose(read_photograph(path).pixels, expected / 255, atol=1e-7)
+
+
 def test_profiles_other_than_srgb_are_named(tmp_path):
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     lab = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
@@ -88,8 +98,27 @@ def truncated(path):
     return path
 
 
+def starting(path, content):
+    path.write_bytes(content + bytes(200))
+    return path
+
+
 REFUSED = {
-    "no photograph": (lambda p: by_pillow(p / "a.bmp"), "is no PNG"),
+    "no photograph": (lambda p: starting(p / "a.xyz", b"photograph"), "is no PNG"),
+    "bmp": (lambda p: by_pillow(p / "a.bmp"), "save it as PNG or TIFF"),
+    "webp": (lambda p: by_pillow(p / "a.webp"), "save it as PNG or TIFF"),
+    "heic": (lambda p: starting(p / "a.heic", b"\0\0\0\x18ftypheic"), "in HEIC or AVIF; save it as PNG"),
+    "raw": (lambda p: starting(p / "a.raf", b"FUJIFILMCCD-RAW "), "raw file; develop it"),
+    "preview": (
+        lambda p: by_tifffile(p / "a.nef", PIXELS, photometric="rgb", subfiletype=1),
+        "raw file, whose first image is a preview",
+    ),
+    "dng": (
+        lambda p: by_tifffile(
+            p / "a.dng", PIXELS, photometric="rgb", extratags=[(50706, 1, 4, (1, 4, 0, 0), True)]
+        ),
+        "raw file, whose first image is a preview",
+    ),
     "grey": (lambda p: by_pillow(p / "a.png", PIXELS[..., 0]), "is grey"),
     "grey tiff": (lambda p: by_tifffile(p / "a.tif", PIXELS[..., 0], photometric="minisblack"), "is grey"),
     "transparent": (lambda p: by_pillow(p / "a.png", np.dstack([PIXELS, PIXELS[..., 0]])), "transparent"),

@@ -193,6 +193,8 @@ def test_clipped_pixels_are_told_and_are_limits(photo):
     film = read_colours(photo(), region="0,0,5,6")
     assert film.values[0].tolist() == [0, 0, 0]
     assert "83 % of the pixels are clipped (dark), taken as a limit in R, G, B" in " ".join(film.notes)
+    dark = read_colours(photo(), region="1,1,2,2")
+    assert "up to 100 % of the pixels are clipped (dark)" in " ".join(dark.notes)
     few = read_colours(photo(), region="0,0,30,20")
     assert "4.2 % of the pixels are clipped" in " ".join(few.notes)
     assert few.values.min() > 0.2

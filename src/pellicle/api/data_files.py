@@ -171,11 +171,11 @@ def check_camera(given_flags: FileOptions, files: Iterable[tuple[str, FileOption
 
 def refuse_camera(path: str, reading: FileOptions) -> None:
     """Raise UsageError where flags of colours are given and the file has a spectrum."""
-    from pellicle.data.photographs import image_format
+    from pellicle.data.photographs import refuse_foreign_image
 
     wrong = [name for name in _PIXELS if getattr(reading, name) is not None]
     if wrong:
-        image_format(path)  # reports a file that does not exist
+        refuse_foreign_image(path)  # reports a file that does not exist, too
         raise UsageError(
             f"{path}: {', '.join(named(wrong))}: only photographs have pixels, with --signal srgb"
         )

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pellicle.data.tabular.text import in_file, open_binary, read_bytes
+from pellicle.data.tabular.text import foreign_format, in_file, open_binary, read_bytes
 from pellicle.errors import DataError, UsageError, decoding, needs
 
 _SIGNATURES = {
@@ -58,6 +58,14 @@ def image_format(path: str | os.PathLike[str]) -> str | None:
     return next((name for name, marks in _SIGNATURES.items() if head.startswith(marks)), None)
 
 
+def refuse_foreign_image(path: str | os.PathLike[str]) -> None:
+    """Raise DataError for a file of another kind than tables and photographs, such as HEIC, with advice."""
+    with open_binary(path) as file:
+        advice = foreign_format(file.read(1024))
+    if advice:
+        raise DataError(f"{path}: is {advice}")
+
+
 def read_photograph(path: str | os.PathLike[str]) -> Photograph:
     """Read a photograph in colour.
 
@@ -76,6 +84,7 @@ def read_frame(path: str | os.PathLike[str]) -> Photograph:
     """Read a photograph in colour, or a grey one with a single channel; the rest as `read_photograph`."""
     kind = image_format(path)
     if kind is None:
+        refuse_foreign_image(path)
         raise DataError(f"{path}: is no PNG, TIFF or JPEG photograph; save it as one of these")
     content, sha256 = read_bytes(path)
     log = getLogger("tifffile")  # without its messages on damaged files, which one error reports
@@ -134,10 +143,26 @@ def _tiff(content: bytes) -> tuple[np.ndarray, float, bytes | None, list[str]]:
     with tifffile.TiffFile(BytesIO(content)) as file:
         page: Any = file.pages[0]
         notes = [f"page 1 of {len(file.pages)}"] if len(file.pages) > 1 else []
+        reduced = page.subfiletype is not None and page.subfiletype & 1
+        if reduced or _DNG_VERSION in page.tags or content[8:10] == b"CR":
+            raise DataError("is a camera's raw file, whose first image is a preview; develop it to a TIFF")
         values, full = tiff_page(page)
+        values = _upright(values, page.tags.get(_ORIENTATION))
         notes += ["palette converted to R, G, B"] if page.photometric.name == "PALETTE" else []
         tag = page.tags.get(34675)  # ICC profile
         return values, full, None if tag is None else tag.value, notes
+
+
+_DNG_VERSION, _ORIENTATION = 50706, 274
+"""Tags of a TIFF."""
+
+
+def _upright(values: np.ndarray, orientation: Any) -> np.ndarray:
+    """Rows from the top and columns from the left, by the tag of a TIFF; 5 to 8 exchange rows and columns."""
+    code = 1 if orientation is None else int(orientation.value)
+    if code >= 5:
+        values, code = np.swapaxes(values, 0, 1), {5: 1, 6: 2, 7: 3, 8: 4}.get(code, 1)
+    return values[:: -1 if code in (3, 4) else 1, :: -1 if code in (2, 3) else 1]
 
 
 def tiff_page(page: Any) -> tuple[np.ndarray, float]:

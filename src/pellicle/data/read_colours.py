@@ -114,6 +114,7 @@ def read_colours_by_film(
         angle = None
     else:
         if not region is points is white is flat_field is None:
+            photographs.refuse_foreign_image(path)
             only = "`region`, `points`, `white` and `flat_field`"
             raise UsageError(f"{path}: is no photograph: leave {only} out")
         films = read_colour_rows(path, space, unit=signal_unit, columns=columns)
@@ -316,11 +317,11 @@ def _region_colour(
     for limit, what in ((0.0, "dark"), (1.0, "bright")):
         share = np.mean(pixels == limit, axis=0)
         if np.any(share > 0):
-            percent = 100 * share.max()
+            percent = float(f"{100 * share.max():.2g}")  # 100, not 1e+02
             at_limit = share > _LIMITED
             value = np.where(at_limit, limit, value)
             told = f", taken as a limit in {_named(at_limit)}" if at_limit.any() else ""
-            notes.append(f"region {region}: up to {percent:.2g} % of the pixels are clipped ({what}){told}")
+            notes.append(f"region {region}: up to {percent:g} % of the pixels are clipped ({what}){told}")
     return value[None], None if sigma is None else sigma[None], tuple(notes)
 
 

@@ -68,10 +68,12 @@ class Continuity:
         if not self.found:
             return f"neighbours show no continuity: none of {self.undecided} {unclear} decided by them"
         recovered = 100 * (1 - self.wrong / self.found)
+        overruled = f", {self.changed} of them against a Δχ² of up to {self.overruled:.2g}"
+        against = overruled if self.changed else ""
         return (
-            f"{self.decided} of {self.undecided} {unclear} take the order of their neighbours,"
-            f" {self.changed} of them against a Δχ² of up to {self.overruled:.2g}; of {self.hidden} decided"
-            f" pixels, hidden as a test, they decided {self.found} and {recovered:.4g} % of these rightly;"
+            f"{self.decided} of {self.undecided} {unclear} take the order of their neighbours{against};"
+            f" of {self.hidden} decided pixels, hidden as a test, they decided {self.found} and"
+            f" {recovered:.4g} % of these rightly;"
             f" {100 * self.continuous:.3g} % of the decided pixels lie on the plane of their neighbours,"
             f" within 5 standard errors and a roughness of {self.roughness:.2g} nm"
         )

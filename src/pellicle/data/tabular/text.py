@@ -165,7 +165,10 @@ def split(text: str, delimiter: str) -> list[str]:
 
 
 _FOREIGN = {
-    rb"\x89PNG|\xff\xd8\xff|GIF8|II\*\x00|MM\x00\*": "an image; give the numbers behind it, as a CSV",
+    rb"\x89PNG|\xff\xd8\xff|II\*\x00|MM\x00\*": "an image; give the numbers behind it, as a CSV",
+    rb"....ftyp(hei|hev|mif1|msf1|avi[fs])": "an image in HEIC or AVIF; save it as PNG or TIFF",
+    rb"....ftypcrx|FUJIFILMCCD|II(RO|RS|U\0)": "a camera's raw file; develop it, and save it as TIFF",
+    rb"GIF8|RIFF....WEBP|BM....\0\0\0\0|\0\0\0\x0cjP": "an image of another kind; save it as PNG or TIFF",
     rb"%PDF": "a PDF; give the numbers in it as a CSV",
     rb"\xd0\xcf\x11\xe0|PK\x03\x04.*(\[Content_Types|spreadsheet)": "an office file; save its sheet as CSV",
     rb"PK\x03\x04|\x1f\x8b|BZh|7z\xbc\xaf|Rar!": "packed; unpack it and give the file inside",
