@@ -72,7 +72,8 @@ def test_layers_are_moved_removed_and_reset(session):
     ("row", "said"),
     [
         ({**ITSELF, "material": "SiO3"}, "unknown material 'SiO3'"),
-        ({**ITSELF, "material": "1.5-0.1j"}, "n and k finite and not negative"),
+        ({**ITSELF, "material": "1.5-0.1j"}, "with n and k finite, not negative"),
+        ({**ITSELF, "material": "0"}, "must be n + ik, with n and k finite, not negative and not both 0"),
         ({**ITSELF, "material": " "}, "name a material"),
         ({**ITSELF, "material": "cauchy(1.45, 0.0035)"}, "B"),
         ({**ITSELF, "thickness": "30:10"}, "reversed"),

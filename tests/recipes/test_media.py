@@ -130,9 +130,9 @@ def test_freeing_a_table_adds_a_constant():
 @pytest.mark.parametrize(
     ("layer", "free", "message"),
     [
-        ("-1.5", (), "`layer` must be an index n"),
-        ("1.5-0.1j", (), "`layer` must be an index n"),
-        ("nan", (), "`layer` must be an index n"),
+        ("-1.5", (), "`layer` must be n"),
+        ("1.5-0.1j", (), "`layer` must be n"),
+        ("nan", (), "`layer` must be n"),
         ("1,46", (), r"an index has a decimal point: 1\.46"),
         ("SiO3", (), "SiO2"),
         ("cauchy(1,2,3,4)", (), "1 to 3 numbers"),

@@ -52,6 +52,7 @@ def test_impossible_bounds_are_refused(arguments, message, refuses):
         (lambda: pl.Layer("tauc-lorentz", 5), r"give pl\.dispersion\.TaucLorentz\(\.\.\.\), with pl\.Free"),
         (lambda: pl.Layer("cauchy(1.4,3000)", 5), r"pl\.dispersion\.Cauchy"),
         (lambda: pl.Layer(-1.46, 5), "index -1.46 has a negative real part"),
+        (lambda: pl.Layer(0.0, 5), "index 0 is that of no medium"),
         (lambda: pl.Layer(math.nan, 5), "index nan is not finite"),
         (lambda: pl.Layer(1.46, math.inf), "`thickness` must be finite, got inf"),
         (lambda: pl.Instrument(scale=FREE), "`scale` has no bounds: give 'free', 'slow' or a number"),

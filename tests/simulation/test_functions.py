@@ -264,6 +264,10 @@ def test_principal_indices_of_a_birefringent_medium(refuses):
     [
         ((500.0, 100.0, 1.46 - 0.1j, 3.9), {}, "1.46-0.1j has a negative imaginary part"),
         ((500.0, 100.0, 1.46, np.array([3.9 - 0.1j])), {}, "3.9-0.1j has a negative imaginary part"),
+        ((500.0, 100.0, 1.46, -3.9), {}, "index -3.9 has a negative real part"),
+        ((500.0, 100.0, -1.5 + 1j, 3.9), {}, "index -1.5+1j has a negative real part"),
+        ((500.0, 100.0, 1.46, 3.9), {"ambient": -1.0}, "index -1 has a negative real part"),
+        ((500.0, 100.0, np.array([1.46, 0.0]), 3.9), {}, "index 0 is that of no medium"),
         ((500.0, -1.0, 1.46, 3.9), {}, "`thickness` must not be negative, got -1 nm"),
         ((500.0, [10.0, -1.0], [1.46, 2.0], 3.9), {}, "`thickness` must not be negative"),
         ((0.55, 100.0, 1.46, 3.9), {}, "0.55 is like one in µm: write 550"),

@@ -122,9 +122,11 @@ def _index_model_or_material(text: str, name: str) -> AbstractDispersion:
     except ValueError:
         index = None
     if index is not None:
-        if np.isfinite(index) and index.real >= 0 and index.imag >= 0:
+        if np.isfinite(index) and index.real >= 0 and index.imag >= 0 and index != 0:
             return Constant(index.real, index.imag if index.imag else None)
-        raise UsageError(f"{name} must be an index n + ik with n and k finite and not negative, got {text}")
+        raise UsageError(
+            f"{name} must be n + ik, with n and k finite, not negative and not both 0, got {text}"
+        )
     match = _CALL.fullmatch(text)
     if match is not None and (model := match[1].lower()) in models.MODELS:
         if match[2] is None:

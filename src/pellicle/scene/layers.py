@@ -47,7 +47,7 @@ def medium(value: MediumLike) -> AbstractDispersion:
 
     **Returns:** a dispersion, whose `index(wavelength)` takes nm.
 
-    **Raises:** ValueError for an index with k < 0 (gain), one that is not finite, and for an unknown name;
+    **Raises:** ValueError for an index with k < 0 (gain), of 0 and not finite, and for an unknown name;
     UsageError for an object that is no medium.
 
     >>> medium(1.5)
@@ -70,6 +70,8 @@ def medium(value: MediumLike) -> AbstractDispersion:
             )
         if np.real(value) < 0:
             raise ValueError(f"index {value} has a negative real part")
+        if value == 0:
+            raise ValueError("index 0 is that of no medium: light has an infinite wavelength in it")
     if isinstance(value, complex | np.complexfloating):
         return Constant(float(value.real), float(value.imag))
     if value is None or isinstance(value, list | tuple | dict | eqx.Module):

@@ -118,12 +118,22 @@ def index_at(what: Medium, wavelength) -> Any:
     """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
     if isinstance(what, str | AbstractDispersion):
         return material_at(what, wavelength).index(wavelength)
-    if not isinstance(what, Tracer) and np.iscomplexobj(what):
-        known: Any = np.ravel(np.asarray(what, complex))  # JAX's copy would be traced in a program
-        if (gain := known[known.imag < 0]).size:
-            said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
-            raise UsageError(f"{said} absorption is n + ik with k ≥ 0")
+    if not isinstance(what, Tracer):
+        _check_index(np.ravel(np.asarray(what)))  # JAX's copy would be traced in a program
     return to_pair(floating(what))
+
+
+def _check_index(known: np.ndarray) -> None:
+    """Raise UsageError for an index that no medium has."""
+    if known.dtype.kind not in "fciu":
+        return
+    if (gain := known[known.imag < 0]).size:
+        said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
+        raise UsageError(f"{said} absorption is n + ik with k ≥ 0")
+    if (below := known[known.real < 0]).size:
+        raise UsageError(f"index {below[np.argmin(below.real)]:g} has a negative real part")
+    if np.any(known == 0):
+        raise UsageError("index 0 is that of no medium: light has an infinite wavelength in it")
 
 
 def material_at(what: str | AbstractDispersion, wavelength: Any) -> AbstractDispersion:
