@@ -113,7 +113,7 @@ def test_a_slider_moves_every_curve_and_the_list_is_edited_by_keys(opened):
     box.fill("70, 95")
     box.press("Enter")
     page.wait_for_selector(".trouble:not([hidden])")
-    assert "from 0 to 90" in page.get_by_role("alert").inner_text()
+    assert "from 0 to 89" in page.get_by_role("alert").inner_text()
     assert box.get_attribute("aria-invalid") == "true"
     box.fill("72")
     box.press("Enter")
@@ -150,7 +150,7 @@ def test_of_two_lists_the_later_counts_though_its_answer_comes_first(opened):
 
 def test_an_address_with_wrong_angles_shows_the_scene(opened):
     page = opened("&angles=65,x&thickness=300")
-    assert "from 0 to 90" in page.get_by_role("alert").inner_text()
+    assert "from 0 to 89" in page.get_by_role("alert").inner_text()
     assert agrees(page, (65, 70, 75), 300.0)
 
 

@@ -65,7 +65,7 @@ def test_its_recipe_has_the_angles_of_the_list(widget):
     assert "angle = [40, 50]" in widget.recipe()
     assert "angle" in before
     assert "angle" not in widget.values
-    with pytest.raises(ValueError, match="from 0 to 90"):
+    with pytest.raises(ValueError, match="from 0 to 89"):
         widget.angles = [95]
     widget.angles = []
     assert widget.values == before

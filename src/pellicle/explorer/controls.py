@@ -198,7 +198,7 @@ def _bounds(path: tuple[Any, ...], value: Any) -> Free:
     if key == "thickness":
         return Free(0.0, _round_up(max(2 * number, 1000.0)), start=number)
     if key in _OPTIONAL:
-        most = 89.0 if key == "angle" else math.inf
+        most = STEEPEST if key == "angle" else math.inf
         wide = _round_up(1.2 * number) if number else 0.0
         return Free(0.0, min(max(_OPTIONAL[key], wide), most), start=number)
     return Free(min(max(number - 0.5, 0.05), max(1.0, number - 0.5)), number + 0.5, start=number)
@@ -226,7 +226,7 @@ _AVERAGED = ("thickness_spread", "bandwidth", "numerical_aperture", "angle_sprea
 CONES = ("numerical_aperture", "angle_spread")
 _SHARES = (0.125, 0.25, 0.5, 1.0)
 """Shares of the range of an average for which programs are compiled: a small spread needs few nodes."""
-_ANGLES, _GRAZING = 5.0, 89.0
+_ANGLES, STEEPEST = 5.0, 89.0
 """Step of the largest angle of incidence of programs with a cone of light, and the steepest ray (degrees)."""
 
 
@@ -251,17 +251,17 @@ def bucket(control: Control, value: float) -> float:
 def oblique_cone(name: str, angle: float, size: float, bound: float) -> tuple[float, float]:
     """Return upper bounds of the angle of incidence, in steps of `_ANGLES`, and of the size of a cone at it.
 
-    Raises UsageError where the cone reaches beyond `_GRAZING`.
+    Raises UsageError where the cone reaches beyond `STEEPEST`.
     """
     aperture = key_of(name) == "numerical_aperture"
     half = math.degrees(math.asin(min(size, 1.0))) if aperture else size
-    if angle + half > _GRAZING:
+    if angle + half > STEEPEST:
         raise UsageError(
-            f"the cone of light reaches beyond {_GRAZING:g} degrees: the angle of incidence is {angle:g}, and"
+            f"the cone of light reaches beyond {STEEPEST:g} degrees: the angle of incidence is {angle:g}, and"
             f" the half angle of the cone {half:.3g}"
         )
-    highest = min(math.ceil(angle / _ANGLES) * _ANGLES, _GRAZING - half)
-    room = _GRAZING - highest
+    highest = min(math.ceil(angle / _ANGLES) * _ANGLES, STEEPEST - half)
+    room = STEEPEST - highest
     return highest, min(bound, math.sin(math.radians(room)) if aperture else room)
 
 

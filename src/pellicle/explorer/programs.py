@@ -16,7 +16,7 @@ from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.spectrum import Spectrum
 from pellicle.effects.film_plan import exact
 from pellicle.errors import UsageError
-from pellicle.explorer.controls import Control, free_paths, template, with_value
+from pellicle.explorer.controls import STEEPEST, Control, free_paths, template, with_value
 from pellicle.forward_model.film_signal import build, tabulated
 from pellicle.scene.film import Light, Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
@@ -65,10 +65,10 @@ def measured_angles(spectra: Sequence[Spectrum | BrdfSamples]) -> np.ndarray:
 def asked_angles(given: Any) -> np.ndarray:
     """Check the angles of a request, which are returned rising and each once. Raises UsageError."""
     asked = given if isinstance(given, list | tuple) else ()
-    known = all(isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= 90 for x in asked)
+    known = all(isinstance(x, int | float) and not isinstance(x, bool) and 0 <= x <= STEEPEST for x in asked)
     if not known or not 1 <= len(asked) <= MOST:
         raise UsageError(
-            f"the angles of incidence must be 1 to {MOST} numbers from 0 to 90, such as 65, 70, 75"
+            f"the angles of incidence must be 1 to {MOST} numbers from 0 to {STEEPEST:g}, such as 65, 70, 75"
         )
     return np.unique(np.asarray(asked, float))
 
