@@ -6,7 +6,7 @@ The formulas are those of `film_signal`; many candidates of one scene are evalua
 import jax
 import numpy as np
 
-from pellicle.forward_model.film_signal import birefringent_on_plates, signal_rows
+from pellicle.forward_model.film_signal import signal_rows
 from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
@@ -18,18 +18,17 @@ _VALUES = 2**16
 
 
 def is_elementary(plan: Plan) -> bool:
-    """True where NumPy evaluates a plan: homogeneous layers in which s and p stay apart, without sums over
-    orders of interference."""
-    mixed = plan.row("anisotropy").count >= GENERAL or birefringent_on_plates(plan)
-    return plan.reference is None and not (mixed or plan.on("orders") or plan.on("gradient"))
+    """True where NumPy evaluates a plan: homogeneous layers, without sums over orders of interference."""
+    return plan.reference is None and not (plan.on("orders") or plan.on("gradient"))
 
 
 def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
     """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
     (candidates, numbers), as many side by side as have `_VALUES` values."""
-    # means over a graded medium have an axis of their own
-    graded = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
-    most = 1 if graded else max(1, _VALUES // np.size(scene.light.wavelength))
+    # means over a graded medium, and the rays of a ring, have an axis of their own
+    own_axis = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
+    own_axis |= plan.on("angle-spread") and plan.row("anisotropy").count >= GENERAL
+    most = 1 if own_axis else max(1, _VALUES // np.size(scene.light.wavelength))
     if len(candidates) > most:
         parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
         return [signal for part in parts for signal in by_numpy(plan, scene, part)]

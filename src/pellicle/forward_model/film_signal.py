@@ -26,7 +26,7 @@ from pellicle.optics import ellipsometry, plate
 from pellicle.optics.coherent import FEW
 from pellicle.optics.hoisting import pointwise, stack_rows
 from pellicle.optics.orders import FWHM
-from pellicle.optics.pair import namespace
+from pellicle.optics.pair import map_rows, namespace
 from pellicle.optics.quadrature import Turn, cone_rays, lens_rays, normal_rule
 from pellicle.scene.film import Scene, media, of_reference, thickness_spread, turned, unchecked
 from pellicle.scene.free import Content, free_leaves
@@ -120,19 +120,20 @@ def over_lens(of_ray: Callable[[Turn], Intensities], count: int, around: int) ->
     def average(scene: Scene):
         like = jnp.result_type(scene.light.wavelength)
         pupil = cone_sine(scene), count, around, scene.instrument.apodisation
-        rays = lens_rays(jnp.deg2rad(scene.light.angle), *pupil)
+        xp: Any = namespace(scene)
+        rays = lens_rays(xp.deg2rad(scene.light.angle), *pupil)
 
         def of_ring(ring: Any):
             angle, azimuth, *turn = ring
-            inclined = eqx.tree_at(lambda s: s.light.angle, scene, jnp.rad2deg(angle))
-            rows = of_ray(Turn(*turn))(turned(inclined, against=jnp.rad2deg(azimuth)))
-            return [jnp.mean(row, axis=0) for row in rows]
+            inclined = eqx.tree_at(lambda s: s.light.angle, scene, xp.rad2deg(angle))
+            rows = of_ray(Turn(*turn))(turned(inclined, against=xp.rad2deg(azimuth)))
+            return [row.mean(axis=0) for row in rows]
 
         # one axis of wavelengths behind that of the rays
         numbers = (rays.angle, rays.azimuth, *rays.turn)
-        rings = [jnp.asarray(x, like).reshape(count, around, -1) for x in numbers]
-        weights = jnp.asarray(rays.weight, like).reshape(count, around).sum(axis=1)
-        return [jnp.tensordot(weights, row, 1) for row in jax.lax.map(of_ring, rings)]
+        rings = [xp.asarray(x, like).reshape(count, around, -1) for x in numbers]
+        weights = xp.asarray(rays.weight, like).reshape(count, around).sum(axis=1)
+        return [xp.tensordot(weights, row, 1) for row in map_rows(of_ring, rings)]
 
     return average
 

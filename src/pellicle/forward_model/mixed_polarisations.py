@@ -13,7 +13,6 @@ with the matrices of the layers from above (r, t) and from below (r′, t′), o
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from pellicle.errors import UsageError
@@ -24,7 +23,7 @@ from pellicle.optics.berreman.matrices import Elements
 from pellicle.optics.berreman.stack import Polarised, polarised, transmittances, two_sided
 from pellicle.optics.ellipsometry import Stokes, mueller, mueller_elements
 from pellicle.optics.interface import Inside, normal, normal_flux, transverse
-from pellicle.optics.pair import abs2, conj, imag, real, to_pair
+from pellicle.optics.pair import abs2, conj, fori_loop, imag, namespace, real, to_pair
 from pellicle.optics.quadrature import Turn, turned_response, turned_stokes
 from pellicle.signals.waves import stokes_of_mueller
 
@@ -38,7 +37,8 @@ def rows(plan: Plan, groups: list[CoherentGroup], turn: Turn | None = None) -> l
     if len(groups) > 1:
         return _rows_of_plates(plan, groups, turn)
     (group,) = groups
-    angle = jnp.zeros_like(group.phases[0]) if group.angle is None else group.angle
+    phase = group.phases[0]
+    angle = namespace(phase).zeros_like(phase) if group.angle is None else group.angle
     dichroic = plan.row("anisotropy").count == SLICED
     response = polarised(group.above, group.layers, group.below, group.phases, angle, dichroic)
     response = response if turn is None else turned_response(response, turn)
@@ -80,7 +80,7 @@ def _passed(group: CoherentGroup, response: Polarised, turn: Turn | None) -> Ele
         raise UsageError(NO_PLATE)
     E, H = response.fields
     q = normal(group.below, transverse(group.above, group.angle)[0])
-    p, s = (jnp.sqrt(normal_flux(group.below, q, letter)) for letter in "ps")
+    p, s = (namespace(q).sqrt(normal_flux(group.below, q, letter)) for letter in "ps")
     p = p / abs2(group.below)
     return Elements(H.pp * p, H.ps * p, E.sp * s, E.ss * s)
 
@@ -114,7 +114,7 @@ def transmitted(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None =
 
 def _angle(group: CoherentGroup) -> Any:
     above: Any = group.above
-    return jnp.zeros_like(above) if group.angle is None else group.angle
+    return namespace(above).zeros_like(above) if group.angle is None else group.angle
 
 
 def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit:
@@ -124,8 +124,9 @@ def _lit(plan: Plan, groups: Sequence[CoherentGroup], turn: Turn | None) -> _Lit
     waves = polarised(last.above, last.layers, last.below, last.phases, Inside(a), dichroic)
     rows = mueller_elements(*waves.reflected)
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for row in rows for x in row))
-    columns = [jnp.stack([jnp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
-    lit = _Lit(jnp.stack(columns, axis=-2), _power(waves))
+    xp = namespace(rows)
+    columns = [xp.stack([xp.broadcast_to(x, shape) for x in row], axis=-1) for row in rows]
+    lit = _Lit(xp.stack(columns, axis=-2), _power(waves))
     for group in reversed(plates):
         angle = _angle(groups[0]) if group is groups[0] else Inside(a)
         lit = _on_plate(group, angle, dichroic, lit)
@@ -141,24 +142,26 @@ def _power(waves: Polarised) -> Any:
     p = real(E.pp * conj(H.pp)) + real(E.sp * conj(H.sp))
     s = real(E.ps * conj(H.ps)) + real(E.ss * conj(H.ss))
     both = E.pp * conj(H.ps) + E.sp * conj(H.ss) + conj(E.ps) * H.pp + conj(E.ss) * H.sp
-    row = jnp.broadcast_arrays(p + s, p - s, real(both), -imag(both))
-    return 0.5 * jnp.stack(row, axis=-1)[..., None, :]
+    xp = namespace(p, s)
+    row = xp.broadcast_arrays(p + s, p - s, real(both), -imag(both))
+    return 0.5 * xp.stack(row, axis=-1)[..., None, :]
 
 
 def _on_plate(group: CoherentGroup, angle: Any, dichroic: bool, beneath: _Lit) -> _Lit:
     """Return what layers on a plate do, from what the back face and all beneath it do."""
     sides = two_sided(group.above, group.layers, group.below, group.phases, angle, dichroic)
-    r, down, up, below = (mueller(jnp.moveaxis(jones, (0, 1), (-2, -1))) for jones in sides)
-    internal = jnp.asarray(group.internal)[..., None, None]
+    xp = namespace(*sides)
+    r, down, up, below = (mueller(xp.moveaxis(jones, (0, 1), (-2, -1))) for jones in sides)
+    internal = xp.asarray(group.internal)[..., None, None]
     returned = internal * internal * beneath.reflected
     part = group.collected or plate.Collection()
     round_trip = below @ returned
     if part.reflections is None:
-        inside = jnp.linalg.solve(jnp.eye(4, dtype=r.dtype) - round_trip, down)
+        inside = xp.linalg.solve(xp.eye(4, dtype=r.dtype) - round_trip, down)
         further = round_trip @ inside
     else:
         # up to n reflections at the back face: n orders of the reflected light, n further ones of the passed
-        inside = jax.lax.fori_loop(0, part.reflections - 1, lambda _, x: down + round_trip @ x, down)
+        inside = fori_loop(0, part.reflections - 1, lambda _, x: down + round_trip @ x, down)
         further = round_trip @ inside
     share = 1.0 if part.share is None else part.share
     return _Lit(r + share * (up @ returned @ inside), internal * beneath.passed @ (down + share * further))

@@ -182,7 +182,8 @@ def mueller(jones: Any) -> Any:
     reflectances (or transmittances) of s and p.
     """
     rows = mueller_elements(*(jones[..., i, j] for i in range(2) for j in range(2)))
-    return jnp.stack([jnp.stack(jnp.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+    xp = namespace(rows)
+    return xp.stack([xp.stack(xp.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
 
 
 def mueller_elements(pp: Number, ps: Number, sp: Number, ss: Number) -> list[list[Any]]:

@@ -51,6 +51,22 @@ def fori_loop(lower: int, upper: int, step: Callable[[Any, Any], Any], state: An
     return state
 
 
+def cond(test: Any, yes: Callable[[Any], Any], no: Callable[[Any], Any], state: Any) -> Any:
+    """`jax.lax.cond`, or a branch of Python where the test is NumPy's."""
+    if namespace(test) is not np:
+        return jax.lax.cond(test, yes, no, state)
+    return (yes if test else no)(state)
+
+
+def map_rows(function: Callable[[Any], Any], rows: Any) -> Any:
+    """`jax.lax.map`, or a loop in Python over NumPy's rows; results are stacked."""
+    if namespace(rows) is not np:
+        return jax.lax.map(function, rows)
+    count = len(jax.tree_util.tree_leaves(rows)[0])
+    each = [function(jax.tree_util.tree_map(lambda x, i=i: x[i], rows)) for i in range(count)]
+    return jax.tree_util.tree_map(lambda *own: np.stack(own), *each)
+
+
 def scan(step: Callable[[Any, Any], Any], state: Any, rows: Any) -> tuple[Any, Any]:
     """`jax.lax.scan`, or a loop in Python over NumPy's rows, of a step without outputs of its own."""
     if namespace(state, rows) is not np:

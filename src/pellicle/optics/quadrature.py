@@ -195,8 +195,9 @@ def turned_response(response: Polarised, turn: Turn) -> Polarised:
 def turned_stokes(turn: Turn) -> Any:
     """Return the Mueller matrix (..., 4, 4) of Q."""
     c, s = turn
-    rows = [jnp.stack([c, -s], axis=-1), jnp.stack([s, c], axis=-1)]
-    return mueller(jnp.stack(rows, axis=-2))
+    xp = namespace(c, s)
+    rows = [xp.stack([c, -s], axis=-1), xp.stack([s, c], axis=-1)]
+    return mueller(xp.stack(rows, axis=-2))
 
 
 RINGS = (3, 4, 5, 6, 8, 10, 12, 16, 20, 24)

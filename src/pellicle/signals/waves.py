@@ -95,7 +95,8 @@ def normalised_elements(elements: Sequence[Any]) -> list[Any]:
 
 def all_elements(jones: Any) -> list[Any]:
     """The 16 elements of the Mueller matrix of a Jones matrix, row by row."""
-    return [jnp.atleast_1d(x) for row in mueller_elements(*jones) for x in row]
+    xp = namespace(jones)
+    return [xp.atleast_1d(x) for row in mueller_elements(*jones) for x in row]
 
 
 def angles(sphere: np.ndarray) -> np.ndarray:

@@ -14,6 +14,9 @@ from pellicle.scene.free import insert
 NM = np.linspace(420.0, 880.0, 40)
 FREE = pl.Free(200, 400)
 AT = np.array([310.0])
+TILTED = pl.Anisotropic(1.6, 1.7, axis=(40.0, 20.0))
+BIAXIAL = pl.Anisotropic(x=1.6, y=1.7, z=1.8 + 0.01j, axis=(40.0, 20.0, 10.0))
+DICHROIC = pl.Anisotropic(1.6, 1.7 + 0.3j, axis=(40.0, 20.0))
 PLATE = pl.Substrate("BK7", back="air")
 STACK = [pl.Layer("SiO2", FREE), *(pl.Layer(n, 60.0) for n in ("TiO2", "SiO2", "TiO2", "SiO2", "TiO2"))]
 
@@ -41,12 +44,28 @@ ELEMENTARY = {
     ),
     "axes along the faces": scene(pl.Layer(pl.Anisotropic(1.6, 1.7), FREE), PLATE, "R", 50.0, "p"),
     "total reflection": scene(pl.Layer(1.33, FREE), "Au", "R", 70.0, "s", ambient=1.5),
+    "tilted axis": scene(pl.Layer(TILTED, FREE), "Si", "R", 50.0),
+    "Mueller elements of a tilted axis": scene(pl.Layer(TILTED, FREE), "Si", "mueller", 50.0),
+    "psi and delta of three media": scene(
+        [pl.Layer(TILTED, FREE), pl.Layer(BIAXIAL, 70.0)], "Si", "psi-delta", 60.0
+    ),
+    "birefringent substrate": scene(pl.Layer("SiO2", FREE), pl.Substrate(TILTED), "R", 60.0, "p"),
+    "biaxial substrate": scene(pl.Layer("SiO2", FREE), pl.Substrate(BIAXIAL), "psi-delta", 60.0),
+    "dichroic": scene(pl.Layer(DICHROIC, pl.Free(200, 40000)), "Si", "R", 50.0, "s"),
+    "tilted axis on a plate": scene(pl.Layer(TILTED, FREE), PLATE, "mueller", 50.0),
+    "dichroic on a plate": scene(pl.Layer(DICHROIC, pl.Free(200, 40000)), PLATE, "T", 50.0, "p"),
+    "axes along the faces of a plate": scene(
+        pl.Layer(pl.Anisotropic(1.6 + 0.1j, 1.7), FREE), PLATE, "psi-delta", 50.0
+    ),
+    "cone through a tilted axis": scene(
+        pl.Layer(TILTED, FREE), "Si", "psi-delta", 58.0, instrument=pl.Instrument(angle_spread=2.0)
+    ),
+    "transmission of a tilted axis": scene(pl.Layer(TILTED, FREE), "BK7", "T", 30.0, "p"),
 }
 OTHERS = {
-    "tilted axis": scene(pl.Layer(pl.Anisotropic(1.6, 1.7, axis=(40.0, 20.0)), FREE), "Si", "R", 50.0),
     "gradient": scene(pl.Layer(pl.Graded(1.45, 1.9, pl.profile.Linear()), FREE), "Si"),
 }
-QUICK = ("R", "two layers, p", "psi and delta")
+QUICK = ("R", "two layers, p", "psi and delta", "tilted axis")
 
 
 def simulations(sample, monkeypatch):

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pellicle.optics.anisotropy import Tensor
 from pellicle.optics.berreman.matrices import Fields, Propagation, inverse, matrix, one_minus, stacked
 from pellicle.optics.hoisting import stored
-from pellicle.optics.pair import Number, Pair, to_complex
+from pellicle.optics.pair import Number, Pair, cond, fori_loop, namespace, stop_gradient, to_complex, where
 
 
 class Delta(NamedTuple):
@@ -73,7 +74,8 @@ def coefficients(epsilon: Tensor, a: Any) -> Any:
     """Return the coefficients of q³, q², q and 1 of det(Δ − q), an array (4, ...); that of q⁴ is 1."""
     A, B, C, D, m, n = map(to_complex, delta(epsilon, a))
     last = D * (A * B - m * m) + 2 * C * n * m - A * C * C - B * n * n
-    return jnp.stack(jnp.broadcast_arrays(-2 * m, m * m - A * B - D, 2 * (m * D - C * n), last))
+    xp = namespace(last)
+    return xp.stack(xp.broadcast_arrays(-2 * m, m * m - A * B - D, 2 * (m * D - C * n), last))
 
 
 def four_roots(epsilon: Tensor, a: Any) -> Any:
@@ -84,20 +86,21 @@ def four_roots(epsilon: Tensor, a: Any) -> Any:
     """
     eps = float(jnp.finfo(jnp.result_type(*jax.tree.leaves(epsilon))).eps)
     lossy = Tensor(*(to_complex(x) * (1 + 1j * eps**0.4) for x in epsilon))
-    c3, c2, c1, c0 = c = jax.lax.stop_gradient(coefficients(lossy, a))
-    size = 1 + jnp.max(jnp.abs(c), axis=0) ** 0.5
-    start = jnp.stack([size * jnp.exp(1j * (0.4 + 0.5 * jnp.pi * j)) for j in range(4)])
+    c3, c2, c1, c0 = c = stop_gradient(coefficients(lossy, a))
+    xp = namespace(c)
+    size = 1 + abs(c).max(axis=0) ** 0.5
+    start = xp.stack([size * np.exp(1j * (0.4 + 0.5 * np.pi * j)) for j in range(4)])
 
     def improve(_: Any, x: Any) -> Any:
         value = (((x + c3) * x + c2) * x + c1) * x + c0
         slope = ((4 * x + 3 * c3) * x + 2 * c2) * x + c1
         gap = x[:, None] - x[None]
-        repulsion = jnp.sum(jnp.where(gap == 0, 0, 1 / jnp.where(gap == 0, 1, gap)), axis=1)
+        repulsion = where(gap == 0, 0, 1 / where(gap == 0, 1, gap)).sum(axis=1)
         divisor = slope - value * repulsion
-        return x - jnp.where(divisor == 0, 0, value / jnp.where(divisor == 0, 1, divisor))
+        return x - where(divisor == 0, 0, value / where(divisor == 0, 1, divisor))
 
-    roots = jax.lax.fori_loop(0, STEPS, improve, start.astype(c.dtype))
-    return jnp.take_along_axis(roots, jnp.argsort(-roots.imag, axis=0), axis=0)
+    roots = fori_loop(0, STEPS, improve, start.astype(c.dtype))
+    return xp.take_along_axis(roots, xp.argsort(-roots.imag, axis=0), axis=0)
 
 
 def downward_pair(epsilon: Tensor, a: Any) -> tuple[Any, Any]:
@@ -116,14 +119,14 @@ def downward_pair(epsilon: Tensor, a: Any) -> tuple[Any, Any]:
         first, second = S * P_up + S_up * P + c1, P * P_up - c0
         turn = 2 * S + c3  # ∂P_up/∂S = S − S_up
         a11, a12, a21, a22 = P_up - P + S * turn, S_up - S, P * turn, P_up - P
-        a11, a12, a21, a22 = map(jax.lax.stop_gradient, (a11, a12, a21, a22))
+        a11, a12, a21, a22 = map(stop_gradient, (a11, a12, a21, a22))
         determinant = a11 * a22 - a12 * a21
-        scale = jnp.where(determinant == 0, 0, 1 / jnp.where(determinant == 0, 1, determinant))
+        scale = where(determinant == 0, 0, 1 / where(determinant == 0, 1, determinant))
         return S - (a22 * first - a12 * second) * scale, P - (a11 * second - a21 * first) * scale
 
     S, P = roots[0] + roots[1], roots[0] * roots[1]
     for _ in range(4):
-        S, P = jax.lax.stop_gradient(step(S, P, c3, c2, c1, c0))
+        S, P = map(stop_gradient, step(S, P, c3, c2, c1, c0))
     return step(S, P, c3, c2, c1, c0)
 
 
@@ -134,7 +137,7 @@ FEW, MOST = 7, 28
 def dichroism(medium: Tensor, a: Any) -> Any:
     """Return by how much the extinctions Im q of the two waves differ, the larger of both directions."""
     q = four_roots(medium, a).imag
-    return jnp.maximum(q[0] - q[1], q[2] - q[3])
+    return namespace(q).maximum(q[0] - q[1], q[2] - q[3])
 
 
 def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propagation:
@@ -142,25 +145,26 @@ def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propaga
     A, B, C, D, m, n = map(to_complex, delta(medium, a))
     roots = four_roots(medium, a)
     m, n = m * direction, n * direction
-    extinction = jnp.where(direction > 0, jnp.max(roots.imag, axis=0), -jnp.min(roots.imag, axis=0))
-    zero, one = jnp.zeros_like(A), jnp.ones_like(A)
+    xp = namespace(roots)
+    extinction = xp.where(direction > 0, roots.imag.max(axis=0), -roots.imag.min(axis=0))
+    zero, one = xp.zeros_like(A), xp.ones_like(A)
     rows = ((m, A, n, zero), (B, m, C, zero), (zero, zero, zero, one), (C, n, D, zero))
-    elements = jnp.broadcast_arrays(*(x for row in rows for x in row), k, extinction)[:16]
-    matrix = jnp.stack(elements).reshape(4, 4, *elements[0].shape)
+    elements = xp.broadcast_arrays(*(x for row in rows for x in row), k, extinction)[:16]
+    matrix = xp.stack(elements).reshape(4, 4, *elements[0].shape)
     # H in units of n E, so that rows and columns have similar sizes
-    size = jax.lax.stop_gradient(jnp.abs(matrix))
-    index = jnp.sqrt(jnp.maximum(jnp.max(size, axis=(0, 1)), 1.0))
+    size = stop_gradient(abs(matrix))
+    index = xp.sqrt(xp.maximum(size.max(axis=(0, 1)), 1.0))
     sides = (1.0, index, 1.0, index)
-    balance = jnp.stack([jnp.stack([sides[j] / sides[i] + 0 * index for j in range(4)]) for i in range(4)])
-    identity = jnp.eye(4, dtype=index.dtype).reshape(4, 4, *[1] * index.ndim)
-    growth = jax.lax.stop_gradient(extinction * k) + 0 * index
+    balance = xp.stack([xp.stack([sides[j] / sides[i] + 0 * index for j in range(4)]) for i in range(4)])
+    identity = xp.eye(4, dtype=index.dtype).reshape(4, 4, *[1] * index.ndim)
+    growth = stop_gradient(extinction * k) + 0 * index
     exponent = -1j * k * matrix * balance - growth * identity
-    norm = jnp.max(jnp.sum(jnp.abs(jax.lax.stop_gradient(exponent)), axis=1), axis=0)
-    count = jnp.ceil(jnp.log2(jnp.maximum(2 * norm, 1.0)))
-    small = exponent * jnp.exp2(-count)
+    norm = abs(stop_gradient(exponent)).sum(axis=1).max(axis=0)
+    count = xp.ceil(xp.log2(xp.maximum(2 * norm, 1.0)))
+    small = exponent * xp.exp2(-count)
 
     def product(one: Any, other: Any) -> Any:
-        return jnp.sum(one[:, :, None] * other[None], axis=1)
+        return (one[:, :, None] * other[None]).sum(axis=1)
 
     # Horner's rule, in a loop: unrolled, it takes a minute to compile with its derivatives
     terms = 14 if jnp.finfo(growth.dtype).bits == 64 else 8
@@ -168,20 +172,20 @@ def propagation(medium: Tensor, a: Any, k: Any, direction: Any = 1.0) -> Propaga
     def add_term(i: Any, rest: Any) -> Any:
         return (small + product(small, rest)) / (terms - i)
 
-    rest = jax.lax.fori_loop(0, terms, add_term, jnp.zeros_like(small))
+    rest = fori_loop(0, terms, add_term, xp.zeros_like(small))
 
     def square(i: Any, rest: Any) -> Any:
-        return jnp.where(i < count, 2 * rest + product(rest, rest), rest)
+        return where(i < count, 2 * rest + product(rest, rest), rest)
 
-    rest = jax.lax.fori_loop(0, FEW, square, rest)
-    more = lambda rest: jax.lax.fori_loop(FEW, MOST, square, rest)  # noqa: E731
-    rest = jax.lax.cond(jnp.any(count > FEW), more, lambda rest: rest, rest)
+    rest = fori_loop(0, FEW, square, rest)
+    more = lambda rest: fori_loop(FEW, MOST, square, rest)  # noqa: E731
+    rest = cond(xp.any(count > FEW), more, lambda rest: rest, rest)
     whole = (rest + identity) / balance
 
     def apply(fields: Fields) -> Fields:
         vector = [to_complex(x) for x in fields]
         results = [sum(whole[i, j] * vector[j] for j in range(4)) for i in range(4)]
-        Ex, Hy, Ey, Hx = (Pair(jnp.real(x), jnp.imag(x)) for x in results)
+        Ex, Hy, Ey, Hx = (Pair(x.real, x.imag) for x in results)
         return Ex, Hy, Ey, Hx
 
     return Propagation(apply, growth)

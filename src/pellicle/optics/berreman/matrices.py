@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from pellicle.optics.characteristic import (
     Characteristic,
@@ -21,7 +22,7 @@ from pellicle.optics.characteristic import (
     scale_exponent,
 )
 from pellicle.optics.hoisting import stored
-from pellicle.optics.pair import Number, Pair, imag, is_real, real
+from pellicle.optics.pair import Number, Pair, custom_jvp, imag, is_real, namespace, real
 from pellicle.optics.special import sincos
 
 
@@ -42,9 +43,10 @@ def stacked(*numbers: Number, like: Any = 0.0) -> Number:
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(numbers)))
     rank = max(map(jnp.ndim, jax.tree.leaves(like)))
     whole = len(numbers), *[1] * (rank - len(shape)), *shape
+    xp = namespace(numbers, like)
 
     def joined(part: Callable[[Number], Any]) -> Any:
-        return jnp.stack([jnp.broadcast_to(part(x), shape) for x in numbers]).reshape(whole)
+        return xp.stack([xp.broadcast_to(part(x), shape) for x in numbers]).reshape(whole)
 
     return joined(real) if is_real(numbers) else Pair(joined(real), joined(imag))
 
@@ -52,10 +54,10 @@ def stacked(*numbers: Number, like: Any = 0.0) -> Number:
 def unstacked(number: Number, count: int) -> list[Number]:
     """Return the numbers along the first axis."""
 
-    def at(i: int) -> Number:
-        return jax.tree.map(lambda x: jax.lax.index_in_dim(x, i, keepdims=False), number)
+    def row(x: Any, i: int) -> Any:
+        return x[i] if namespace(x) is np else jax.lax.index_in_dim(x, i, keepdims=False)
 
-    return [at(i) for i in range(count)]
+    return [jax.tree.map(lambda x, i=i: row(x, i), number) for i in range(count)]
 
 
 def matrix(*elements: Number, like: Any = 0.0) -> Number:
@@ -87,7 +89,7 @@ def inverse(matrix: Number) -> Number:
     pp, ps, sp, ss = elements(matrix)
     determinant = stored(1 / (pp * ss - ps * sp))
     signs = _constant(((1, -1), (-1, 1)), matrix)
-    return jax.tree.map(lambda x: jnp.swapaxes(x[::-1, ::-1], 0, 1) * signs, matrix) * determinant
+    return jax.tree.map(lambda x: x[::-1, ::-1].swapaxes(0, 1) * signs, matrix) * determinant
 
 
 def one_minus(matrix: Number) -> Number:
@@ -102,7 +104,7 @@ def one_plus(matrix: Number) -> Number:
 
 def _constant(rows: tuple[tuple[int, int], ...], matrix: Number) -> Any:
     like = real(matrix)
-    return jnp.array(rows, like.dtype).reshape(2, 2, *[1] * (like.ndim - 2))
+    return namespace(like).array(rows, like.dtype).reshape(2, 2, *[1] * (like.ndim - 2))
 
 
 Fields = tuple[Number, Number, Number, Number]
@@ -118,17 +120,18 @@ class Propagation(NamedTuple):
 
 def full(number: Number) -> Pair:
     """Return a number as a `Pair` of two arrays, which promises nothing."""
-    return Pair(jnp.asarray(real(number)) * 1.0, imag(number) + 0.0 * real(number))
+    return Pair(namespace(number).asarray(real(number)) * 1.0, imag(number) + 0.0 * real(number))
 
 
 def exp(z: Number) -> Number:
     """Return the exponential of a real array or a `Pair`."""
+    xp = namespace(z)
     if not isinstance(z, Pair):
-        return jnp.exp(real(z))
+        return xp.exp(real(z))
     sine, cosine = sincos(z.im)
     if z.re is None:
         return Pair(cosine, sine)
-    size = jnp.exp(z.re)
+    size = xp.exp(z.re)
     return Pair(size * cosine, size * sine)
 
 
@@ -140,7 +143,7 @@ def elements_and_exponents(squares: Sequence[Number], k: Any) -> Iterator[tuple[
     return zip(*(unstacked(x, len(squares)) for x in (scaled.c, scaled.f, exponent)), strict=True)
 
 
-@jax.custom_jvp
+@custom_jvp
 def _stored_elements(Q: Number, k: Any) -> Characteristic:
     return stored(matrix_elements(Q, k))
 
@@ -151,10 +154,11 @@ def _stored_element_slopes(primal: Any, tangent: Any) -> tuple[Characteristic, C
     return values, stored(slopes)
 
 
-@jax.custom_jvp
+@custom_jvp
 def _real_exponent(Q: Any, k: Any) -> Any:
     """Return x for a real Q: 0 where the wave propagates, −k√−Q where it is evanescent."""
-    return jnp.where(Q < 0, -k * jnp.sqrt(jnp.abs(Q)), 0.0)
+    xp = namespace(Q, k)
+    return xp.where(Q < 0, -k * xp.sqrt(xp.abs(Q)), 0.0)
 
 
 @_real_exponent.defjvp

@@ -9,7 +9,6 @@ Matrices are complex arrays here, which compile to less code than pairs of real 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from pellicle.optics.berreman.matrices import (
@@ -19,7 +18,7 @@ from pellicle.optics.berreman.matrices import (
     product,
 )
 from pellicle.optics.hoisting import stored
-from pellicle.optics.pair import Number, to_complex, to_pair, where
+from pellicle.optics.pair import Number, cond, fori_loop, namespace, to_complex, to_pair, where
 
 DIRECT = 3.0
 """Largest difference of the attenuations, as exponents of amplitudes, that takes no slices: it costs e³."""
@@ -57,11 +56,12 @@ def transfer(propagation: Propagation, direction: Any) -> Any:
     `propagation` upwards in its first row and, with the opposite transverse index, in its second;
     `direction` is 1 and −1 in these. Reversed, Hy and −Hx change their signs.
     """
-    unit = jnp.array([[1.0, 0, 1, 0], [0, 1, 0, 1], [1, 0, -1, 0], [0, 1, 0, -1]], direction.dtype)
+    xp = namespace(direction)
+    unit = xp.array([[1.0, 0, 1, 0], [0, 1, 0, 1], [1, 0, -1, 0], [0, 1, 0, -1]], direction.dtype)
     Ex, Ey, Hy, Hx = unit.reshape(4, 4, *[1] * direction.ndim)  # each wave's, (4, 1, ...)
     Ex, Hy, Ey, Hx = map(to_complex, stored(propagation.apply((Ex, Hy * direction, Ey, Hx * direction))))
     Hy, Hx = direction * Hy, direction * Hx
-    return stored(0.5 * jnp.stack(jnp.broadcast_arrays(Ex + Hy, Ey + Hx, Ex - Hy, Ey - Hx)))
+    return stored(0.5 * xp.stack(xp.broadcast_arrays(Ex + Hy, Ey + Hx, Ex - Hy, Ey - Hx)))
 
 
 def scattering(transfer: Any, loss: Any) -> Scattering:
@@ -78,8 +78,9 @@ def scattering(transfer: Any, loss: Any) -> Scattering:
 
 def slice_count(exponent: Any, shape: Any) -> Any:
     """Return m of 2ᵐ slices, 0 where none are needed, for the difference of the attenuations."""
-    needed = jnp.broadcast_to(exponent > DIRECT, shape)
-    return jnp.ceil(jnp.log2(jnp.where(needed, exponent / DIRECT, 1.0)))
+    xp = namespace(exponent)
+    needed = xp.broadcast_to(exponent > DIRECT, shape)
+    return xp.ceil(xp.log2(xp.where(needed, exponent / DIRECT, 1.0)))
 
 
 def doubled(one: Scattering, count: Any) -> Scattering:
@@ -87,9 +88,9 @@ def doubled(one: Scattering, count: Any) -> Scattering:
 
     def double(i: Any, s: Scattering) -> Scattering:
         new = join(s, s)
-        return Scattering(*(jnp.where(i < count, x, y) for x, y in zip(new, s, strict=True)))
+        return Scattering(*(where(i < count, x, y) for x, y in zip(new, s, strict=True)))
 
-    return jax.lax.fori_loop(0, DOUBLINGS, double, one)
+    return fori_loop(0, DOUBLINGS, double, one)
 
 
 def sliced(
@@ -102,15 +103,16 @@ def sliced(
     """
     lower = to_complex(below)
     shape = jnp.broadcast_shapes(jnp.shape(k), jnp.shape(exponent), lower.shape[2:])
-    lower = jnp.broadcast_to(lower, (2, 2, *shape))
+    xp = namespace(k, exponent, lower)
+    lower = xp.broadcast_to(lower, (2, 2, *shape))
     count = slice_count(exponent, shape)
     needed = count > 0
     # the whole layer, where it needs no slices
-    depth = k * jnp.exp2(-count)
-    direction = jnp.array([1.0, -1.0], depth.dtype).reshape(2, *[1] * len(shape))
+    depth = k * xp.exp2(-count)
+    direction = xp.array([1.0, -1.0], depth.dtype).reshape(2, *[1] * len(shape))
     propagation = layer(depth, direction)
     matrix = transfer(propagation, direction)
-    loss = jnp.broadcast_to(jnp.exp(-propagation.growth), (2, *shape))
+    loss = xp.broadcast_to(xp.exp(-propagation.growth), (2, *shape))
     upwards = matrix[:, :, 0]
     through = inverse(upwards[:2, :2] + product(upwards[:2, 2:], lower))
     direct = product(upwards[2:, :2] + product(upwards[2:, 2:], lower), through), through * loss[0]
@@ -121,5 +123,5 @@ def sliced(
         reflected = whole.reflected + product(product(whole.up, lower), inside)
         return where(needed, reflected, state[0]), where(needed, inside, state[1])
 
-    reached = jax.lax.cond(jnp.any(needed), by_slices, lambda state: state, stored(direct))
+    reached = cond(xp.any(needed), by_slices, lambda state: state, stored(direct))
     return to_pair(reached[0]), to_pair(reached[1])

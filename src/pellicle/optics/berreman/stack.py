@@ -51,7 +51,17 @@ from pellicle.optics.berreman.slices import (
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import Inside, normal_square, transverse
-from pellicle.optics.pair import Number, conj, real, times_i, to_complex, to_pair
+from pellicle.optics.pair import (
+    Number,
+    cond,
+    conj,
+    namespace,
+    real,
+    stop_gradient,
+    times_i,
+    to_complex,
+    to_pair,
+)
 
 
 class Polarised(NamedTuple):
@@ -82,7 +92,7 @@ def polarised(
     - `dichroic`: False promises that the attenuations of the two waves in a layer, as exponents of
       amplitudes, differ by less than `slices.DIRECT`.
     """
-    a, q0 = transverse(ambient, angle if isinstance(angle, Inside) else jnp.asarray(angle) * 1.0)
+    a, q0 = transverse(ambient, angle if isinstance(angle, Inside) else namespace(angle).asarray(angle) * 1.0)
     a, q0, layers, substrate, phases = stored((a, q0, layers, substrate, phases))
     every = q0, layers, substrate, phases
     bottom = stored(_substrate(substrate, a, every))
@@ -119,7 +129,7 @@ def most_dichroic(ambient: Any, layers: Sequence[Medium], phases: Sequence[Any],
 
     As exponents of amplitudes. Above `slices.DIRECT` the layer is cut into slices.
     """
-    a, _ = transverse(ambient, jnp.asarray(angle) * 1.0)
+    a, _ = transverse(ambient, namespace(angle).asarray(angle) * 1.0)
     exponents = [
         jnp.max(_method(medium).dichroism(medium, a) * k)
         for medium, k in zip(layers, phases, strict=True)
@@ -159,7 +169,8 @@ def _propagation(medium: Index, a: Any, k: Any) -> Propagation:
     Q_p, Q_s, epsilon = _squares(medium, a)
     squares = (Q_p, Q_s) if isinstance(medium, Principal) else (Q_p,)
     waves = list(elements_and_exponents(squares, k))
-    growth = jax.lax.stop_gradient(reduce(jnp.maximum, (-real(exponent) for *_, exponent in waves)))
+    growths = [-real(exponent) for *_, exponent in waves]
+    growth = stop_gradient(reduce(namespace(growths).maximum, growths))
     factors = [exp(-exponent - growth) for *_, exponent in waves]
     scaled = [(c * factor, times_i(-f) * factor) for (c, f, _), factor in zip(waves, factors, strict=True)]
     (c, f), (c_s, f_s) = scaled[0], scaled[-1]
@@ -208,7 +219,7 @@ def _add(medium: Medium, a: Any, k: Any, below: _Fields, dichroic: bool) -> _Fie
     if not dichroic:
         return _direct(method.propagation(medium, a, k), below)
     assert below.reflection is not None
-    exponent = method.dichroism(medium, a) * jax.lax.stop_gradient(k)
+    exponent = method.dichroism(medium, a) * stop_gradient(k)
     reflection, through = sliced(partial(method.propagation, medium, a), k, exponent, below.reflection)
     return _of_reflection(*stored((reflection, _behind(below.down, through))))
 
@@ -216,7 +227,7 @@ def _add(medium: Medium, a: Any, k: Any, below: _Fields, dichroic: bool) -> _Fie
 def _direct(layer: Propagation, below: _Fields) -> _Fields:
     (Ex, Ey), (Hy, Hx) = unstacked(below.E, 2), unstacked(below.H, 2)
     Ex, Hy, Ey, Hx = layer.apply(stored((Ex, Hy, Ey, Hx)))
-    loss = jnp.exp(-layer.growth)
+    loss = namespace(layer.growth).exp(-layer.growth)
     down = loss if below.down is None else below.down * loss
     E, H, down = stored((stacked(Ex, Ey), stacked(Hy, Hx), down))
     return _Fields(E, H, down, None)
@@ -239,7 +250,9 @@ def two_sided(
     from above `reflected` and `down`, from below `below` and `up`. The field of a p wave along x is p cos θ
     where it travels down and −p cos θ where it travels up.
     """
-    a, q_above = transverse(above, angle if isinstance(angle, Inside) else jnp.asarray(angle) * 1.0)
+    a, q_above = transverse(
+        above, angle if isinstance(angle, Inside) else namespace(angle).asarray(angle) * 1.0
+    )
     _, q_below = transverse(below, Inside(a))
     every = a, q_above, q_below, above, below, list(layers), list(phases)
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in jax.tree.leaves(every)))
@@ -249,7 +262,7 @@ def two_sided(
     # from free space into the half space below: an upper face from its other side, where p waves change the
     # sign of Ex
     reflected, down, up, below_ = _upper_face(below, q_below, shape)
-    signs = jnp.array([-1.0, 1.0], jnp.real(up).dtype).reshape(2, 1, *[1] * len(shape))
+    signs = namespace(up).array([-1.0, 1.0], real(up).dtype).reshape(2, 1, *[1] * len(shape))
     face = Scattering(reflected=below_, down=up * signs, up=down * signs, below=reflected)
     return stored(join(whole, face))
 
@@ -257,20 +270,21 @@ def two_sided(
 def _layer(medium: Medium, a: Any, k: Any, shape: tuple[int, ...], dichroic: bool) -> Scattering:
     method = _method(medium)
     mixes = isinstance(medium, Uniaxial | Tensor)
-    k = jnp.broadcast_to(k, shape)
+    xp = namespace(k, a)
+    k = xp.broadcast_to(k, shape)
     count = None
     if dichroic and mixes:
-        count = slice_count(method.dichroism(medium, a) * jax.lax.stop_gradient(k), shape)
-        k = k * jnp.exp2(-count)
-    direction = jnp.array([1.0, -1.0], k.dtype).reshape(2, *[1] * len(shape))
+        count = slice_count(method.dichroism(medium, a) * stop_gradient(k), shape)
+        k = k * xp.exp2(-count)
+    direction = xp.array([1.0, -1.0], k.dtype).reshape(2, *[1] * len(shape))
     # waves along the axes of the laboratory are alike in both directions
     propagation = method.propagation(medium, a, k, direction) if mixes else _propagation(medium, a, k)
-    loss = jnp.broadcast_to(jnp.exp(-propagation.growth), (2, *shape))
+    loss = xp.broadcast_to(xp.exp(-propagation.growth), (2, *shape))
     waves = transfer(propagation, direction)
-    one = scattering(jnp.broadcast_to(waves, (4, 4, 2, *shape)), loss)
+    one = scattering(xp.broadcast_to(waves, (4, 4, 2, *shape)), loss)
     if count is None:
         return one
-    return jax.lax.cond(jnp.any(count > 0), lambda s: doubled(s, count), lambda s: s, stored(one))
+    return cond(xp.any(count > 0), lambda s: doubled(s, count), lambda s: s, stored(one))
 
 
 def _upper_face(index: Number, q: Number, shape: tuple[int, ...]) -> Scattering:
@@ -288,6 +302,7 @@ def _upper_face(index: Number, q: Number, shape: tuple[int, ...]) -> Scattering:
 
 
 def _diagonal(p: Any, s: Any, shape: tuple[int, ...]) -> Any:
-    p, s = jnp.broadcast_to(p, shape), jnp.broadcast_to(s, shape)
-    zero = jnp.zeros_like(p)
-    return jnp.stack([p, zero, zero, s]).reshape(2, 2, *shape)
+    xp = namespace(p, s)
+    p, s = xp.broadcast_to(p, shape), xp.broadcast_to(s, shape)
+    zero = xp.zeros_like(p)
+    return xp.stack([p, zero, zero, s]).reshape(2, 2, *shape)

@@ -13,7 +13,6 @@ wave runs along the axis, the elimination that gives X is singular; differences 
 
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from pellicle.optics.anisotropy import Uniaxial, birefringence
@@ -29,7 +28,18 @@ from pellicle.optics.berreman.matrices import (
 from pellicle.optics.characteristic import nonzero_root
 from pellicle.optics.hoisting import stored
 from pellicle.optics.interface import normal_square
-from pellicle.optics.pair import Number, Pair, abs2, imag, real, times_i, where
+from pellicle.optics.pair import (
+    Number,
+    Pair,
+    abs2,
+    cond,
+    imag,
+    namespace,
+    real,
+    stop_gradient,
+    times_i,
+    where,
+)
 
 ALONG_AXIS = 0.03
 """Relative size of the determinant below which differences of exponentials replace the elimination."""
@@ -78,7 +88,7 @@ def dichroism(medium: Uniaxial, a: Any) -> Any:
     """
     t = terms(medium, a)
     q, w, drift = imag(nonzero_root(full(t.Q))), imag(nonzero_root(full(t.W))), imag(t.mu)
-    return jax.lax.stop_gradient(jnp.abs(w - q) + jnp.abs(drift))
+    return stop_gradient(abs(w - q) + abs(drift))
 
 
 def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propagation:
@@ -91,26 +101,27 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
     x, y, _ = medium.axis
     (c, f, exponent), (c_e, f_e, exponent_e) = elements_and_exponents((t.Q, t.W), k)
     drift = times_i(k * t.mu)
-    growth = jax.lax.stop_gradient(jnp.maximum(-real(exponent), -real(exponent_e) - real(drift)))
+    xp = namespace(exponent, drift)
+    growth = stop_gradient(xp.maximum(-real(exponent), -real(exponent_e) - real(drift)))
     factor, factor_e = stored((exp(-exponent - growth), exp(-exponent_e - drift - growth)))
     c, f, c_e, f_e = stored((c * factor, f * factor, c_e * factor_e, f_e * factor_e))
 
     # γX and γX′ from two linear equations; they do not divide by γ
     sines, cosines = f - f_e, c - c_e - times_i(t.mu) * f_e
     determinant = t.zeta * t.zeta - t.eta * t.eta * t.Q
-    size = abs2(t.zeta) + abs2(t.eta) * jnp.sqrt(abs2(t.Q) + jnp.finfo(growth.dtype).tiny)
-    near = jax.lax.stop_gradient(abs2(determinant) <= (ALONG_AXIS * size) ** 2)
+    size = abs2(t.zeta) + abs2(t.eta) * xp.sqrt(abs2(t.Q) + jnp.finfo(growth.dtype).tiny)
+    near = stop_gradient(abs2(determinant) <= (ALONG_AXIS * size) ** 2)
     inverse = stored(1 / where(near, 1.0 + 0.0 * determinant, determinant))
     X = (t.zeta * sines - times_i(t.eta) * cosines) * inverse
     Y = (t.zeta * cosines + times_i(t.eta) * t.Q * sines) * inverse
     shape = jnp.broadcast_shapes(jnp.shape(near), jnp.shape(real(X)))
-    X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), jnp.broadcast_to(near, shape)
+    X, Y, near = _broadcast(X, shape), _broadcast(Y, shape), xp.broadcast_to(near, shape)
 
     def by_differences(_: Any) -> tuple[Number, Number]:
         new_X, new_Y = (_broadcast(new, shape) for new in _differences(t, k, growth))
         return where(near, new_X, X), where(near, new_Y, Y)
 
-    X, Y = jax.lax.cond(jnp.any(near), by_differences, lambda _: (X, Y), None)
+    X, Y = cond(xp.any(near), by_differences, lambda _: (X, Y), None)
     X, Y, V = stored((X, Y, t.gamma * f_e - t.Q * X))
 
     isotropic = times_i(-f)
@@ -133,7 +144,8 @@ def propagation(medium: Uniaxial, a: Any, k: Any, direction: Any = 1.0) -> Propa
 
 
 def _broadcast(number: Number, shape: Any) -> Pair:
-    return Pair(jnp.broadcast_to(real(number), shape), jnp.broadcast_to(imag(number), shape))
+    xp = namespace(number)
+    return Pair(xp.broadcast_to(real(number), shape), xp.broadcast_to(imag(number), shape))
 
 
 def _differences(t: Terms, k: Any, growth: Any) -> tuple[Number, Number]:
@@ -151,7 +163,7 @@ def _exponential_difference(one: Number, other: Number, k: Any, growth: Any) -> 
     """Return (e^{−ik·one} − e^{−ik·other})/(i (other − one)) times exp(−growth)."""
     difference = other - one
     half = 0.5 * k * difference
-    near = jax.lax.stop_gradient(abs2(half) < 1.0)
+    near = stop_gradient(abs2(half) < 1.0)
     small, far = where(near, half, 0.0 * half), where(near, 1.0 + 0.0 * difference, difference)
     square, series = stored(small * small), Pair(1.0, 0.0)
     for n in range(9, 0, -1):
