@@ -9,7 +9,7 @@ import numpy as np
 
 from pellicle.fitting.coordinates import Box
 from pellicle.fitting.levenberg_marquardt import Evaluated, normal_equations
-from pellicle.fitting.problem import Blocked, Explained, Form, Member, Problem, Static
+from pellicle.fitting.problem import Blocked, Elementary, Explained, Form, Member, Problem, Static
 from pellicle.fitting.progress import Progress, quiet
 from pellicle.programs.cache import kept
 
@@ -23,7 +23,12 @@ class Deviances(NamedTuple):
     value: Any
 
 
-@kept
+def _deviances_by_numpy(form: Form, arrays: Any, values: np.ndarray) -> Deviances | None:
+    found = form.deviances(arrays, values) if isinstance(form, Elementary) else None
+    return None if found is None else Deviances(found)
+
+
+@partial(kept, at_first=_deviances_by_numpy)
 def deviances(form: Form, arrays: Any, values: Any) -> Deviances:
     """Deviance of one view at candidates `values` (candidates, its parameters)."""
     return Deviances(jax.vmap(lambda each: form.explain(arrays, each).deviance)(values))

@@ -75,6 +75,15 @@ class Blocked(Hashable, Protocol):
 
 
 @runtime_checkable
+class Elementary(Hashable, Protocol):
+    """A form whose deviances NumPy computes, where its plan allows it: nothing is then compiled."""
+
+    def deviances(self, arrays: Any, values: np.ndarray, /) -> np.ndarray | None:
+        """Deviances of candidates `values` (candidates, its parameters); None where NumPy cannot."""
+        ...
+
+
+@runtime_checkable
 class Nuisance(Protocol):
     """A linear coefficient that is solved in each evaluation, such as a scale or an offset."""
 

@@ -26,7 +26,6 @@ from pellicle.fitting.film.colour_view import ColourForm, ColoursView
 from pellicle.fitting.film.indices import free_media
 from pellicle.fitting.film.parameters import anonymous
 from pellicle.fitting.film.view import SpectrumForm, SpectrumView
-from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.film_signal import depolarises
 from pellicle.forward_model.plan import Plan, Row
 from pellicle.optics.coherent import FEW
@@ -65,11 +64,9 @@ def _simulated(form: SpectrumForm | ColourForm, scene: Scene, data: Any, values:
 
 def _by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulated | None:
     """Signals as of `_simulated`, by NumPy; None for a plan that it does not evaluate."""
-    if not (isinstance(form, SpectrumForm) and is_elementary(form.plan)):
-        return None
     rows, each = np.unique(values, axis=0, return_inverse=True)  # without those that are padding
-    signals = [form.compared(signal, scene, data) for signal in by_numpy(form.plan, scene, rows)]
-    return Simulated(np.stack(signals)[each.ravel()])
+    signals = form.signals(scene, data, rows) if isinstance(form, SpectrumForm) else None
+    return None if signals is None else Simulated(signals[each.ravel()])
 
 
 simulated = kept(_simulated, at_first=_by_numpy)

@@ -18,6 +18,7 @@ from jaxtyping import ScalarLike
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.normal_equations import times
 from pellicle.fitting.positive_definite import nonnegative
+from pellicle.optics.pair import namespace
 from pellicle.scene.free import remembered
 from pellicle.scene.instrument import Drift, Instrument
 
@@ -79,19 +80,23 @@ def chebyshev(position, degree: int) -> list:
 
 
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
-    """The best scale and offset for a simulated signal, and the deviance."""
-    weight = data.weight * jnp.sqrt(data.independent_fraction)
+    """The best scale and offset for a simulated signal, and the deviance.
+
+    Signals of NumPy may have leading axes (...) where scale and offset are known.
+    """
+    xp = namespace(signal)
+    weight = data.weight * xp.sqrt(data.independent_fraction)
     gains, shifts = (
         _series(instrument.scale, scale_prior, data),
         _series(instrument.offset, offset_prior, data),
     )
     first = len(gains.mean)
-    known = gains.known * signal + shifts.known * jnp.ones_like(signal)
+    one = xp.ones_like(signal)
+    known = gains.known * signal + shifts.known * one
     rest = data.values - known
     if not first and not len(shifts.mean):
         residual = weight * rest
-        one = jnp.ones_like(signal)
-        return Solved(known, residual, gains.known * one, shifts.known * one, jnp.sum(residual**2))
+        return Solved(known, residual, gains.known * one, shifts.known * one, (residual**2).sum(axis=-1))
     # sums over the points are products with terms and pairs of them that all candidates share
     square = weight * weight
     on_signal = square * signal
@@ -137,7 +142,7 @@ def _series(
 ) -> _Series:
     """A nuisance as Chebyshev terms, or as a known number without terms."""
     if not isinstance(number, Drift):
-        return _Series(jnp.zeros((0, len(data.position))), np.zeros(0), np.zeros(0), number)
+        return _Series(np.zeros((0, np.shape(data.position)[-1])), np.zeros(0), np.zeros(0), number)
     return _Series(jnp.stack(chebyshev(data.position, number.degree)), *prior(number), 0.0)
 
 

@@ -19,12 +19,14 @@ from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import linearised
+from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.film_signal import build, depolarises
 from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
+from pellicle.scene.instrument import Drift
 from pellicle.signals.base import Signal
 
 
@@ -46,6 +48,21 @@ class SpectrumForm:
         """The measured channels (points · channels,) of a signal of the plan."""
         rows = signal.reshape(scene.light.wavelength.size, -1)
         return self.signal.compared(rows, data.frame, depolarises(self.plan))
+
+    def signals(self, scene: Scene, data: Data, values: np.ndarray) -> np.ndarray | None:
+        """The measured channels (candidates, points · channels) of candidates `values` (candidates, free
+        numbers) by NumPy; None for a plan that it does not evaluate."""
+        if not is_elementary(self.plan):
+            return None
+        return np.stack([self.compared(each, scene, data) for each in by_numpy(self.plan, scene, values)])
+
+    def deviances(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> np.ndarray | None:
+        """Deviances of candidates by NumPy; None for such a plan, and where scale or offset are free."""
+        scene, data = arrays
+        if isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift):
+            return None
+        signals = self.signals(scene, data, values)
+        return None if signals is None else nuisance.solve(signals, data, scene.instrument).deviance
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
         """Return the form with another plan."""
