@@ -387,7 +387,7 @@ def test_toml_parses_and_complete_recipes_are_valid(page):
 
 def test_every_flag_on_a_page_exists(monkeypatch, capsys):
     names = "fit sample identify simulate plan plan-measurement compare cost chart explore export map series"
-    names += " watch materials read doctor"
+    names += " watch materials read doctor warm"
     helps = []
     for command in ("", *names.split()):
         monkeypatch.setattr(sys, "argv", ["pellicle", *command.split(), "--help"])

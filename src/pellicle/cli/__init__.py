@@ -23,6 +23,7 @@ from pellicle.cli.read import materials, read
 from pellicle.cli.series import series
 from pellicle.cli.session import BAD_DATA, INTERRUPTED, WRONG_USAGE, interruptible
 from pellicle.cli.simulate import demo, simulate
+from pellicle.cli.warm import warm
 from pellicle.cli.watch import watch
 from pellicle.errors import UsageError
 
@@ -53,6 +54,7 @@ COMMANDS = (
     watch,
     materials,
     demo,
+    warm,
     doctor,
 )
 for function in COMMANDS:

@@ -21,6 +21,7 @@ import stat
 import tempfile
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import lru_cache, wraps
 from itertools import count
 from pathlib import Path
@@ -238,6 +239,19 @@ UNCOMPILED = 32
 20 to 60 of them (`benchmarks/cold_start.py`)."""
 
 
+_at_once = ContextVar("at_once", default=False)
+
+
+@contextmanager
+def compiled_at_once() -> Iterator[None]:
+    """Within, programs are compiled at their first call, whatever NumPy could do `at_first`."""
+    token = _at_once.set(True)
+    try:
+        yield
+    finally:
+        _at_once.reset(token)
+
+
 def kept(function: Program, *, calls: Calls = "some", at_first: Program | None = None) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
@@ -325,7 +339,7 @@ def _place(
 def _is_new(program: tuple) -> bool:
     """True at the first `UNCOMPILED` calls of a program that no earlier process has kept."""
     called = next(_calls_of(*program))
-    return called < UNCOMPILED and not (program[-1] and _place(*program)[0].exists())
+    return not _at_once.get() and called < UNCOMPILED and not (program[-1] and _place(*program)[0].exists())
 
 
 @lru_cache(maxsize=256)

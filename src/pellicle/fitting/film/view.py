@@ -62,7 +62,9 @@ class SpectrumForm:
         if isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift):
             return None
         signals = self.signals(scene, data, values)
-        return None if signals is None else nuisance.solve(signals, data, scene.instrument).deviance
+        return (
+            None if signals is None else np.asarray(nuisance.solve(signals, data, scene.instrument).deviance)
+        )
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
         """Return the form with another plan."""

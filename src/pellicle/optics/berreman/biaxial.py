@@ -95,7 +95,7 @@ def four_roots(epsilon: Tensor, a: Any) -> Any:
         value = (((x + c3) * x + c2) * x + c1) * x + c0
         slope = ((4 * x + 3 * c3) * x + 2 * c2) * x + c1
         gap = x[:, None] - x[None]
-        repulsion = where(gap == 0, 0, 1 / where(gap == 0, 1, gap)).sum(axis=1)
+        repulsion = xp.where(gap == 0, 0, 1 / xp.where(gap == 0, 1, gap)).sum(axis=1)
         divisor = slope - value * repulsion
         return x - where(divisor == 0, 0, value / where(divisor == 0, 1, divisor))
 
