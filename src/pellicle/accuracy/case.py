@@ -150,7 +150,7 @@ class Program:
 
 def compiled(case: Case, variant: Variant, double: bool = True) -> Program:
     """Compile a variant for all draws of a case. Raises ValueError where a material has no data."""
-    scene = anonymous(tabulated(variant.scene, variant.plan.on("coherence")))
+    scene = anonymous(tabulated(variant.scene))
     values = case.draws[:, remaining_parameters(case.scene, variant.scene)]
     simulate = build(variant.plan)
 

@@ -122,7 +122,7 @@ def simulate_signal(
         instrument = replace(fixed.instrument, scale=scale, offset=offset)
         fixed = eqx.tree_at(lambda s: s.instrument, fixed, instrument)
         chosen = plan(fixed, tolerance)
-        known = tabulated(fixed, chosen.on("coherence"))
+        known = tabulated(fixed)
         if is_elementary(chosen):
             [signal] = by_numpy(chosen, known, np.empty((1, 0)))
         else:
