@@ -128,3 +128,9 @@ def test_a_full_disk_ends_neither_the_chain_nor_python(bands, film, tmp_path, ca
     assert found.trusted
     assert "chain.h5: cannot be written (File too large)" in caplog.text
     assert not list(tmp_path.iterdir())
+
+
+def test_a_chain_with_fewer_steps_than_walkers_is_written_without_a_warning(bands, film, tmp_path):
+    found = pl.sample(bands(), film(), steps=10)
+    assert found.draws.shape[0] < found.draws.shape[1]
+    assert write_netcdf(tmp_path / "posterior.nc", found, found.predictions()).exists()

@@ -133,23 +133,25 @@ def inference_data(posterior: Posterior, predictions: tuple[Prediction, ...]) ->
     by_walker = np.moveaxis(posterior.draws, 0, 1)
     fit = to_json(posterior.fit)
     data = fit["data"] if posterior.fit.joint else [fit["data"]]
-    return arviz().from_dict(
-        posterior={name: by_walker[:, :, i] for i, name in enumerate(posterior.names)},
-        sample_stats={"lp": posterior.log_density.T},
-        posterior_predictive={p.name: p.noisy[None] for p in predictions},
-        observed_data={p.name: p.data for p in predictions},
-        coords={p.axis.name: p.axis.values for p in predictions},
-        dims={p.name: [p.axis.name] for p in predictions},
-        attrs={
-            "inference_library": "pellicle",
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
-            "pellicle_version": fit["versions"]["pellicle"],
-            "data_path": "; ".join(part["path"] for part in data),
-            "data_sha256": "; ".join(part["sha256"] for part in data),
-            "scene": str(posterior.fit.scene),
-            "fit": one_line(fit),
-            "trusted": int(posterior.trusted),
-            "doubts": "; ".join(posterior.checks.doubts),
-            "record": one_line(posterior_to_json(posterior)),
-        },
-    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "More chains .* than draws")  # walkers, of a chain that is short
+        return arviz().from_dict(
+            posterior={name: by_walker[:, :, i] for i, name in enumerate(posterior.names)},
+            sample_stats={"lp": posterior.log_density.T},
+            posterior_predictive={p.name: p.noisy[None] for p in predictions},
+            observed_data={p.name: p.data for p in predictions},
+            coords={p.axis.name: p.axis.values for p in predictions},
+            dims={p.name: [p.axis.name] for p in predictions},
+            attrs={
+                "inference_library": "pellicle",
+                "date": datetime.now(UTC).isoformat(timespec="seconds"),
+                "pellicle_version": fit["versions"]["pellicle"],
+                "data_path": "; ".join(part["path"] for part in data),
+                "data_sha256": "; ".join(part["sha256"] for part in data),
+                "scene": str(posterior.fit.scene),
+                "fit": one_line(fit),
+                "trusted": int(posterior.trusted),
+                "doubts": "; ".join(posterior.checks.doubts),
+                "record": one_line(posterior_to_json(posterior)),
+            },
+        )
