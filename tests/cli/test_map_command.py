@@ -63,6 +63,13 @@ def test_a_strip_across_a_wedge(pellicle, recipe, colours, tmp_path):
     assert (tmp_path / "out" / "map.png").stat().st_size > 5000
 
 
+def test_a_strip_says_which_free_numbers_it_keeps(pellicle, write, colours, tmp_path):
+    layer = LAYER.replace("1.46", '{ model = "constant", n = { lower = 1.4, upper = 1.5 } }')
+    recipe = write(film_recipe('signal = "srgb"', layer, substrate="3.9"), "film.toml")
+    ran = pellicle("map", photo(tmp_path / "wedge.png", colours), "--recipe", recipe, "--strip", "0,6,9,6")
+    assert "each colour gives thickness alone, kept are n = 1.45" in " ".join(ran.out.split())
+
+
 @pytest.mark.slow
 def test_a_map_in_python_with_a_white_and_a_free_exposure(colours, tmp_path):
     """A photograph at 0.6 of the exposure, beside a white of 0.6."""

@@ -70,6 +70,11 @@ def test_a_good_chain_has_no_doubts():
     assert found.independent == pytest.approx(20_000 * 8 / 3, rel=0.1)
 
 
+def test_split_rhat_of_three_steps_is_unknown_and_logs_nothing(caplog):
+    assert np.isnan(split_rhat(np.random.default_rng(0).normal(size=(3, 8, 2))))
+    assert not caplog.records
+
+
 def test_split_rhat_of_drifting_walkers():
     """Alike among each other, but not in their first and second halves."""
     drift = np.linspace(0, 1, 1000)[:, None, None] + 0.01 * np.random.default_rng(0).normal(size=(1000, 8, 1))

@@ -110,3 +110,5 @@ def test_film_colour_takes_what_reflectance_takes(refuses):
     refuses(ValueError, "pl.film_colour", film.film_colour, 300.0, "SiO2", 3.9)
     refuses(ValueError, "uniform-64", pl.film_colour, [1.0, 2.0], [1.5, 2.0], 3.9, method="gaussians-8")
     refuses(UsageError, "negative", pl.film_colour, -300.0, "SiO2", "Si")
+    refuses(UsageError, "index -4 has a negative real part", pl.film_colour, 300.0, "SiO2", -4.0)
+    refuses(UsageError, "index 0 is that of no medium", pl.film_colour, 300.0, np.array([1.5, 0.0]), "Si")

@@ -17,6 +17,7 @@ from pellicle.data.read_colours import against_white, check_photograph, white_ba
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.fitting.film.camera_errors import channel_errors
+from pellicle.fitting.film.parameters import parameters, thickness_name
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -93,6 +94,7 @@ def map_photograph(
     clipped = np.mean(np.any((coded <= 0) | (coded >= 1), axis=-1))
     sigma = USUAL_NOISE[space] if noise is None else noise_of("a photograph", noise)
     told = [*photograph.notes, *seen.notes, *notes, note, f"noise {sigma:.2g} of each channel"]
+    told += _kept(scene, layer)
     if clipped > 0:
         told.append(f"{100 * clipped:.3g} % of the positions are clipped in a channel")
     spread = np.full(3, sigma)
@@ -114,6 +116,14 @@ def map_photograph(
         told.append(decided)
     about = where, space, tuple(told), photograph.path, photograph.sha256
     return ThicknessMap(coded, _fitted(films, inverse, seen), films, position, *about)
+
+
+def _kept(scene: Scene, layer: str | None) -> list[str]:
+    """A note on the free numbers of a scene that the colour of a pixel does not fit."""
+    fitted = thickness_name(scene, varied_layer(scene, layer))
+    kept = [f"{p.name} = {p.start:.6g} {p.unit}".rstrip() for p in parameters(scene) if p.name != fitted]
+    kept += ["instrument.offset = 0"] if isinstance(scene.instrument.offset, Drift) else []
+    return [f"each colour gives {fitted} alone, kept are {', '.join(kept)}"] if kept else []
 
 
 def _camera_errors(scene: Scene, space: str, linear: np.ndarray, **camera: Any) -> list[np.ndarray]:

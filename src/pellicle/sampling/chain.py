@@ -228,6 +228,8 @@ def autocorrelation_time(draws: np.ndarray, modes: Modes) -> float:
 
 def split_rhat(draws: np.ndarray) -> float:
     """The largest split R̂ of (steps, walkers, parameters), by ArviZ."""
+    if len(draws) < 4:  # two in each half
+        return float("nan")
     rhat = arviz().rhat
     with np.errstate(invalid="ignore", divide="ignore"):
         return float(max(rhat(draws[:, :, i].T, method="split") for i in range(draws.shape[2])))

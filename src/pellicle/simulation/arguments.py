@@ -118,13 +118,15 @@ def index_at(what: Medium, wavelength) -> Any:
     """Return the index at the wavelengths: arrays and numbers as they are, materials evaluated."""
     if isinstance(what, str | AbstractDispersion):
         return material_at(what, wavelength).index(wavelength)
-    if not isinstance(what, Tracer):
-        _check_index(np.ravel(np.asarray(what)))  # JAX's copy would be traced in a program
+    check_index(what)
     return to_pair(floating(what))
 
 
-def _check_index(known: np.ndarray) -> None:
-    """Raise UsageError for an index that no medium has."""
+def check_index(what: Any) -> None:
+    """Raise UsageError for an index that no medium has; traced ones are not known, and pass."""
+    if isinstance(what, Tracer):
+        return
+    known = np.ravel(np.asarray(what))  # JAX's copy would be traced in a program
     if known.dtype.kind not in "fciu":
         return
     if (gain := known[known.imag < 0]).size:

@@ -28,7 +28,7 @@ from pellicle.optics.pair import real
 from pellicle.scene.film import Scene, with_wavelength
 from pellicle.scene.free import Free, insert, start_values
 from pellicle.scene.layers import Layer, medium
-from pellicle.simulation.arguments import check_numbers
+from pellicle.simulation.arguments import check_index, check_numbers
 from pellicle.simulation.spectra import simulate_signal
 
 BANDS = "uniform-64"
@@ -68,6 +68,9 @@ def film_colour(
     layers, below, above = (_media(x) for x in (layer if several else [layer], [substrate], [ambient]))
     for d in thickness if several else [thickness]:
         check_numbers(550.0, d, angle)
+    for index in (*layers, *below, *above):
+        if np.ndim(index) or np.isscalar(index):
+            check_index(index)
     chosen = method or (BANDS if several else "gaussians-8")
     how: dict[str, Any] = {"angle": angle, "method": chosen, "illuminant": illuminant, "observer": observer}
     return colour_of_film(thickness, layers if several else layers[0], below[0], ambient=above[0], **how)
