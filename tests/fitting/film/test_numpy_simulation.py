@@ -110,6 +110,9 @@ SIMULATED = {
     "drift": pl.Scene(pl.Group([pl.Layer("TiO2", 60.0, drift=0.05), pl.Layer("SiO2", 90.0)], 5), "BK7"),
     "periods": scene(pl.Group([pl.Layer("TiO2", 60.0), pl.Layer("SiO2", 90.0)], 5), PLATE, "R", 50.0),
     "cone": ELEMENTARY["oblique cone"],
+    "tilted axis on a plate": ELEMENTARY["tilted axis on a plate"],
+    "biaxial substrate": ELEMENTARY["biaxial substrate"],
+    "cone through a tilted axis": ELEMENTARY["cone through a tilted axis"],
 }
 
 
