@@ -66,6 +66,39 @@ def test_the_command_draws_it(pellicle, recipe, tmp_path):
         pellicle("chart", recipe, *flags).refused(3 if "illuminant" in words else 2, words)
 
 
+def test_a_chart_says_what_varies_and_what_is_kept(pellicle, write, tmp_path):
+    layers = 'name = "upper"\nmaterial = 1.5\nthickness = { lower = 1, upper = 400 }\n[[scene.layer]]\n' + (
+        'name = "lower"\nmaterial = 2.0\nthickness = { value = 80, lower = 1, upper = 300 }'
+    )
+    ran = pellicle("chart", write(film_recipe("", layers), "two.toml"), "--out", tmp_path / "a.png")
+    assert "upper.thickness from 1 to 400 nm" in ran.err
+    assert "kept are lower.thickness = 80 nm" in ran.err
+
+
+def test_a_chart_has_the_lamp_and_the_observer_of_its_recipe(pellicle, write, tmp_path, monkeypatch):
+    from pellicle.reporting import colour_figures
+
+    drawn = []
+    monkeypatch.setattr(colour_figures, "chart", lambda *args, **how: drawn.append(how) or 0.0)
+    layer = 'material = "SiO2"\nthickness = 300'
+    camera = '[camera]\nilluminant = "A"\nobserver = "1964"'
+    path = write(film_recipe('signal = "srgb"', layer, substrate='"Si"', end=camera), "lit.toml")
+    for flags in ((), ("--illuminant", "E")):
+        pellicle("chart", path, "--out", tmp_path / "a.png", *flags)
+    assert [(how["illuminant"], how["observer"]) for how in drawn] == [("A", "1964"), ("E", "1964")]
+
+
+def test_nothing_is_written_where_one_file_of_a_chart_exists(pellicle, recipe, tmp_path):
+    image, table = tmp_path / "a.png", tmp_path / "a.csv"
+    image.write_text("mine")
+    pellicle("chart", recipe, "--out", image, "--invert", table).refused(2, "choose another --out")
+    assert not table.exists()
+    table.write_text("mine")
+    words = pellicle("chart", recipe, "--out", tmp_path / "b.png", "--invert", table)
+    words.refused(2, "choose another --invert")
+    assert table.read_text() == "mine"
+
+
 def test_views_that_a_recipe_does_not_have(pellicle, recipe, write, tmp_path):
     surface = write('[scene.surface]\nmodel = "microfacet-film"\n[data]\nsignal = "brdf"\n', "surface.toml")
     for path, flags, words in (

@@ -22,6 +22,9 @@ COUNT = 5
 """Thicknesses of a row of objects."""
 
 
+_EYE = {"observer": "1931", "illuminant": "D65"}
+
+
 @dataclass(frozen=True)
 class ChartFlags(Flags):
     """Flags of what is drawn of a film, and of the sphere of a surface."""
@@ -32,10 +35,10 @@ class ChartFlags(Flags):
     """LO:HI in nm (the recipe's bounds)."""
     angle: str = "0:80"
     """LO:HI in degrees."""
-    illuminant: str = "D65"
-    """E, A, D50, D55, D65 or D75."""
-    observer: str = "1931"
-    """1931 (2 degrees) or 1964 (10 degrees)."""
+    illuminant: str | None = None
+    """E, A, D50, D55, D65 or D75 (that of the recipe, or D65)."""
+    observer: str | None = None
+    """1931 (2 degrees) or 1964 (10 degrees) (that of the recipe, or 1931)."""
     invert: str | None = None
     """CSV file to write: every thickness of each colour at the lowest angle, with ΔE."""
     view: Annotated[
@@ -51,10 +54,12 @@ class ChartFlags(Flags):
     environment: Literal["studio", "lamp"] = "studio"
     """Surfaces: studio of four soft boxes and a horizon, or one lamp in the dark."""
 
-    @property
-    def eye(self) -> dict[str, Any]:
-        """Observer and illuminant."""
-        return {"observer": self.observer, "illuminant": self.illuminant}
+    def eye(self, camera: dict[str, Any]) -> dict[str, Any]:
+        """Observer and illuminant, where they are not given those of a recipe's camera."""
+        stated = {name: x for name in _EYE if (x := getattr(self, name)) is not None}
+        if "illuminant" not in stated and "lamp" in camera:
+            say(f"drawn under {_EYE['illuminant']}, not under the lamp {camera['lamp']} of the recipe")
+        return _EYE | {name: x for name, x in camera.items() if name in _EYE} | stated
 
 
 def chart(
@@ -70,6 +75,7 @@ def chart(
 
     Example: pellicle chart film.toml --out colours.png --thickness 0:1000
     """
+    from pellicle.fitting.film.parameters import varied_and_kept
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
     from pellicle.scene.free import Free
     from pellicle.simulation.colours import varied_layer
@@ -86,17 +92,25 @@ def chart(
     else:
         nm = _range("--thickness", how.thickness, inf)
     if how.view != "chart":
-        return _objects(scene, Path(recipe).stem, out, nm, how)
+        return _objects(scene, Path(recipe).stem, out, nm, how, described.camera)
     start()
+    from pellicle.files import check_new
     from pellicle.reporting import colour_figures
+    from pellicle.reporting.matplotlib_figure import figure_path
 
-    inverse, options = None, {"layer": how.layer, **how.eye}
+    figure_path(out)
+    inverse, options = None, {"layer": how.layer, **how.eye(described.camera)}
     if how.invert is not None:
+        check_new(Path(how.invert), name="invert")
         about = options | {"source": Path(recipe).name}
         inverse = colour_figures.invert_chart(scene, how.invert, nm, angles[0], **about)
     options |= {"title": Path(recipe).stem, "inverse": inverse}
     outside = colour_figures.chart(scene, out, nm, angles, **options)
-    say(f"{out}: {nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
+    varied, kept = varied_and_kept(scene, varied_layer(scene, how.layer))
+    name = "" if varied == "thickness" else f"{varied} from "
+    say(f"{out}: {name}{nm[0]:g} to {nm[1]:g} nm, {angles[0]:g} to {angles[1]:g} degrees")
+    if kept:
+        say(f"{out}: kept are {', '.join(kept)}")
     if outside > 0.005:
         say(f"{100 * outside:.0f} % of the colours are outside sRGB and are shown by the nearest ones")
     if inverse is not None:
@@ -107,7 +121,9 @@ def chart(
     return 0
 
 
-def _objects(scene: Scene, title: str, out: str, nm: tuple[float, float], how: ChartFlags) -> int:
+def _objects(
+    scene: Scene, title: str, out: str, nm: tuple[float, float], how: ChartFlags, camera: dict[str, Any]
+) -> int:
     """Draw balls, a bubble or methods, with thicknesses in a range (nm)."""
     import numpy as np
 
@@ -116,7 +132,7 @@ def _objects(scene: Scene, title: str, out: str, nm: tuple[float, float], how: C
         raise UsageError("--invert belongs to a chart: leave out --view")
     if view == "bubble" and nm[0] <= 0:
         raise UsageError("--thickness of a bubble must be above 0 at its top: give --thickness LO:HI")
-    if view == "methods" and (layer is not None or how.eye != ChartFlags().eye):
+    if view == "methods" and (layer is not None or not how.observer is how.illuminant is None):
         raise UsageError("methods are compared on one layer under D65: leave out the other flags")
     start()
     from pellicle.reporting import renderings
@@ -131,7 +147,7 @@ def _objects(scene: Scene, title: str, out: str, nm: tuple[float, float], how: C
         thicknesses = [float(f"{x:.4g}") for x in np.linspace(*nm, COUNT)]
         if view == "bubble":
             thicknesses = [float(f"{x:.3g}") for x in np.geomspace(nm[1], nm[0], COUNT)]
-        renderings.objects(scene, out, view, thicknesses, title, layer=layer, **how.eye)
+        renderings.objects(scene, out, view, thicknesses, title, layer=layer, **how.eye(camera))
     say(f"{out}: {view}, {nm[0]:g} to {nm[1]:g} nm")
     return 0
 

@@ -17,7 +17,7 @@ from pellicle.data.read_colours import against_white, check_photograph, white_ba
 from pellicle.errors import UsageError
 from pellicle.fitting.batch.data import BY_NEIGHBOURS, CODES
 from pellicle.fitting.film.camera_errors import channel_errors
-from pellicle.fitting.film.parameters import parameters, thickness_name
+from pellicle.fitting.film.parameters import varied_and_kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import Free
 from pellicle.scene.instrument import Drift
@@ -120,8 +120,7 @@ def map_photograph(
 
 def _kept(scene: Scene, layer: str | None) -> list[str]:
     """A note on the free numbers of a scene that the colour of a pixel does not fit."""
-    fitted = thickness_name(scene, varied_layer(scene, layer))
-    kept = [f"{p.name} = {p.start:.6g} {p.unit}".rstrip() for p in parameters(scene) if p.name != fitted]
+    fitted, kept = varied_and_kept(scene, varied_layer(scene, layer))
     kept += ["instrument.offset = 0"] if isinstance(scene.instrument.offset, Drift) else []
     return [f"each colour gives {fitted} alone, kept are {', '.join(kept)}"] if kept else []
 

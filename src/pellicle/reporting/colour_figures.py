@@ -13,10 +13,11 @@ from pellicle.colour import ColourInverse
 from pellicle.colour.inverse import SIGMA, ColourThickness
 from pellicle.colour.spaces import outside
 from pellicle.files import write_text
-from pellicle.reporting.matplotlib_figure import figure_path, new_figure, save_figure
+from pellicle.fitting.film.parameters import varied_and_kept
+from pellicle.reporting.matplotlib_figure import figure_path, new_figure, plain, save_figure
 from pellicle.reporting.plain_text import csv_rows
 from pellicle.scene.film import Scene
-from pellicle.simulation.colours import colour_table, interference_colours
+from pellicle.simulation.colours import colour_table, interference_colours, varied_layer
 
 ACROSS, UP = 600, 61
 """Pixels of the chart: thicknesses, angles."""
@@ -50,7 +51,7 @@ def chart(
     swatch, strip, *others = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
     swatch.imshow(srgb, origin="lower", aspect="auto", extent=(*thickness, *angle))
     swatch.set(ylabel="angle of incidence (°)")
-    swatch.set_title(f"{title}   {how.get('illuminant', 'D65')}".strip(), loc="left")
+    swatch.set_title(plain(f"{title}   {how.get('illuminant', 'D65')}".strip()), loc="left")
     strip.imshow(srgb[:1], origin="lower", aspect="auto", extent=(*thickness, 0, 1))
     strip.set(yticks=[], ylabel=f"{angle[0]:g}°")
     if inverse is not None:
@@ -59,7 +60,8 @@ def chart(
         size = 12 + 24 * np.sqrt(inverse.found.probability[row, order])
         others[0].scatter(inverse.source[row], nm, size, color=inverse.srgb[row], edgecolors="none")
         others[0].set(ylabel=f"thicknesses (nm) of the\ncolour at {angle[0]:g}°", ylim=thickness)
-    (others or [strip])[-1].set_xlabel("thickness (nm)")
+    varied, _ = varied_and_kept(scene, varied_layer(scene, how.get("layer")))
+    (others or [strip])[-1].set_xlabel(plain(f"{varied} (nm)"))
     save_figure(figure, target)
     return float(np.mean(outside(np.asarray(colours.linear_srgb))))
 

@@ -146,6 +146,13 @@ def thickness_name(scene: Scene, position: int) -> str:
     return name_in_fit(scene, path, "thickness")
 
 
+def varied_and_kept(scene: Scene, position: int) -> tuple[str, list[str]]:
+    """Name of the thickness of a layer that is varied alone, and the other free numbers as `n = 1.46`."""
+    varied = thickness_name(scene, position)
+    others = [p for p in parameters(scene) if p.name != varied]
+    return varied, [f"{p.name} = {p.start:.6g} {p.unit}".rstrip() for p in others]
+
+
 def bounds(parameters: tuple[Parameter, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper bounds, each of shape (parameters,)."""
     return np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
