@@ -18,6 +18,7 @@ from pellicle.fitting.problem import Noise
 from pellicle.mapping.pixels import _example, bands_off, fit_pixels, prepare, spectrum
 
 from .. import by_tmm
+from ..airy import airy
 
 NM, SIGMA = np.linspace(400, 900, 100), 0.003
 FREE = pl.Free(0, 1600)
@@ -186,6 +187,21 @@ def test_the_deviance_is_the_misfit_of_the_model_at_the_truth(wedge):
     residual = np.where(np.isfinite(values), (np.nan_to_num(values) - best.model) / SIGMA, 0.0)
     assert best.deviance[known, 0] == pytest.approx(np.sum(residual[known] ** 2, axis=1), rel=1e-6)
     assert np.all(np.diff(best.deviance[known], axis=1) >= 0)
+
+
+def test_noise_beyond_the_fringes_leaves_the_least_misfit():
+    """Minima with large residuals, where steps by the slopes of the model alone do not end."""
+    values, sigma = films(*np.linspace(60, 1400, 60), size=1.0, seed=8), 1.0
+    cube = cube_of(values, sigma)
+    model = prepare(cube, OXIDE)
+    with jax.enable_x64(True):
+        best = minima(model.search, batch_data(cube.pixels((slice(None),)), model.problem.views[0].noise))
+    index: Any = pl.material("Si").index(NM)
+    silicon = np.asarray(index.re) + 1j * np.asarray(index.im)
+    every = airy(NM, np.arange(0, 1600.05, 0.1)[:, None], 1.46, silicon)
+    misfit = np.sum(values**2, axis=1, keepdims=True) + np.sum(every**2, axis=1) - 2 * values @ every.T
+    assert best.deviance[:, 0] == pytest.approx(misfit.min(axis=1) / sigma**2, abs=1e-5)
+    assert best.converged[:, 0].all()
 
 
 def test_slope_is_that_of_the_signal(wedge):

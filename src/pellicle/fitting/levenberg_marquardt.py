@@ -182,8 +182,11 @@ def begin(y: Any, bounds: Bounds, aux: Any) -> State:
     )
 
 
-def advance(evaluated: Evaluated, y: Any, bounds: Bounds, state: State) -> tuple[Any, State]:
-    """The accepted point and the next state, where the trial point was `evaluated`."""
+def advance(
+    evaluated: Evaluated, y: Any, bounds: Bounds, state: State, secant: Any = True
+) -> tuple[Any, State]:
+    """The accepted point and the next state, where the trial point was `evaluated`; by Gauss-Newton alone
+    where `secant` is false."""
     xp = namespace(y)
     cost, gradient, hessian, aux = evaluated
     cost = xp.where(xp.isfinite(cost), cost, np.inf)
@@ -193,7 +196,7 @@ def advance(evaluated: Evaluated, y: Any, bounds: Bounds, state: State) -> tuple
         return xp.where(accept.reshape(accept.shape + (1,) * (new.ndim - accept.ndim)), new, old)
 
     hessian = chosen(hessian, state.hessian)
-    curvature = _with_secant(state, state.y_eval - y, gradient, hessian)
+    curvature = _with_secant(state, state.y_eval - y, gradient, hessian, secant)
     fall = state.cost - cost
     off = xp.abs(state.predicted - fall[..., None])
     corrected = xp.where(xp.isfinite(fall), off[..., 1] <= off[..., 0], state.corrected)
@@ -248,13 +251,13 @@ def ended(y: Any, state: State, rtol: Any, atol: Any) -> Ended:
     return Ended(done | stuck | lost, stuck & (promise > rtol**0.5 * size), lost)
 
 
-def _with_secant(state: State, step: Any, gradient: Any, hessian: Any) -> Any:
+def _with_secant(state: State, step: Any, gradient: Any, hessian: Any, wanted: Any) -> Any:
     """The curvature, corrected by what the model did not know of the secant of the gradient along a step."""
     xp = namespace(step)
     missing = gradient - state.gradient - _times(hessian + state.curvature, step)
     along = xp.sum(missing * step, axis=-1)
     size = xp.sqrt(xp.sum(missing**2, axis=-1)) * xp.sqrt(xp.sum(step**2, axis=-1))
-    defined = ~state.first & (xp.abs(along) > _RANK_ONE * size)
+    defined = wanted & ~state.first & (xp.abs(along) > _RANK_ONE * size)
     update = missing[..., :, None] * missing[..., None, :] / xp.where(defined, along, 1)[..., None, None]
     taken = defined & xp.all(xp.isfinite(update), axis=(-2, -1))
     return state.curvature + xp.where(taken[..., None, None], update, 0)

@@ -12,7 +12,14 @@ from pellicle.fitting.coordinates import Box, Coordinates
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Data
 from pellicle.fitting.film.view import SpectrumForm
-from pellicle.fitting.levenberg_marquardt import QuadraticModel, normal_equations
+from pellicle.fitting.levenberg_marquardt import (
+    Bounds,
+    QuadraticModel,
+    State,
+    advance,
+    begin,
+    normal_equations,
+)
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import in_chunks, kept
 from pellicle.scene.film import Scene
@@ -42,18 +49,6 @@ class Explained(NamedTuple):
     """Deviances of points (spectra, points)."""
 
     deviance: Any
-
-
-class Stepped(NamedTuple):
-    """Points (starts, parameters) after the steps, with what a last one predicts there: the deviance, and
-    its part that goes with the weights. `promise` is the fall that is still to come, about, `damping` that of
-    the next step."""
-
-    units: Any
-    deviance: Any
-    misfit: Any
-    promise: Any
-    damping: Any
 
 
 class Curved(NamedTuple):
@@ -95,10 +90,14 @@ def _residual(static: Static, common: Common, row: BatchData, unit: Any) -> tupl
     return (explained.residual, prior), (explained.deviance + jnp.sum(prior**2), misfit)
 
 
+def _ends(units: Any) -> Bounds:
+    """Bounds of points of the unit cube."""
+    return 0 * units, 0 * units + 1
+
+
 def _quadratic(unit: Any, gradient: Any, hessian: Any) -> QuadraticModel:
     """The Gauss-Newton model around a point of the unit cube."""
-    top, ends = jnp.diagonal(hessian), (jnp.zeros_like(unit), jnp.ones_like(unit))
-    return QuadraticModel(unit, gradient, hessian, 0 * hessian, top, *ends)
+    return QuadraticModel(unit, gradient, hessian, 0 * hessian, jnp.diagonal(hessian), *_ends(unit))
 
 
 @kept
@@ -125,38 +124,30 @@ def curved(static: Static, common: Common, rows: BatchData, units: Any) -> Curve
 
 
 @partial(kept, calls="many")
-def stepped(static: Static, common: Common, rows: BatchData, units: Any, damping: Any) -> Stepped:
-    """`EVALUATIONS` bounded Gauss-Newton steps from points `units` (starts, parameters).
+def stepped(static: Static, common: Common, rows: BatchData, state: State, secant: Any) -> State:
+    """The solver after `EVALUATIONS` more steps of each start, which correct Gauss-Newton's matrix where
+    `secant` (starts,).
 
-    A step that does not lower the misfit is taken back and repeated with more damping.
+    The auxiliary output is the point itself, with its deviance and misfit before it: `_begun`. The promise
+    returned is that of the step after the next.
     """
 
-    def one(row, unit, damping):
+    def one(row, state, secant):
         def fn(unit, _):
-            return _residual(static, common, row, unit)
+            residuals, sums = _residual(static, common, row, unit)
+            return residuals, jnp.concatenate([jnp.stack(sums), unit])
 
-        def advance(carry, _):
-            state, trial, damping, promise = carry
-            cost, gradient, hessian, aux = normal_equations(fn, trial, None)
-            cost = jnp.where(jnp.isfinite(cost), cost, jnp.inf)
-            accept = cost <= state[3]
-            new = trial, gradient, hessian, cost, aux
-            state = jax.tree.map(lambda a, b: jnp.where(accept, a, b), new, state)
-            damping = jnp.where(accept, damping / 10, jnp.maximum(10 * damping, 1e-3))
-            trial, predicted, left = _quadratic(*state[:3]).propose(damping, jnp.array(False))
-            return (state, trial, damping, jnp.stack([promise[1], left])), predicted[0]
+        def step(state, _):
+            unit = state.aux[2:]
+            evaluated = normal_equations(fn, state.y_eval, None)
+            return advance(evaluated, unit, _ends(unit), state, secant)[1], state.promise
 
-        size = unit.size
-        nothing = unit, 0 * unit, jnp.zeros((size, size)), jnp.inf, (jnp.inf, jnp.inf)
-        start = nothing, unit, damping, jnp.full(2, jnp.inf)
-        (state, trial, damping, promise), predicted = jax.lax.scan(advance, start, None, EVALUATIONS)
-        fall, (before, last) = jnp.maximum(predicted[-1], 0.0), promise
-        # Gauss-Newton's promises fall by a constant factor from step to step
-        ratio = jnp.where(before > 0, last / before, 0.0)
-        deviance, misfit = state[4]
-        return Stepped(trial, deviance - fall, misfit - fall, last * jnp.minimum(ratio, 1.0), damping)
+        state, promises = jax.lax.scan(step, state, None, EVALUATIONS)
+        # promises fall by about a constant factor from step to step
+        ratio = jnp.where(promises[-1] > 0, state.promise / promises[-1], 0.0)
+        return state._replace(promise=state.promise * jnp.minimum(ratio, 1.0))
 
-    return jax.vmap(one)(rows, units, damping)
+    return jax.vmap(one)(rows, state, secant)
 
 
 @partial(kept, calls="many")
@@ -196,7 +187,7 @@ def at_best(static: Static, common: Common, rows: BatchData, units: Any) -> Best
     return jax.vmap(one)(rows, units)
 
 
-def in_rows(program: Any, static: Static, common: Common, rows: BatchData, *points: np.ndarray) -> Any:
+def in_rows(program: Any, static: Static, common: Common, rows: BatchData, *points: Any) -> Any:
     """Outputs of a `program` of starts, at most as many at a time as `static` says; `rows` are the data of
     each."""
     return in_chunks(lambda own: program(static, common, *own), (rows, *points), static[-1])
@@ -220,18 +211,26 @@ def settle(
     (starts,) a start also ends where the fall to come is less than `COARSE` of its distance to that deviance.
     """
     units, count = np.array(units), len(units)
-    deviance, misfit = np.full(count, np.inf), np.full(count, np.inf)
-    promise, damping = np.full(count, np.inf), np.zeros(count)
-    left = np.arange(count)
+    deviance, misfit, promise = (np.full(count, np.inf) for _ in range(3))
+    left, state = np.arange(count), _begun(units)
     for _ in range(rounds):
         if not len(left):
             break
-        own = data.of(spectra[left])
-        polished = in_rows(stepped, static, common, own, units[left], damping[left])
-        units[left], deviance[left], misfit[left] = polished.units, polished.deviance, polished.misfit
-        promise[left], damping[left] = polished.promise, polished.damping
+        secant = np.full(len(left), coarse is None)
+        state = in_rows(stepped, static, common, data.of(spectra[left]), state, secant)
+        fall = np.maximum(np.where(state.corrected, *state.predicted.T[::-1]), 0.0)
         enough = tolerance[left]
         if coarse is not None:
-            enough = np.maximum(enough, COARSE * (polished.deviance - coarse[left]))
-        left = left[promise[left] > enough]
+            enough = np.maximum(enough, COARSE * (state.aux[:, 0] - fall - coarse[left]))
+        on = state.promise > enough
+        # a step of one that has not settled may lead anywhere
+        units[left] = np.where(on[:, None], state.aux[:, 2:], state.y_eval)
+        deviance[left], misfit[left] = state.aux.T[:2] - np.where(on, 0.0, fall)
+        promise[left] = state.promise
+        left, state = left[on], State(*(x[on] for x in state))
     return units, deviance, misfit, promise
+
+
+def _begun(units: np.ndarray) -> State:
+    """The solver before it has evaluated points (starts, parameters)."""
+    return begin(units, _ends(units), np.concatenate([np.full((len(units), 2), np.inf), units], axis=1))

@@ -27,6 +27,8 @@ because differences of χ² count less by what a scene may leave out."""
 _NEAR, _SETTLED = 1e-5, 1e-10
 """Fall of the deviance, in units of the noise, that may be left in a minimum before and after its last step:
 the second is 1e-5 of a standard error."""
+_FALLING = 0.1
+"""Share to which the fall that is left in a minimum comes by one more undamped step."""
 _ROUNDS, _MORE_ROUNDS, _LAST = 4, 40, 4
 """Rounds of steps for each candidate, of more for the best of a spectrum, and most repetitions of its
 last."""
@@ -99,18 +101,44 @@ class _Points:
 
     def end(self, lowest: np.ndarray) -> polish.Best:
         """The last steps of the `lowest` points (spectra,), and the model there."""
-        static, common, spectra = self.search.static, self.search.common, np.arange(len(lowest))
-        best = polish.in_rows(polish.at_best, static, common, self.data, self.units[spectra, lowest])
+        spectra = np.arange(len(lowest))
+        best = self._at_best(spectra, self.units[spectra, lowest])
+        tolerance = _SETTLED * self.search.noise(best.deviance)
+        left = np.flatnonzero(best.promise > tolerance)
         for _ in range(_LAST):
-            left = np.flatnonzero(best.promise > _SETTLED * self.search.noise(best.deviance))
             if not len(left):
                 break
-            again = polish.in_rows(polish.at_best, static, common, self.data.of(left), best.units[left])
+            again = self._at_best(left, best.units[left])
+            nearer = again.promise <= _FALLING * best.promise[left]
             for mine, own in zip(best, again, strict=True):
-                mine[left] = own
+                mine[left[nearer]] = own[nearer]
+            left = left[nearer & (again.promise > tolerance[left])]
+        self._end_damped(lowest, best, np.flatnonzero(best.promise > tolerance), tolerance)
         self.units[spectra, lowest], self.deviance[spectra, lowest] = best.units, best.deviance
         self.misfit[spectra, lowest], self.promise[spectra, lowest] = best.misfit, best.promise
         return best
+
+    def _at_best(self, spectra: np.ndarray, units: np.ndarray) -> polish.Best:
+        static, common = self.search.static, self.search.common
+        return polish.in_rows(polish.at_best, static, common, self.data.of(spectra), units)
+
+    def _end_damped(
+        self, lowest: np.ndarray, best: polish.Best, left: np.ndarray, tolerance: np.ndarray
+    ) -> None:
+        """End the points of the spectra `left`, where residuals are so large that undamped steps lead away
+        from the minimum."""
+        if not len(left):
+            return
+        units, deviance, misfit, _ = polish.settle(
+            *(self.search.static, self.search.common, self.data, left, self.units[left, lowest[left]]),
+            rounds=_LAST,
+            tolerance=tolerance[left],
+        )
+        ended = self._at_best(left, units)
+        far = ended.promise > _NEAR * self.search.noise(deviance)
+        ended.units[far], ended.deviance[far], ended.misfit[far] = units[far], deviance[far], misfit[far]
+        for mine, own in zip(best, ended, strict=True):
+            mine[left] = own
 
 
 def _minima(search: BatchSearch, data: BatchData) -> BatchMinima:
