@@ -24,6 +24,14 @@ def test_rivals_and_one_film(pellicle, scene_recipe):
     assert "0.002 of R" in text
 
 
+def test_angles_of_a_plan_need_none_in_the_recipe(pellicle, scene_recipe):
+    a = scene_recipe(f'signal = "psi-delta"\n{GRID}', "a.toml")
+    planned = "plan-measurement", a, "--signals", "psi-delta", "--angles"
+    [record] = pellicle(*planned, "0,65", "--json", code=0).objects
+    assert {m["angle"] for m in record["measurements"]} == {65.0}
+    pellicle(*planned, "0").refused(2, "nothing is left to measure: ψ and Δ at 0°")
+
+
 @pytest.mark.slow  # fits twice
 def test_recipes_with_data_are_fitted_first(pellicle, scene_recipe, spectrum_file):
     spectrum_file("film.csv", thickness=280.0)

@@ -91,14 +91,14 @@ def _described(path: str) -> tuple[Scene | Fit, np.ndarray]:
     from pellicle.api.fits import fit
     from pellicle.api.recipe_fits import measurement
     from pellicle.cli.inputs import inputs
-    from pellicle.cli.reading import measured_scene
+    from pellicle.cli.reading import scene_and_wavelengths
     from pellicle.recipes.read import SurfaceRecipe, read_recipe
 
     recipe = read_recipe(path)
     if isinstance(recipe, SurfaceRecipe) or recipe.tables.data.signal in SPACES or recipe.samples:
         raise DataError(f"{path}: measurements are planned for the spectra of one film: give its recipe")
     if not recipe.files:
-        return measured_scene(recipe)
+        return scene_and_wavelengths(recipe)
     files = inputs([], path).groups[0]
     data, scene = measurement(files, len(files) > 1, say)
     with Progress(path) as progress:

@@ -39,18 +39,25 @@ MOST = 1_000_000
 
 
 def measured_scene(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
-    """The scene in the light of the recipe and its wavelengths: the recipe's, or those of its first file."""
+    """The scene in the light of the recipe and its wavelengths: the recipe's, or those of its first file.
+
+    Raises DataError for ellipsometry without an angle.
+    """
+    scene, nm = scene_and_wavelengths(recipe)
+    if scene.light.ellipsometric and scene.light.largest_angle == 0.0:
+        raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
+    return scene, nm
+
+
+def scene_and_wavelengths(recipe: FilmRecipe) -> tuple[Scene, np.ndarray]:
+    """`measured_scene` at any angle."""
     data = recipe.tables.data
     if recipe.first.tables.data.signal in SPACES:
         return _in_colours(recipe)
     if recipe.files and data.wavelengths is None:
-        scene, nm = _as_measured(recipe)
-    else:
-        scene = recipe.scene()
-        scene, nm = each_setting(scene, wavelengths(recipe, scene))
-    if scene.light.ellipsometric and scene.light.largest_angle == 0.0:
-        raise DataError(f"{recipe.path}: ellipsometry needs an angle of incidence: give [data] angle = 70")
-    return scene, nm
+        return _as_measured(recipe)
+    scene = recipe.scene()
+    return each_setting(scene, wavelengths(recipe, scene))
 
 
 def refuse_wavelengths(recipe: FilmRecipe) -> None:

@@ -96,6 +96,8 @@ def plan_measurement(
     may = _Possible(signals or tuple(ANGLES), angles, polarisations or POLARISATIONS, levels)
     not_tried: list[str] = []
     result, every = [], [*_candidates(rivals, nm, may, not_tried)]
+    if not every:
+        raise UsageError(f"nothing is left to measure: {'; '.join(not_tried)}")
     with jax.enable_x64(True):
         for done, (planned, grid) in enumerate(every):
             progress("measurements", done, len(every))
@@ -193,10 +195,9 @@ def _candidates(
         if signal == T and any(scene.substrate.back is None for scene in scenes):
             not_tried.append('T: the substrate has no back face: give it one, as in `back="air"`')
             continue
-        # light at normal incidence has no Ψ and Δ
-        usual = [
-            x for x in (ANGLES[signal] if may.angles is None else may.angles) if x or signal != PSI_DELTA
-        ]
+        usual = ANGLES[signal] if may.angles is None else may.angles
+        if signal == PSI_DELTA and not (usual := [angle for angle in usual if angle]):
+            not_tried.append("ψ and Δ at 0°: s and p are equal at normal incidence: name an oblique angle")
         every = [
             PlannedMeasurement(signal, float(angle), polarised, near[0], near[-1], may.noise[signal])
             for angle in usual
