@@ -206,6 +206,18 @@ def test_a_share_needs_a_back(refuses):
     refuses(UsageError, "`back_collected` needs the medium behind the plate", substrate, back_collected="0.5")
 
 
+@pytest.mark.parametrize(
+    ("flags", "text"),
+    [
+        ({"back": "air", "back_collected": "2"}, "`back_collected` must be at most 1"),
+        ({"back": "air", "back_reflections": 0}, "`back_reflections` must be 1 to 100"),
+        ({"bandwidth": "-2"}, "`bandwidth` must not be negative"),
+    ],
+)
+def test_a_flag_out_of_range_is_wrong_usage(flags, text, refuses):
+    refuses(UsageError, text, substrate, **flags)
+
+
 @pytest.fixture
 def thickness(pellicle, spectrum_file):
     """Fits a spectrum with these flags, and returns the thickness and the names of the budget."""

@@ -140,6 +140,10 @@ def test_white_that_is_a_material(pellicle, cube, tmp_path):
     given[-1] = "1.5+0.0j"  # a glass: 4 % at normal incidence
     [record] = pellicle("read", tmp_path / "raw.npy", "--json", *given).objects
     np.testing.assert_allclose(record["median"]["values"], 0.04 * np.nanmedian(cube, (0, 1)), rtol=1e-6)
+    (tmp_path / "glass.csv").write_text("wavelength_nm,n,k\n350,1.5,0\n900,1.5,0\n")
+    given[-1] = tmp_path / "glass.csv"
+    [again] = pellicle("read", tmp_path / "raw.npy", "--json", *given).objects
+    assert again["median"] == record["median"]
 
 
 def test_flags_that_do_not_apply(pellicle, netcdf, tmp_path):

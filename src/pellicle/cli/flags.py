@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, make_dataclass
 from math import inf
 from pathlib import Path
@@ -21,7 +22,7 @@ from pellicle.data.options import (
     named,
     parse_signal,
 )
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from pellicle.recipes.read import FilmRecipe
@@ -162,7 +163,19 @@ class SceneFlags(Flags):
     """usual: errors include those of ordinary instruments and samples; or none."""
 
     def scene(self, reading: FileOptions) -> Scene:
-        """Build the scene that the flags describe, in the light of `reading`. Raises UsageError."""
+        """Build the scene that the flags describe, in the light of `reading`.
+
+        **Raises:** UsageError for a missing flag or a value out of range; DataError for a table of n and k
+        that cannot be read.
+        """
+        try:
+            return self._scene(reading)
+        except (UsageError, DataError):
+            raise
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+
+    def _scene(self, reading: FileOptions) -> Scene:
         from pellicle.recipes import media as w
         from pellicle.scene.film import Scene
         from pellicle.scene.free import Free
@@ -339,17 +352,30 @@ class CubeFlags(CubeOnlyFlags):
 
 
 def _reflectance(white: str, light: dict[str, Any]) -> Any:
-    """The reflectance of a white reference: a number, the path of a CSV, or a function of the wavelength."""
+    """The reflectance of a white reference: a number, the path of a CSV, or a function of the wavelength for
+    a material or its file."""
     import numpy as np
-
-    try:
-        return float(white)
-    except ValueError:
-        if Path(white).is_file():
-            return white
 
     from pellicle.recipes.media import medium
     from pellicle.simulation.functions import reflectance
 
+    with suppress(ValueError):
+        return float(white)
+    if Path(white).is_file() and not _has_an_index(white):
+        return white
     material = medium(white, name="`white_reflectance`")
     return lambda nm: np.asarray(reflectance(nm, 0.0, 1.0, material, **light))
+
+
+def _has_an_index(path: str) -> bool:
+    """True of a table of n and k, which is no spectrum."""
+    from pellicle.data.read_spectrum import read_spectrum
+    from pellicle.recipes.media import medium
+
+    with suppress(DataError):
+        read_spectrum(path)
+        return False
+    with suppress(DataError):
+        medium(path)
+        return True
+    return False
