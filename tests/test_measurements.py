@@ -147,6 +147,7 @@ def fitted_files(shared_data, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.slow
 def test_quartz_on_silicon(fitted_files):
     code, (found,) = fitted_files(
         "regresspro_filmetrics_F20/quartz_reflectance.csv",
@@ -158,6 +159,7 @@ def test_quartz_on_silicon(fitted_files):
     assert found["rms"] < 0.004
 
 
+@pytest.mark.slow
 def test_fluorinated_oxide_with_its_index_free(fitted_files):
     """Its index is low, as fluorine makes it: 1.407 at 633 nm."""
     code, (found,) = fitted_files(

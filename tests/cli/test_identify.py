@@ -42,6 +42,7 @@ def test_a_film_is_named_and_written_as_a_recipe(pellicle, film, tmp_path):
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_files_at_several_angles_are_one_sample(pellicle, tmp_path):
     nm, out = np.linspace(420, 880, 60), tmp_path / "out"
     paths = []
@@ -85,6 +86,7 @@ def test_what_is_missing_is_said(pellicle, film):
         assert message in pellicle("identify", film, *flags, "--substrate", "Si", code=2).err
 
 
+@pytest.mark.slow
 def test_a_delta_without_its_sign_is_named_and_written_to_the_recipe(pellicle, tmp_path):
     """Of 100 nm by WVASE: nothing but the fit shows that Δ is folded, as 11 points an angle have no kink."""
     path, flags = Path("measurements/wvase/cauchy_100nm.txt"), ("--among", "SiO2", "--allow", "layers=1")

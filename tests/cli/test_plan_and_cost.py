@@ -18,6 +18,7 @@ def faint(write):
     return write(FAINT, "film.toml")
 
 
+@pytest.mark.slow
 def test_a_plan_as_table_and_record(pellicle, faint):
     (record,) = pellicle("plan", faint, "--tolerance", 1e-3, "--json").objects
     assert (record["schema"], record["tolerance"]) == ("pellicle.plan/1", 1e-3)

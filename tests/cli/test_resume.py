@@ -116,6 +116,7 @@ def test_worker_processes_go_on_too(batch, fitted, monkeypatch, tmp_path):
     assert list(rows(tmp_path)) == ["a", "b"]
 
 
+@pytest.mark.slow
 def test_processes_share_a_batch_that_takes_long(
     pellicle, spectrum_file, scene, fitted, monkeypatch, tmp_path
 ):

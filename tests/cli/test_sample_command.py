@@ -41,6 +41,7 @@ def test_the_interval_is_that_of_least_squares(sampled):
     assert {"n_over_tau", "rhat", "acceptance", "minima_found", "minima_visited"} <= set(checks)
 
 
+@pytest.mark.slow
 def test_the_report_has_the_interval_and_the_checks(sampled):
     ran = sampled()
     assert "[[Posterior]]" in ran.out

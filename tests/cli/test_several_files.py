@@ -177,6 +177,7 @@ def test_thicknesses_that_differ_are_told(pellicle, spectrum_file, scene_recipe)
     assert "the stated noise error is too small" in " ".join(ran.out.split())
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_is_not_waited_for(pellicle, spectrum_file, scene, tmp_path):
     out = tmp_path / "out"
     out.mkdir()
@@ -198,6 +199,7 @@ def test_what_repeats_are_not(pellicle, spectrum_file, scene, scene_recipe):
     pellicle("fit", file, "--recipe", path).refused(3, "joint and repeats exclude each other")
 
 
+@pytest.mark.slow
 def test_sweeps_of_one_file_are_repeats(pellicle, spectrum_file, scene, tmp_path):
     texts = [spectrum_file(f"{seed}.csv", seed=seed).read_text().split("\n", 1) for seed in range(3)]
     together = tmp_path / "sweeps.csv"

@@ -69,6 +69,7 @@ def test_continuity_decides_orders_and_a_jump_is_found(live):
     assert [i for i, fit in enumerate(fits) if fit.jump] == [40]
 
 
+@pytest.mark.slow
 def test_a_file_that_is_no_spectrum_of_the_series_is_said(live):
     made, _ = live
     told = {name: fit.error for name, fit in made.fits.items() if fit.error}

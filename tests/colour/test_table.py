@@ -70,6 +70,7 @@ def test_its_stated_error_and_size():
     assert table_of("soap").thickness == (0.0, 600.0)
 
 
+@pytest.mark.slow
 def test_outside_the_table_the_edge_counts():
     table = table_of("soap")
     np.testing.assert_array_equal(table.xyz(900.0, 1.0), table.xyz(600.0, 1.0))

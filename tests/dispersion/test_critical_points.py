@@ -110,6 +110,7 @@ def test_every_term_and_the_marked_models_are_here():
 OLD = ("empirical", "spline", "oscillators")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in MODELS if name in TERMS and MODELS[name].kramers_kronig])
 def test_kramers_and_kronig(name):
     """ε₁ of every term that is marked is the integral of its ε₂."""
@@ -256,6 +257,7 @@ def test_gradients_against_central_differences():
             assert float(slopes[i]) == pytest.approx(numeric, rel=2e-5, abs=2e-6), (model, i)
 
 
+@pytest.mark.slow
 def test_finite_at_hard_values():
     """On resonance, at edges, without strength or damping, far from everything."""
     hard = [

@@ -93,6 +93,7 @@ def test_a_direction_that_the_data_do_not_see_keeps_its_variance(film, measured)
     assert errors(scaled(problem, unit, [at], [1.0])).stderr[0] > 1e6
 
 
+@pytest.mark.slow
 def test_a_lower_limit_is_where_chi2_has_risen_by_2_71(film, measured):
     """A 95 % limit; at half of it the film is far out."""
     scene = film(pl.Free(1, 1000), "Au")

@@ -100,7 +100,7 @@ def test_a_start_without_a_number_ends_and_the_others_go_on(three):
     np.testing.assert_allclose(result.y[rest], three.y[rest], atol=1e-9)
 
 
-@pytest.mark.parametrize("coarse", [0.0, 1e-3])
+@pytest.mark.parametrize("coarse", [pytest.param(0.0, marks=pytest.mark.slow), 1e-3])
 def test_the_same_minima_by_steps_of_numpy(coarse):
     """Of single starts the steps are the same; beside others, hopeless ones may end a step earlier."""
 

@@ -53,6 +53,7 @@ def test_deviance_is_that_of_a_normal_distribution_with_the_effects_in_its_covar
     assert found.stderr[0] > fit["thickness"].stderr_noise
 
 
+@pytest.mark.slow
 def test_weak_fringes_on_a_level_that_is_off_determine_the_film():
     """Residuals are those of the level, which the offset explains: they are no noise of the fringes."""
     fit = pl.fit(measured(0.01), FILM)

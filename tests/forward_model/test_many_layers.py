@@ -63,6 +63,7 @@ def test_slopes_in_rows_are_those_of_each_layer(monkeypatch, signal, angle):
     np.testing.assert_allclose(slopes, plain, rtol=1e-11, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_rows_are_the_layers_one_by_one():
     """In the precision of the wavelengths, also of Python's numbers."""
     with jax.enable_x64(True):

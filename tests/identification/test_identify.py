@@ -91,6 +91,7 @@ def test_bare_silicon_has_no_film():
     assert found.best.name in ("bare substrate", "native oxide")
 
 
+@pytest.mark.slow
 def test_a_reflectance_relative_to_silicon_is_at_most_undecided():
     spectrum = reflectance(("SiO2", 300.0), noise=0.001)
     mirror = np.abs((1 - index("Si")) / (1 + index("Si"))) ** 2
@@ -125,6 +126,7 @@ def test_other_thicknesses_of_a_film_are_left():
     assert len({x.name for x in found.hypotheses}) == len(found.hypotheses)
 
 
+@pytest.mark.slow
 def test_a_wrong_back_face_is_at_most_undecided():
     """Light from the front face alone, stated to be that of a plate."""
     spectrum = reflectance(("CdS", 80.0), substrate="BK7")
@@ -136,6 +138,7 @@ def test_a_wrong_back_face_is_at_most_undecided():
     assert abs(right.best.layers[0].thickness.value - 80) < 3 * right.best.layers[0].thickness.stderr < 5
 
 
+@pytest.mark.slow
 def test_another_glass_is_named_and_never_certain():
     spectrum = reflectance(("Y2O3", 400.0), substrate="BK7")
     found = pl.identify(spectrum, "SF10/HOYA", among=["Y2O3", "SiO2", "ZrO2"], layers=1)

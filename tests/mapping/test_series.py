@@ -65,6 +65,7 @@ def test_all_times_know_more_than_one(grown):
     assert np.sqrt(np.mean((grown["thickness"] - GROWN) ** 2)) < 0.6 * np.sqrt(np.mean(alone**2))
 
 
+@pytest.mark.slow
 def test_a_jump_and_a_gap_are_told_and_nothing_after_them_is_wrong():
     true = np.where(np.arange(80) < 50, GROWN, GROWN - 160)
     data = cube(true, seed=1)
@@ -95,6 +96,7 @@ def test_an_index_that_all_times_share_is_known_by_all():
     assert (np.abs(found.thickness - GROWN) < 4 * found.thickness_stderr_noise).all()
 
 
+@pytest.mark.slow
 def test_an_order_that_nothing_decides_is_not_decided():
     """A film that hardly changes, seen in a narrow band: the order is open, and said to be."""
     data = cube(1500 + 5 * np.sin(TIME / 100), seed=3).isel(wavelength=slice(0, 6))
@@ -104,6 +106,7 @@ def test_an_order_that_nothing_decides_is_not_decided():
     assert not found.breaks
 
 
+@pytest.mark.slow
 def test_a_netcdf_file_and_a_folder_of_files_are_series(grown, tmp_path):
     data = cube(GROWN)
     data.to_netcdf(tmp_path / "grown.nc")
@@ -116,6 +119,7 @@ def test_a_netcdf_file_and_a_folder_of_files_are_series(grown, tmp_path):
     assert list(found.times) == pytest.approx([0, 10, 20, 30])
 
 
+@pytest.mark.slow
 def test_a_series_with_dates_counts_from_the_first(grown, tmp_path):
     data = cube(GROWN)
     dates = np.datetime64("2026-05-04T12:30:00", "ns") + (TIME * 1e9).astype("timedelta64[ns]")
@@ -128,6 +132,7 @@ def test_a_series_with_dates_counts_from_the_first(grown, tmp_path):
     assert raw.time.attrs["units"] == "minutes since 2026-05-04T12:30:00.000"
 
 
+@pytest.mark.slow
 def test_a_closed_shutter_is_left_out():
     data = cube(GROWN, seed=6)
     data.R[50] = 0.02

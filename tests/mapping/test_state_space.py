@@ -73,6 +73,7 @@ def test_values_rates_and_errors_are_those_of_all_times_together(states):
     np.testing.assert_allclose(found.rate_systematic[:, 0] * unit**2, of_rate, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_the_stiffness_is_that_of_the_data():
     """The noise of a straight line is averaged; a wave is followed; errors cover both."""
     rng, t = np.random.default_rng(4), np.linspace(0, 10, 300)

@@ -217,6 +217,7 @@ def test_without_zarr_the_message_names_the_extra(monkeypatch, tmp_path, refuses
     refuses(UsageError, r"need zarr: pip install 'pellicle\[maps\]'", Map, tmp_path / "map.zarr")
 
 
+@pytest.mark.slow
 def test_a_map_is_reported_drawn_and_saved(cube, scene, fake_fits, tmp_path):
     made = run_map(cube, scene, tmp_path / "map.zarr", fit=fake_fits.fit)
     text = pl.report(made)

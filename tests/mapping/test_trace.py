@@ -163,6 +163,7 @@ def test_a_trace_is_refused_where_it_says_too_little():
         scene(first=3000.0)
 
 
+@pytest.mark.slow
 def test_a_table_with_a_time_and_wavelengths_is_a_trace(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     grown = 5 * FRINGE * TIME / 600

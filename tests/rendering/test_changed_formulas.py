@@ -81,6 +81,7 @@ def test_many_wavelengths_are_exact(changes):
     np.testing.assert_allclose(exact, entering, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_rules_of_transmitted_light(changes):
     """What is not reflected, by channel or by the brightest of them, and a base without its film."""
     look = appearance(pl.Scene(pl.Layer(2.0, 150.0), 1.5))

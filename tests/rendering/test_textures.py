@@ -137,6 +137,7 @@ def test_materialx_squares_the_roughness_of_its_image(tmp_path, unsolved):
         assert valid, why
 
 
+@pytest.mark.slow
 def test_blender_and_mitsuba_have_images_of_the_roughness(tmp_path, unsolved):
     _, files = written("blender", tmp_path, roughness_map=ROUGH)
     assert "ROUGHNESS_MAP = 'film_roughness.png'" in files[".py"].read_text("utf-8")

@@ -26,6 +26,7 @@ def quantile(weight: np.ndarray, share: float) -> float:
     return float(np.interp(share, np.cumsum(weight), GRID))
 
 
+@pytest.mark.slow
 def test_each_minimum_has_its_share(bimodal, grid):
     assert bimodal.trusted
     modes = [mode for mode in bimodal["thickness"].modes if mode.mass > 0.02]

@@ -42,6 +42,7 @@ def reference(i, letter):
     return tmm.coh_tmm(letter, indices, thickness, np.deg2rad(light["angle"]), film[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("letter", "sp")
 def test_random_stacks_as_tmm(letter):
     absorbed, R, _, field = computed(letter)

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pellicle.api.fits import fit
 from pellicle.api.recipe_fits import Inputs, measurement
 from pellicle.cli.flags import SCENE, FileFlags, FitFlags, SceneFlags, switch
 from pellicle.cli.inputs import inputs
@@ -58,6 +57,7 @@ def _kept(folder: str) -> set[str]:
 
 def _compile(files: Inputs, name: str) -> None:
     """Fit every group of files by compiled programs."""
+    from pellicle.api.fits import fit
     from pellicle.programs.cache import compiled_at_once
 
     options = {"loss": files.loss, "tolerance": files.tolerance, "residual": files.residual}

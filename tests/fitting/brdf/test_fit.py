@@ -59,6 +59,7 @@ def test_a_known_surface_is_found_within_its_errors(samples):
     assert all((p.lower_limit, p.upper_limit) == (None, None) for p in known.free)
 
 
+@pytest.mark.slow
 def test_the_record_of_a_fit(known):
     """A single set of samples has no name; residuals are in standard deviations where σ is known."""
     [part] = known.parts

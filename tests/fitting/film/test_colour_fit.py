@@ -148,6 +148,7 @@ def test_the_camera_clips_the_model_too():
     assert "scale" not in names  # it is free
 
 
+@pytest.mark.slow
 def test_colours_far_from_those_of_the_film_are_a_misfit_whatever_their_noise():
     right = colours(300.0, sigma=0.12, seed=0)
     film = colours(300.0).values

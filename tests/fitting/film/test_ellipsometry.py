@@ -41,6 +41,7 @@ def test_a_thin_oxide():
 NOISES = [(0.2, 0.02), *(pytest.param(*x, marks=pytest.mark.slow) for x in ((0.02, 0.05), (0.002, 0.5)))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("psi_sigma", "delta_sigma"), NOISES)
 def test_the_error_is_that_of_both_angles_with_their_own_noise(psi_sigma, delta_sigma):
     """Cramér and Rao's bound from differences of Ψ and Δ themselves: neither noise is spread over the other.

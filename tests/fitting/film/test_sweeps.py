@@ -106,6 +106,7 @@ def ellipsometry(shift: float, seed: int) -> pl.Spectrum:
 MEASURES = [reflectance, pytest.param(ellipsometry, marks=pytest.mark.slow)]  # in the joint fit below too
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measure", MEASURES)
 def test_the_scatter_between_sweeps_is_that_of_their_own_fits(measure):
     """To first order: within 5 %, where residuals alone state a third of it or less."""

@@ -13,6 +13,7 @@ from pellicle.reporting.json_record import to_json
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 
 
+@pytest.mark.slow
 def test_two_tied_halves_are_one_layer():
     """Values and errors are those of the whole layer, which has no tie; the index follows too."""
     known = {"uncertainty": pl.Uncertainty.none()}
