@@ -97,16 +97,12 @@ def digits(values, certified) -> float:
     return min(11.0, -np.log10(max(error, 1e-11)))
 
 
-@pytest.mark.parametrize(
-    ("name", "least"),
-    # two exponentials of MGH17 are nearly alike: the last digits are the rounding of the LAPACK at hand
-    [*(("Misra1a", 9), ("Eckerle4", 9)), *((x, 8) for x in ("MGH09", "Thurber", "Hahn1")), ("MGH17", 7.5)],
-)
-def test_certified_values_from_both_starts(name, least):
+@pytest.mark.parametrize("name", ["Misra1a", "Eckerle4", "MGH09", "Thurber", "Hahn1", "MGH17"])
+def test_certified_values_from_both_starts(name):
     problem, values, converged = solve(name)
     assert converged.all()
     for each in values:
-        assert digits(each, problem.values) > least
+        assert digits(each, problem.values) > 9
         squares = np.sum((MODELS[name](each, problem.x) - problem.y) ** 2)
         np.testing.assert_allclose(squares, problem.squares, rtol=1e-10)
 

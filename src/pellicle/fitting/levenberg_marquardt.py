@@ -190,7 +190,10 @@ def advance(
     xp = namespace(y)
     cost, gradient, hessian, aux = evaluated
     cost = xp.where(xp.isfinite(cost), cost, np.inf)
-    accept = state.first | (cost < state.cost)
+    # within rounding errors of the cost, the gradient says which point is nearer to the minimum
+    flatter = _steepness(gradient, hessian) < _steepness(state.gradient, state.hessian)
+    level = cost <= (1 + float(np.finfo(y.dtype).eps) ** _ROUNDING) * state.cost
+    accept = state.first | (cost < state.cost) | (level & flatter)
 
     def chosen(new, old):
         return xp.where(accept.reshape(accept.shape + (1,) * (new.ndim - accept.ndim)), new, old)
@@ -249,6 +252,12 @@ def ended(y: Any, state: State, rtol: Any, atol: Any) -> Ended:
     stuck = ~done & xp.all(xp.abs(state.y_eval - y) <= eps * xp.abs(y), axis=-1)
     lost = ~xp.isfinite(size)
     return Ended(done | stuck | lost, stuck & (promise > rtol**0.5 * size), lost)
+
+
+def _steepness(gradient: Any, hessian: Any) -> Any:
+    """Σ gᵢ²/Hᵢᵢ: the fall of the cost by steps along one parameter each."""
+    xp, squares = namespace(gradient), _diagonal(hessian)
+    return xp.sum(xp.where(squares > 0, gradient**2 / xp.where(squares > 0, squares, 1), 0), axis=-1)
 
 
 def _with_secant(state: State, step: Any, gradient: Any, hessian: Any, wanted: Any) -> Any:
