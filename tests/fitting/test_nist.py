@@ -107,7 +107,7 @@ def test_certified_values_from_both_starts(name):
         np.testing.assert_allclose(squares, problem.squares, rtol=1e-10)
 
 
-@pytest.mark.parametrize("name", ["BoxBOD", "MGH10"])
+@pytest.mark.parametrize("name", ["BoxBOD", pytest.param("MGH10", marks=pytest.mark.slow)])
 def test_hard_problems_do_not_converge_from_the_far_start(name):
     """Known failures: where a better solver succeeds, move them to the list above."""
     problem, values, converged = solve(name)

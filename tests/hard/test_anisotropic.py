@@ -73,6 +73,7 @@ def called(function, *arguments):
     return jax.jit(function).lower(*arguments).compile(compiler_options("few"))(*arguments)
 
 
+@pytest.mark.slow
 def test_values_and_reverse_mode():
     def weighted(columns):
         found = outputs(False, *columns)

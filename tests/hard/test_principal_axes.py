@@ -93,6 +93,7 @@ def test_value_and_slope_in_every_number(name, computed):
             np.testing.assert_allclose(slopes[:, i], slope, rtol=1e-9, atol=1e-11, err_msg=f"number {i}")
 
 
+@pytest.mark.slow
 def test_equal_indices_are_an_isotropic_medium_to_the_last_digits():
     with jax.enable_x64(True):
         angle, phase = jnp.linspace(0.0, 1.57, 64), jnp.linspace(0.0, 20.0, 64)

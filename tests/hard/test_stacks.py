@@ -75,7 +75,7 @@ def ratios(case, value, slope, dtype):
 
 RUNS = [
     ("one film", np.float64),
-    ("one film", np.float32),
+    pytest.param("one film", np.float32, marks=pytest.mark.slow),
     pytest.param("one film by matrices", np.float32, marks=pytest.mark.slow),  # as the loop over three
     ("three layers", np.float64),
     pytest.param("three layers", np.float32, marks=pytest.mark.slow),  # compiles for 10 s; the loop takes 4
@@ -104,6 +104,7 @@ def by_matrix(monkeypatch):
         yield importlib.import_module("stack_truth").by_matrix
 
 
+@pytest.mark.slow
 def test_fifty_layers_with_an_opaque_one_in_the_middle(by_matrix):
     """A mirror of quarter waves on metal on another mirror, that no light passes: R, T and their slopes."""
     depth = np.tile([60.0, 95.0], 25)
@@ -142,7 +143,8 @@ def test_fifty_layers_with_an_opaque_one_in_the_middle(by_matrix):
     np.testing.assert_allclose(slope[1], slopes[:, 1], rtol=1e-10)
 
 
-@pytest.mark.parametrize("angle", [pytest.param(0.0, marks=pytest.mark.slow), 60.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("angle", [0.0, 60.0])
 def test_a_roughness_free_from_zero_is_smooth_and_flat_there(angle):
     """Its first order vanishes; the other slopes are those of the smooth stack."""
     light = pl.Light(np.linspace(400.0, 800.0, 5), angle=angle, polarisation="p" if angle else "unpolarised")
