@@ -45,6 +45,9 @@ LAMP = Accuracy(weighted=0.6)
         ([row()], (0.05, 0.013, 0.04, 18.0), FILM, True),
         ([row()], (0.05, 0.013, 0.04, 9.0), FILM, False),
         ([row()], (0.05, 0.013, 0.014, 18.0), FILM, False),
+        # a few points without structure that are no noise of an instrument
+        ([row()], (1.0, 0.3, 0.3, 1.0), Accuracy(0.02, noise=0.1), True),
+        ([row()], (1.0, 0.09, 0.09, 1.0), Accuracy(0.02, noise=0.1), False),
         # a drifting lamp is judged by the error that it is allowed
         ([row()], (20.0, 1.0, 1.0, 0.5), LAMP, False),
         ([row()], (20.0, 1.0, 1.0, 0.7), LAMP, True),

@@ -32,12 +32,14 @@ class Accuracy(NamedTuple):
     """The structure in residuals that no instrument makes; infinite where a number says nothing.
 
     `largest` is in the unit of the data, `span` the signal's range, and `weighted` in units of the σ of the
-    points, where that is the error of a model whose lamp drifts.
+    points, where that is the error of a model whose lamp drifts. `noise` is the root mean square, in the unit
+    of the data, of what cannot be noise where none was given.
     """
 
     largest: float = math.inf
     span: Any = math.inf
     weighted: float = math.inf
+    noise: float = math.inf
 
 
 def misfit(discrepancy: Discrepancy, remaining: Remaining, accuracy: Accuracy) -> Any:
@@ -52,7 +54,7 @@ def beyond_accuracy(remaining: Remaining, accuracy: Accuracy) -> Any:
     large = (remaining.typical > largest) | (remaining.weighted > accuracy.weighted)
     # the misfit of a wrong order may be in some of the fringes alone
     contradicted = (remaining.rms > largest) & (remaining.weighted > CONTRADICTED)
-    return (large & (remaining.ratio > STRUCTURED)) | contradicted
+    return (large & (remaining.ratio > STRUCTURED)) | contradicted | (remaining.rms > accuracy.noise)
 
 
 def other_material(contributions: Sequence[Contribution]) -> Any:

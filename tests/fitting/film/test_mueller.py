@@ -91,6 +91,19 @@ def test_the_other_sign_of_the_fourth_stokes_parameter_is_named():
     assert float(thickness) == pytest.approx(THICKNESS, abs=0.05)
 
 
+@pytest.mark.slow  # compiles a program for five wavelengths
+def test_residuals_of_a_few_wavelengths_that_are_no_noise():
+    """Of five wavelengths with the other sign, which have no structure: it was 118 nm, converged."""
+    nm = np.linspace(400, 900, 5)
+    silicon = np.array([5.57 + 0.387j, 4.25 + 0.056j, 3.91 + 0.022j, 3.75 + 0.010j, 3.65 + 0.004j])
+    n, c, s = ncs(nm, [1, 1.46, silicon], [240.0], 65.0).T
+    values, elements = np.stack([-n, c, -s, s], axis=1), ("m12", "m33", "m34", "m43")
+    data = pl.Spectrum(nm, values, "mueller", angle=np.full(5, 65.0), elements=elements)
+    found = pl.fit(data, pl.Scene(pl.Layer(1.46, pl.Free(1, 600)), "Si"))
+    assert found.status == "misfit"
+    assert any(x.startswith("with the opposite signs of m34, m43") for x in found.warnings)
+
+
 @pytest.mark.slow  # the same fit
 def test_a_given_sigma_for_each_element_is_absolute(fit):
     given = pl.fit(replace(measured(), sigma=np.tile(NOISE, (128, 1))), scene())

@@ -25,6 +25,8 @@ from pellicle.fitting.reweighting import RankedMinima, ViewFit
 
 _LARGEST_POWER, _LARGEST_ANGLES = 0.02, 0.02
 """Structure in residuals of R and T, and of N, C and S (0.6° of Ψ), that no calibrated instrument makes."""
+_NOISIEST = 0.1
+"""Noise of N, C and S (3° of Ψ) that no ellipsometer has: of a few points residuals have no structure."""
 _LARGEST_DRIFT = 1.0
 """Structure in residuals that no drifting lamp makes, in units of the error that its model has: 0.7 of it
 remains in a soap film of known thickness, 1.3 of titania on silicon that is fitted as a soap film."""
@@ -110,7 +112,7 @@ def accuracy(view: SpectrumView, calibrated: bool, values: np.ndarray) -> Accura
     """
     if view.signal.ellipsometric:
         # of Ψ and Δ the range says nothing: on a thin oxide it is that of the substrate
-        return Accuracy(largest=_LARGEST_ANGLES)
+        return Accuracy(_LARGEST_ANGLES, noise=math.inf if view.noise.known else _NOISIEST)
     if view.noise.drifting:
         return Accuracy(weighted=_LARGEST_DRIFT)
     return Accuracy(_LARGEST_POWER if calibrated else math.inf, np.ptp(values, axis=-1))
