@@ -1,4 +1,4 @@
-"""Figures of fits, spectra and predictions by Matplotlib, and of fits with their rivals by Plotly.
+"""Figures of fits and spectra by Matplotlib, and of fits with their rivals by Plotly.
 
 Panels of a fit are the data of each part, the misfit against thickness, n and k, profiles of graded layers.
 """
@@ -22,7 +22,6 @@ from pellicle.reporting import data_panels
 from pellicle.reporting.drawable import Band, Line, Panel, Section, Style, Table
 from pellicle.reporting.matplotlib_figure import draw
 from pellicle.reporting.plotly_figure import figure, thinning
-from pellicle.sampling.result import Prediction
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,22 +63,6 @@ def draw_spectrum(spectrum: Spectrum) -> Figure:
     """
     title = f"{spectrum.path} [{spectrum.name}]" if spectrum.name else spectrum.path
     return draw([data_panels.measured(spectrum)], title)
-
-
-def draw_predictions(predictions: Sequence[Prediction]) -> Figure:
-    """Draw each data set over the bands of 95 % of the model's curves and of repeated measurements."""
-    sections = []
-    for p in predictions:
-        order = np.argsort(p.axis.values, kind="stable")
-        x, bands = p.axis.values[order], []
-        for draws, opacity, name in ((p.noisy, 0.25, "repeated measurements"), (p.model, 0.8, "model")):
-            low, high = np.quantile(draws, [0.025, 0.975], axis=0)[:, order]
-            bands.append(Band(x, low, high, f"{name}, 95 %", "fit", opacity))
-        data = [Line(x, p.data[order], "data", "residual", "point")]
-        scale = "log" if p.decades else "linear"
-        panel = Panel(p.label, data, bands, 3.0, legend="inside", scale=scale)
-        sections.append(Section(p.axis.label, [[panel]]))
-    return draw(sections, "")
 
 
 def rival_label(rival: Rival, fit: Fit) -> str:

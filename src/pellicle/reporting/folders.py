@@ -100,9 +100,9 @@ def _remove_tables_of_another_scene(target: Path, written: Iterable[str]) -> Non
 
 def _write_posterior(target: Path, posterior: Posterior) -> dict[str, bytes]:
     """Write the draws and the figures of a posterior, and return the PNG images by name."""
-    from pellicle.reporting.figures import draw_predictions
     from pellicle.reporting.matplotlib_figure import save_figure
     from pellicle.reporting.posterior import corner_figure, write_netcdf
+    from pellicle.reporting.predictive_figure import draw_predictions
 
     predictions = posterior.predictions()
     write_netcdf(target / "posterior.nc", posterior, predictions, overwrite=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples
 from pellicle.data.colours import Colours
+from pellicle.data.spectrum import Spectrum
 from pellicle.fitting.brdf.view import INVERSES, RESIDUALS, SamplesView
 from pellicle.fitting.curves import BrdfCurve, ColourCurve, Curve
 from pellicle.fitting.evaluation import curves
@@ -35,7 +36,8 @@ class Axis(NamedTuple):
 
 class Prediction(NamedTuple):
     """One measured quantity: `data` (points,), and draws from the posterior, (draws, points): `model`, and
-    `noisy`, as it would be measured again; `decades` says that it spans several."""
+    `noisy`, as it would be measured again; `measured` is the data set. `decades` says that it spans several,
+    `wraps` that it is an angle that goes on at 0 behind 360 degrees."""
 
     name: str
     label: str
@@ -43,7 +45,9 @@ class Prediction(NamedTuple):
     data: np.ndarray
     model: np.ndarray
     noisy: np.ndarray
+    measured: Spectrum | Colours | BrdfSamples | None = None
     decades: bool = False
+    wraps: bool = False
 
 
 def predictions(
@@ -78,10 +82,12 @@ def _spectrum(
     curve, (prefix, suffix) = part.spectral, _names(part)
     axis = Axis(f"wavelength_nm{suffix}", "wavelength (nm)", curve.wavelength)
     drawn, again = (view.signal.in_quantities(view.in_columns(columns)) for columns in (model, noisy))
-    return [
-        Prediction(q.name + suffix, prefix + q.axis, axis, q.curve(curve)[0], drawn[..., i], again[..., i])
-        for i, q in enumerate(view.signal.quantities)
-    ]
+    predicted = []
+    for i, q in enumerate(view.signal.quantities):
+        numbers = q.curve(curve)[0], drawn[..., i], again[..., i]
+        about = {"measured": part.data, "wraps": q.wraps}
+        predicted.append(Prediction(q.name + suffix, prefix + q.axis, axis, *numbers, **about))
+    return predicted
 
 
 def _samples(
@@ -100,7 +106,8 @@ def _samples(
     for c, name in enumerate(cast(BrdfSamples, part.data).channels):
         at = Axis(f"rank_{name}{suffix}", "samples, from the darkest to the brightest", rank[:, c])
         numbers = part.data.values[:, c], model[..., c], noisy[..., c]
-        predicted.append(Prediction(name + suffix, f"{prefix}{name} (1/sr)", at, *numbers, decades=True))
+        label = f"{prefix}{name} (1/sr)"
+        predicted.append(Prediction(name + suffix, label, at, *numbers, part.data, decades=True))
     return predicted
 
 
@@ -116,7 +123,7 @@ def _colours(
     if data.angle is not None:
         at = Axis(f"angle_deg{suffix}", "angle of incidence (degrees)", data.angle)
     return [
-        Prediction(name + suffix, prefix + name, at, data.values[:, c], model[..., c], noisy[..., c])
+        Prediction(name + suffix, prefix + name, at, data.values[:, c], model[..., c], noisy[..., c], data)
         for c, name in enumerate(data.channels)
     ]
 
