@@ -84,4 +84,4 @@ def _joined(
     there = np.isfinite(along)
     limits = np.full((2, len(along)), np.nan)
     limits[:, there] = low[rows], high[rows]
-    return along, *limits
+    return along, limits[0], limits[1]

@@ -126,7 +126,7 @@ def check_index(what: Any) -> None:
     """Raise UsageError for an index that no medium has; traced ones are not known, and pass."""
     if isinstance(what, Tracer):
         return
-    known = np.ravel(np.asarray(what))  # JAX's copy would be traced in a program
+    known: Any = np.ravel(np.asarray(what))  # JAX's copy would be traced in a program
     if known.dtype.kind not in "fciu":
         return
     if (gain := known[known.imag < 0]).size:
