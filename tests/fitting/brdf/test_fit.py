@@ -9,7 +9,7 @@ import pytest
 import pellicle as pl
 from pellicle.api.fits import fit
 from pellicle.brdf import direction, model
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting.brdf import fit as module
 from pellicle.fitting.result import Status
 from pellicle.reporting.json_record import to_json
@@ -134,6 +134,8 @@ def test_impossible_fits_are_refused(refuses):
         ([], FREE, {}, "no samples"),
     ):
         refuses(UsageError, message, fit, data, surface, **options)
+    dark = dataclasses.replace(flat, values=0 * flat.values)
+    refuses(DataError, "every value is zero", fit, dark, FREE)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import numpy as np
 
 from pellicle.data.brdf_samples import BrdfSamples, spread
 from pellicle.effects.surface_plan import plan
-from pellicle.errors import UsageError
+from pellicle.errors import DataError, UsageError
 from pellicle.fitting import identifiability
 from pellicle.fitting.assembly import Assembly, assemble
 from pellicle.fitting.brdf import summary
@@ -56,7 +56,7 @@ def fitted(
     **Returns:** the fit, and the ranked minima that it rests on.
 
     **Raises:** UsageError where nothing is free, a residual, a loss or the wavelengths do not match, or the
-    samples are too few.
+    samples are too few; DataError where all values are zero.
     """
     check_loss(loss)
     samples = [data] if isinstance(data, BrdfSamples) else list(data)
@@ -69,6 +69,8 @@ def fitted(
         raise UsageError("nothing is free to fit: give bounds, as in thickness = { lower = 0, upper = 1000 }")
     for each in samples:
         check_channels(each, surface)
+        if not np.any(each.values):
+            raise DataError(f"{_place(each)}every value is zero: check how it was written")
     count = sum(len(each) for each in samples)
     if count < FEWEST:
         raise UsageError(
