@@ -9,7 +9,7 @@ from pellicle.fitting.film import extended_scene
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
 from pellicle.fitting.film.systematic_effects import simulated_effects
-from pellicle.scene.free import insert
+from pellicle.scene.free import free_leaves, insert, start_values
 
 NM = np.linspace(420.0, 880.0, 40)
 FREE = pl.Free(200, 400)
@@ -103,6 +103,51 @@ def test_numpy_and_the_program_simulate_the_same(name, monkeypatch):
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_plans_take_the_program(name, monkeypatch):
     assert all(found is None for _, found in simulations(OTHERS[name], monkeypatch))
+
+
+TILT = pl.Anisotropic(1.6, pl.dispersion.Constant(pl.Free(1.65, 1.8)), axis=(pl.Free(10, 80), 20.0))
+SCANNED = {
+    "R": ELEMENTARY["R"],
+    "psi and delta, two layers": scene(
+        [pl.Layer(pl.dispersion.Cauchy(pl.Free(1.4, 1.7), 5e3), FREE), pl.Layer("SiO2", pl.Free(0, 5))],
+        *("Si", "psi-delta", 65.0),
+    ),
+    "free axis": scene(pl.Layer(TILT, FREE), "Si", "psi-delta", 60.0),
+}
+
+
+def deviances(sample):
+    """Those of candidates by NumPy, and a function that returns those of the program."""
+    data = pl.simulate(insert(sample, start_values(sample)), NM, noise=0.01)
+    with jax.enable_x64(True):
+        [view] = make(*measurements(data, sample)).views
+        lower, upper = np.array([(x.lower, x.upper) for _, x in free_leaves(sample)]).T
+        values = np.random.default_rng(0).uniform(lower, upper, (8, len(lower)))
+        found = view.form.deviances(view.arrays, values)
+
+    def compiled():
+        def one(arrays, each):
+            return view.form.explain(arrays, each).deviance
+
+        with jax.enable_x64(True):
+            return np.asarray(jax.jit(jax.vmap(one, in_axes=(None, 0)))(view.arrays, values))
+
+    return found, compiled
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "free axis")) for name in SCANNED]
+)
+def test_numpy_and_the_program_scan_the_same(name):
+    found, compiled = deviances(SCANNED[name])
+    assert isinstance(found, np.ndarray)
+    np.testing.assert_allclose(found, compiled(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("instrument", [{"scale": "free"}, {"offset": "free"}, {"numerical_aperture": 0.5}])
+def test_scans_that_cost_numpy_more_than_a_compilation_take_the_program(instrument):
+    sample = scene(pl.Layer("SiO2", FREE), "Si", instrument=pl.Instrument(**instrument))
+    assert deviances(sample)[0] is None
 
 
 SIMULATED = {

@@ -57,9 +57,12 @@ class SpectrumForm:
         return np.stack([self.compared(each, scene, data) for each in by_numpy(self.plan, scene, values)])
 
     def deviances(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> np.ndarray | None:
-        """Deviances of candidates by NumPy; None for such a plan, and where scale or offset are free."""
+        """Deviances of candidates by NumPy; None for such a plan, for averages, which cost it more than a
+        compilation, and where scale or offset are free."""
         scene, data = arrays
-        if isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift):
+        averaged = self.plan.row("coherence").count or self.plan.on("angle-spread")
+        free = isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift)
+        if averaged or free:
             return None
         signals = self.signals(scene, data, values)
         return (
