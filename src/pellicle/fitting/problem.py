@@ -76,10 +76,15 @@ class Blocked(Hashable, Protocol):
 
 @runtime_checkable
 class Elementary(Hashable, Protocol):
-    """A form whose deviances NumPy computes, where its plan allows it: nothing is then compiled."""
+    """A form that NumPy evaluates, where its plan allows it: nothing is then compiled."""
 
-    def deviances(self, arrays: Any, values: np.ndarray, /) -> np.ndarray | None:
-        """Deviances of candidates `values` (candidates, its parameters); None where NumPy cannot."""
+    def compiles_slowly(self, arrays: Any, /) -> bool:
+        """True where NumPy can, and slopes by differences cost less than the compilation of a program."""
+        ...
+
+    def explained(self, arrays: Any, values: np.ndarray, /) -> Explained | None:
+        """The view at candidates `values` (candidates, its parameters), with an axis of these in front; None
+        where NumPy cannot."""
         ...
 
 

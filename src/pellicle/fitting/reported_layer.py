@@ -7,8 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from pellicle.dispersion.anisotropic import Anisotropic, principal_media
+from pellicle.dispersion.base import known_index
+from pellicle.fitting.central_differences import around
 from pellicle.fitting.curves import BIREFRINGENCE, Index
 from pellicle.optics.hoisting import stack_rows
+from pellicle.optics.pair import imag, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, insert
 from pellicle.scene.layers import Interface
@@ -49,6 +52,26 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
 
     reported, push = jax.linearize(both, values)
     return Linearised(*reported, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
+
+
+_STEP = 1e-6
+"""Step of a difference, as a share of the number, or in its own unit below 1."""
+
+
+def linearised_by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Linearised:
+    """As `linearised`, with slopes by differences, of a plan that NumPy evaluates."""
+    nm = np.asarray(scene.light.wavelength)
+
+    def layer(numbers: np.ndarray) -> np.ndarray:
+        media = principal_media(reported_medium(scene, insert(scene, [*numbers])))
+        parts = [part(known_index(medium, nm)) for medium in media for part in (real, imag)]
+        return np.stack([np.broadcast_to(x, nm.shape) for x in parts])
+
+    def both(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return form.signals(scene, data, points), np.stack([*map(layer, points)])
+
+    found = around(both, np.asarray(values, float), _STEP * np.maximum(np.abs(values), 1.0))
+    return Linearised(*found.values, *found.slopes)
 
 
 def index_of_layer(scene: Scene, at: Any, covariance: np.ndarray, wavelength: np.ndarray) -> dict[str, Any]:

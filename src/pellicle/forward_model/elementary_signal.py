@@ -35,7 +35,8 @@ def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarra
     columns = candidates[0] if len(candidates) == 1 else np.transpose(candidates)[:, :, None]
     numbers = jax.tree.map(np.asarray, insert(scene, [*columns]))
     each, kind = np.empty((len(candidates), 1)), plan.kind
-    _, *rows = np.broadcast_arrays(each, *signal_rows(plan)(numbers))
+    with np.errstate(all="ignore"):  # a candidate without a signal has NaN
+        _, *rows = np.broadcast_arrays(each, *signal_rows(plan)(numbers))
     if not kind.ellipsometric:
         return [np.asarray(kind.of_power(power)) for power in rows[0]]
     return [*np.stack(rows, axis=-1).reshape(len(candidates), -1)]

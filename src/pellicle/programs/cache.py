@@ -252,13 +252,19 @@ def compiled_at_once() -> Iterator[None]:
         _at_once.reset(token)
 
 
-def kept(function: Program, *, calls: Calls = "some", at_first: Program | None = None) -> Program:
+def kept(
+    function: Program,
+    *,
+    calls: Calls = "some",
+    at_first: Program | None = None,
+    uncompiled: int = UNCOMPILED,
+) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
     its `repr` says all that the program depends on. The arrays are NumPy's. With many `calls` it is compiled
     to run fast, with few in a short time. `at_first`, of the same arguments and results, takes the first
-    `UNCOMPILED` calls of a program that is not kept yet: it returns None where it cannot.
+    `uncompiled` calls of a program that is not kept yet: it returns None where it cannot.
     """
 
     @lru_cache(maxsize=1)
@@ -281,7 +287,7 @@ def kept(function: Program, *, calls: Calls = "some", at_first: Program | None =
         shapes = tuple((np.shape(x), _dtype(x)) for x in own.values())
         # JAX can cache in a cloud, too
         program = function, calls, plan, places, shapes, None if "://" in str(folder) else folder
-        if at_first is not None and _is_new(program):
+        if at_first is not None and _is_new(program, uncompiled):
             result = at_first(plan, *arguments)
             if result is not None:
                 return result
@@ -336,10 +342,10 @@ def _place(
     return Path(folder) / "programs" / key.hex(), key
 
 
-def _is_new(program: tuple) -> bool:
-    """True at the first `UNCOMPILED` calls of a program that no earlier process has kept."""
+def _is_new(program: tuple, uncompiled: int) -> bool:
+    """True at the first `uncompiled` calls of a program that no earlier process has kept."""
     called = next(_calls_of(*program))
-    return not _at_once.get() and called < UNCOMPILED and not (program[-1] and _place(*program)[0].exists())
+    return not _at_once.get() and called < uncompiled and not (program[-1] and _place(*program)[0].exists())
 
 
 @lru_cache(maxsize=256)

@@ -123,7 +123,7 @@ def deviances(sample):
         [view] = make(*measurements(data, sample)).views
         lower, upper = np.array([(x.lower, x.upper) for _, x in free_leaves(sample)]).T
         values = np.random.default_rng(0).uniform(lower, upper, (8, len(lower)))
-        found = view.form.deviances(view.arrays, values)
+        found = view.form.explained(view.arrays, values)
 
     def compiled():
         def one(arrays, each):

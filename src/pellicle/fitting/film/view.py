@@ -12,16 +12,17 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
+from pellicle.fitting.central_differences import UNCOMPILED
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
 from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
-from pellicle.fitting.reported_layer import linearised
+from pellicle.fitting.reported_layer import Linearised, linearised, linearised_by_numpy
 from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.film_signal import build, depolarises
-from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
@@ -56,18 +57,25 @@ class SpectrumForm:
             return None
         return np.stack([self.compared(each, scene, data) for each in by_numpy(self.plan, scene, values)])
 
-    def deviances(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> np.ndarray | None:
-        """Deviances of candidates by NumPy; None for such a plan, for averages, which cost it more than a
-        compilation, and where scale or offset are free."""
-        scene, data = arrays
+    def compiles_slowly(self, arrays: tuple[Scene, Data], /) -> bool:
+        """True for 4×4 matrices, whose slopes take 3 to 10 s to compile, where NumPy evaluates them."""
+        return self.plan.row("anisotropy").count >= GENERAL and self._is_quick(arrays[0])
+
+    def _is_quick(self, scene: Scene) -> bool:
+        """True where NumPy evaluates a scene: not scales and offsets that are free, and not averages, which
+        cost it more than a compilation."""
         averaged = self.plan.row("coherence").count or self.plan.on("angle-spread")
         free = isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift)
-        if averaged or free:
+        return is_elementary(self.plan) and not (averaged or free)
+
+    def explained(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> Explained | None:
+        """The spectrum at candidates by NumPy, where it is quick."""
+        scene, data = arrays
+        signals = self.signals(scene, data, values) if self._is_quick(scene) else None
+        if signals is None:
             return None
-        signals = self.signals(scene, data, values)
-        return (
-            None if signals is None else np.asarray(nuisance.solve(signals, data, scene.instrument).deviance)
-        )
+        solved = nuisance.solve(signals, data, scene.instrument)
+        return Explained(solved.model, solved.residual, solved.deviance)
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
         """Return the form with another plan."""
@@ -94,10 +102,19 @@ class Local(NamedTuple):
     layer_slope: Array  # their derivatives, (2, points, parameters)
 
 
-@partial(kept, calls="few")
+def _local_by_numpy(form: SpectrumForm, scene: Scene, data: Data, values: np.ndarray) -> Local | None:
+    if not form.compiles_slowly((scene, data)):
+        return None
+    return _local(linearised_by_numpy(form, scene, data, values), data, scene)
+
+
+@partial(kept, calls="few", at_first=_local_by_numpy, uncompiled=UNCOMPILED)
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
-    linear = linearised(form, scene, data, values)
+    return _local(linearised(form, scene, data, values), data, scene)
+
+
+def _local(linear: Linearised, data: Data, scene: Scene) -> Local:
     solved = nuisance.solve(linear.signal, data, scene.instrument)
     curves = solved.model, solved.gain, solved.offset
     return Local(linear.signal, linear.slope, *curves, linear.layer, linear.layer_slope)
