@@ -114,6 +114,9 @@ ELSEWHERE = (
     "source .venv/bin/activate",  # a shell builtin; make fit creates the folder
     "pellicle fit wafer.txt --layer cauchy --substrate Si",  # a file of the reader
     "pellicle demo",  # cli/test_demo_command.py
+    # keep programs in the user's cache; cli/test_warm.py
+    "pellicle warm --recipe measurements/recipes/hematite_on_glass_140nm.toml",
+    "pellicle warm docs/examples/oxide_um_percent.csv --layer SiO2 --substrate Si --thickness 10:1000",
     # compiles for half a minute; fitting/film/test_index_curves.py, dispersion/test_spline.py
     'pellicle fit measurements/hematite_on_glass_140nm.csv --layer "spline-kk(400,470,540,610,690,780)"'
     " --substrate BK7 --thickness 10:1000 --out results/hematite_k",
