@@ -166,16 +166,15 @@ def test_a_program_is_traced_once_in_all_processes(cache, new_process):
     assert TRACED == [2]
 
 
-def test_formulas_without_a_program_take_the_first_calls(cache, new_process, monkeypatch):
+def test_formulas_without_a_program_take_the_first_calls(cache, new_process):
     """Until as many of one program were made, or another process has kept it."""
-    monkeypatch.setattr(program_cache, "UNCOMPILED", 3)
     given = []
 
     def by_numpy(factor, x):
         given.append(factor)
         return Sum(factor * np.sum(x)) if factor < 10 else None
 
-    either = kept(plain_scaled, at_first=by_numpy)
+    either = kept(plain_scaled, at_first=by_numpy, uncompiled=3)
     assert [float(either(2, np.arange(4.0)).total) for _ in range(5)] == [12.0] * 5
     assert (given, TRACED) == ([2, 2, 2], [2])
     assert either(2, np.arange(5.0)).total == 20  # another program
@@ -188,10 +187,9 @@ def test_formulas_without_a_program_take_the_first_calls(cache, new_process, mon
     assert (given, TRACED) == ([], [2, 10])
 
 
-def test_formulas_take_the_first_calls_without_a_cache(cache, new_process, monkeypatch):
+def test_formulas_take_the_first_calls_without_a_cache(cache, new_process):
     jax.config.update("jax_compilation_cache_dir", None)
-    monkeypatch.setattr(program_cache, "UNCOMPILED", 1)
-    either = kept(plain_scaled, at_first=lambda factor, x: Sum(-factor * np.sum(x)))
+    either = kept(plain_scaled, at_first=lambda factor, x: Sum(-factor * np.sum(x)), uncompiled=1)
     assert [float(either(5, np.arange(4.0)).total) for _ in range(3)] == [-30.0, 30.0, 30.0]
 
 
