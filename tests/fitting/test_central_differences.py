@@ -6,7 +6,7 @@ import pytest
 
 import pellicle as pl
 from pellicle.fitting import evaluation
-from pellicle.fitting.central_differences import around, central_differences, within
+from pellicle.fitting.central_differences import around, central_differences, steps_within
 from pellicle.fitting.film import view as film_view
 from pellicle.fitting.film.fit import measurements
 from pellicle.fitting.film.problem import make
@@ -22,7 +22,7 @@ def waves(x):
 
 def test_values_and_slopes_of_known_functions():
     at = np.array([[0.3, 0.7], [1.0, 0.0]])
-    found = central_differences(waves, at, within(at, np.array([1e-6, 1e-6]), 0.0, 1.0))
+    found = central_differences(waves, at, steps_within(at, np.array([1e-6, 1e-6]), 0.0, 1.0))
     rates = np.linspace(1.0, 100.0, 50)
     np.testing.assert_array_equal(found.values[0], waves(at)[0])
     for point, slope, square in zip(at, *found.slopes, strict=True):

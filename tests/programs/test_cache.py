@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pellicle.programs import cache as program_cache
+from pellicle.programs import private_files
 from pellicle.programs.cache import kept
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="files have no owners")
@@ -59,7 +60,7 @@ def test_an_option_that_xla_does_not_have_is_left_out(tmp_path, monkeypatch):
 def link(path):
     path.with_name("two").symlink_to(path)
     path.parent.with_name("linked").symlink_to(path.parent)
-    assert not program_cache.make_folder(path.parent.with_name("linked"))
+    assert not private_files.make_folder(path.parent.with_name("linked"))
 
 
 DAMAGE = {
@@ -113,11 +114,11 @@ def test_a_file_or_folder_of_another_user_is_not_loaded(path, monkeypatch):
 
 def test_the_oldest_files_make_room(tmp_path):
     folder = tmp_path / "programs"
-    assert program_cache.make_folder(folder)
+    assert private_files.make_folder(folder)
     for age, name in enumerate(["new", "older", "oldest"]):
-        program_cache.write(folder / name, bytes(100), 1000)
+        private_files.write(folder / name, bytes(100), 1000)
         os.utime(folder / name, (1e9 - age, 1e9 - age))
-    program_cache.write(folder / "last", bytes(100), 250)
+    private_files.write(folder / "last", bytes(100), 250)
     assert {file.name for file in folder.iterdir()} == {"new", "last"}
 
 

@@ -45,7 +45,7 @@ def start(keep: bool = True) -> None:
     folder = cache_folder() if keep else None
     if folder is None:
         return
-    from pellicle.programs.cache import others_can_write
+    from pellicle.programs.private_files import others_can_write
 
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

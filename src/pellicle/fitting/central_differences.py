@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-UNCOMPILED = 256
+DIFFERENCED = 256
 """Calls of a program of 4×4 matrices that are left to differences: 10 to 20 fits, which cost 0.3 s more each;
 the compilation takes 7 s."""
 _LEAST, _ENOUGH = 1e-7, 1e-6
@@ -29,7 +29,7 @@ class Slopes(NamedTuple):
     slopes: tuple[np.ndarray, ...]
 
 
-def within(at: np.ndarray, step: np.ndarray, lower: Any, upper: Any) -> tuple[np.ndarray, np.ndarray]:
+def steps_within(at: np.ndarray, step: np.ndarray, lower: Any, upper: Any) -> tuple[np.ndarray, np.ndarray]:
     """Distances of two points from each number: one step to either side, or one and two from a wall."""
     low, high = at - step < lower, at + step > upper
     return np.where(high, -step, step), np.where(low, 2 * step, np.where(high, -2 * step, -step))
@@ -65,7 +65,8 @@ def around(function: Function, at: np.ndarray, step: np.ndarray) -> Slopes:
     wall = np.where(at >= 0, 0.0, -np.inf)
 
     def with_steps(step: np.ndarray) -> Slopes:
-        found = central_differences(function, at[None], [x[None] for x in within(at, step, wall, np.inf)])
+        steps = steps_within(at, step, wall, np.inf)
+        found = central_differences(function, at[None], [x[None] for x in steps])
         return Slopes(*(tuple(x[0] for x in arrays) for arrays in found))
 
     found = with_steps(step)

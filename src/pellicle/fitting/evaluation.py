@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.central_differences import UNCOMPILED, central_differences, within
+from pellicle.fitting.central_differences import DIFFERENCED, central_differences, steps_within
 from pellicle.fitting.coordinates import Box
 from pellicle.fitting.levenberg_marquardt import Evaluated, normal_equations
 from pellicle.fitting.normal_equations import times
@@ -157,7 +157,7 @@ def _by_numpy(
 polish = kept(polished, at_first=_by_numpy)
 
 
-STEP = 2e-6
+_STEP = 2e-6
 """Half the distance of points for differences in the unit cube: 0.02 nm for bounds 10 000 nm apart."""
 
 
@@ -182,7 +182,7 @@ def _equations_by_numpy(
         deviance = sum(view.deviance for view in views) + np.sum(prior**2, axis=1)
         return np.concatenate([*(view.residual for view in views), prior], axis=1), deviance
 
-    found = central_differences(residuals, at, within(at, np.full(size, STEP), 0.0, 1.0))
+    found = central_differences(residuals, at, steps_within(at, np.full(size, _STEP), 0.0, 1.0))
     (residual, deviance), (slope, _) = found
     across = np.swapaxes(slope, 1, 2)
     cost, gradient = np.sum(residual**2, axis=1), times(across, residual)
@@ -195,7 +195,7 @@ def _equations_by_numpy(
     )
 
 
-@partial(kept, at_first=_equations_by_numpy, uncompiled=UNCOMPILED)
+@partial(kept, at_first=_equations_by_numpy, uncompiled=DIFFERENCED)
 def equations(
     static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, count: Any
 ) -> Evaluated:

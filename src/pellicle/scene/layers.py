@@ -39,6 +39,19 @@ MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
 """A dispersion, a name of the catalogue or path of a file of n and k, an index n + ik, or a `Free` index."""
 
 
+def why_no_index(values: Any) -> str:
+    """Return the reason why no medium has one of these numbers for its index, empty where all may be one."""
+    known = np.ravel(np.asarray(values))
+    if (gain := known[known.imag < 0]).size:
+        said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
+        return f"{said} absorption is n + ik with k ≥ 0"
+    if (below := known[known.real < 0]).size:
+        return f"index {below[np.argmin(below.real)]:g} has a negative real part"
+    return (
+        "index 0 is that of no medium: light has an infinite wavelength in it" if np.any(known == 0) else ""
+    )
+
+
 def medium(value: MediumLike) -> AbstractDispersion:
     """Return the dispersion of a medium: what layers, substrates and ambients are made of.
 
@@ -64,14 +77,8 @@ def medium(value: MediumLike) -> AbstractDispersion:
     if isinstance(value, int | float | complex | np.number):
         if not np.isfinite(value):
             raise ValueError(f"index {value} is not finite")
-        if np.imag(value) < 0:
-            raise ValueError(
-                f"index {value} has a negative imaginary part, which is gain: absorption is n + ik with k ≥ 0"
-            )
-        if np.real(value) < 0:
-            raise ValueError(f"index {value} has a negative real part")
-        if value == 0:
-            raise ValueError("index 0 is that of no medium: light has an infinite wavelength in it")
+        if reason := why_no_index(value):
+            raise ValueError(reason)
     if isinstance(value, complex | np.complexfloating):
         return Constant(float(value.real), float(value.imag))
     if value is None or isinstance(value, list | tuple | dict | eqx.Module):

@@ -16,7 +16,7 @@ from pellicle.optics import interface
 from pellicle.optics.anisotropy import is_anisotropic
 from pellicle.optics.pair import Number, is_real, to_pair
 from pellicle.scene.film import check_polarisation
-from pellicle.scene.layers import ambient_medium, medium
+from pellicle.scene.layers import ambient_medium, medium, why_no_index
 
 Medium = Any
 """A number (n + ik), an array of them, a material, or a material's name."""
@@ -126,16 +126,9 @@ def check_index(what: Any) -> None:
     """Raise UsageError for an index that no medium has; traced ones are not known, and pass."""
     if isinstance(what, Tracer):
         return
-    known: Any = np.ravel(np.asarray(what))  # JAX's copy would be traced in a program
-    if known.dtype.kind not in "fciu":
-        return
-    if (gain := known[known.imag < 0]).size:
-        said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
-        raise UsageError(f"{said} absorption is n + ik with k ≥ 0")
-    if (below := known[known.real < 0]).size:
-        raise UsageError(f"index {below[np.argmin(below.real)]:g} has a negative real part")
-    if np.any(known == 0):
-        raise UsageError("index 0 is that of no medium: light has an infinite wavelength in it")
+    known = np.asarray(what)  # JAX's copy would be traced in a program
+    if known.dtype.kind in "fciu" and (reason := why_no_index(known)):
+        raise UsageError(reason)
 
 
 def material_at(what: str | AbstractDispersion, wavelength: Any) -> AbstractDispersion:

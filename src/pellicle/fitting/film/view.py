@@ -12,7 +12,7 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.central_differences import UNCOMPILED
+from pellicle.fitting.central_differences import DIFFERENCED
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
@@ -108,7 +108,7 @@ def _local_by_numpy(form: SpectrumForm, scene: Scene, data: Data, values: np.nda
     return _local(linearised_by_numpy(form, scene, data, values), data, scene)
 
 
-@partial(kept, calls="few", at_first=_local_by_numpy, uncompiled=UNCOMPILED)
+@partial(kept, calls="few", at_first=_local_by_numpy, uncompiled=DIFFERENCED)
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
     return _local(linearised(form, scene, data, values), data, scene)
