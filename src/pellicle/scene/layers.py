@@ -41,7 +41,7 @@ MediumLike: TypeAlias = AbstractDispersion | str | complex | Free | Any
 
 def why_no_index(values: Any) -> str:
     """Return the reason why no medium has one of these numbers for its index, empty where all may be one."""
-    known = np.ravel(np.asarray(values))
+    known: Any = np.ravel(np.asarray(values))
     if (gain := known[known.imag < 0]).size:
         said = f"index {gain[np.argmin(gain.imag)]:g} has a negative imaginary part, which is gain:"
         return f"{said} absorption is n + ik with k ≥ 0"
