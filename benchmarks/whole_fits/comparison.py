@@ -2,7 +2,7 @@
 
 The first call of pellicle is timed in two new processes: one with an empty cache of compiled programs, one
 with the cache that the first has filled. The second process then fits a few files as it does before programs
-pay (`programs.cache.UNCOMPILED`), and every file with every program, in turns, with all programs compiled.
+pay (`programs.cache.kept`), and every file with every program, in turns, with all programs compiled.
 The other programs get the least effort (starts, or size of the population) with which they find the right
 answer in 95 % of the files; the search for it is not timed.
 """
@@ -108,8 +108,8 @@ def all_files(chosen: int, folder: str, files: int) -> tuple[Time, Time, list[Re
     loads, case = first_call(chosen, folder), cases()[chosen]
     measured = [measurement(case, seed) for seed in range(files)]
     early = [timed(lambda one=one: _by_pellicle(case, one.spectrum))[0] for one in measured[1:_EARLY]]
-    cache.UNCOMPILED = 0
-    _by_pellicle(case, measured[0].spectrum)  # compiles
+    with cache.compiled_at_once():
+        _by_pellicle(case, measured[0].spectrum)
     problems = [Problem(case, one) for one in measured]
     least = [_chi2(problem, polished(problem, problem.truth)) for problem in problems]
     efforts = [_least_effort(each, problems, least) for each in COMPETITORS]

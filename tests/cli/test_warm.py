@@ -10,11 +10,11 @@ from pellicle.programs import cache
 
 
 def test_within_it_programs_are_compiled_at_their_first_call(monkeypatch):
-    monkeypatch.setattr(cache, "_calls_of", lambda *program: iter([0]))
-    assert cache._is_new(("program", None), 32)
+    monkeypatch.setattr(cache, "_spent_on", lambda *program: [0.0])
+    assert cache._is_new(("program", None), 0.1)
     with cache.compiled_at_once():
-        assert not cache._is_new(("program", None), 32)
-    assert cache._is_new(("program", None), 32)
+        assert not cache._is_new(("program", None), 0.1)
+    assert cache._is_new(("program", None), 0.1)
 
 
 @pytest.mark.slow

@@ -95,11 +95,21 @@ def test_equations_and_local_models_are_those_of_the_programs(data):
             assert np.all(np.abs(x - y) <= 1e-6 * size + 1e-12), name
 
 
-@pytest.mark.slow
-def test_the_first_fit_is_that_of_compiled_programs(data):
-    first = pl.fit(data, SCENE)
+def film(thickness, index, scale):
+    instrument = pl.Instrument(scale=scale, offset=scale)
+    return pl.Scene(pl.Layer(pl.dispersion.Cauchy(index, 4e3), thickness), "Si", instrument=instrument)
+
+
+@pytest.mark.parametrize("kind", [pytest.param("tilted axis", marks=pytest.mark.slow), "free scale, offset"])
+def test_the_first_fit_is_that_of_compiled_programs(kind, request):
+    if kind == "tilted axis":
+        sample, data = SCENE, request.getfixturevalue("data")
+    else:
+        sample = film(pl.Free(100, 400), pl.Free(1.3, 1.8), "free")
+        data = pl.simulate(film(240.0, 1.46, 1.0), NM, noise=0.002, seed=2)
+    first = pl.fit(data, sample)
     with compiled_at_once():
-        again = pl.fit(data, SCENE)
+        again = pl.fit(data, sample)
     assert first.status == again.status
     for name, parameter in again.parameters.items():
         if not parameter.free:

@@ -143,7 +143,7 @@ def new_process():
     TRACED.clear()
 
     def clear():
-        for remembered in (program_cache._load, program_cache._place, program_cache._calls_of):
+        for remembered in (program_cache._load, program_cache._place, program_cache._spent_on):
             remembered.cache_clear()
 
     clear()
@@ -168,18 +168,20 @@ def test_a_program_is_traced_once_in_all_processes(cache, new_process):
 
 
 def test_formulas_without_a_program_take_the_first_calls(cache, new_process):
-    """Until as many of one program were made, or another process has kept it."""
+    """Until their shares of a compilation sum to 1, one is large, or another process has kept the program."""
     given = []
 
     def by_numpy(factor, x):
         given.append(factor)
         return Sum(factor * np.sum(x)) if factor < 10 else None
 
-    either = kept(plain_scaled, at_first=by_numpy, uncompiled=3)
-    assert [float(either(2, np.arange(4.0)).total) for _ in range(5)] == [12.0] * 5
-    assert (given, TRACED) == ([2, 2, 2], [2])
+    either = kept(plain_scaled, at_first=by_numpy, share=lambda factor, x: len(x) / 40)
+    assert [float(either(2, np.arange(4.0)).total) for _ in range(12)] == [12.0] * 12
+    assert (given, TRACED) == ([2] * 10, [2])
     assert either(2, np.arange(5.0)).total == 20  # another program
-    assert len(given) == 4
+    assert len(given) == 11
+    assert either(3, np.arange(6.0)).total == 45  # more than an eighth
+    assert (len(given), TRACED.pop()) == (11, 3)
     assert either(10, np.arange(4.0)).total == 60  # nothing without a program
     assert TRACED == [2, 10]
     new_process()
@@ -190,8 +192,8 @@ def test_formulas_without_a_program_take_the_first_calls(cache, new_process):
 
 def test_formulas_take_the_first_calls_without_a_cache(cache, new_process):
     jax.config.update("jax_compilation_cache_dir", None)
-    either = kept(plain_scaled, at_first=lambda factor, x: Sum(-factor * np.sum(x)), uncompiled=1)
-    assert [float(either(5, np.arange(4.0)).total) for _ in range(3)] == [-30.0, 30.0, 30.0]
+    either = kept(plain_scaled, at_first=lambda factor, x: Sum(-factor * np.sum(x)), share=lambda *_: 0.125)
+    assert [float(either(5, np.arange(4.0)).total) for _ in range(10)] == [-30.0] * 8 + [30.0] * 2
 
 
 def test_a_program_is_kept_by_its_plan_its_shapes_and_the_settings(cache, new_process, monkeypatch):

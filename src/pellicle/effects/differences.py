@@ -203,7 +203,7 @@ def signals(plan: Plan, scene: Any, points: np.ndarray, build: Build) -> np.ndar
     each wavelength (and ratio), for a surface the channels of each pair of directions."""
     of_film = build is film_signal.build and is_elementary(plan)
     if of_film and len(points) * np.size(scene.light.wavelength) <= _BY_NUMPY:
-        return np.stack(by_numpy(plan, scene, points))
+        return by_numpy(plan, scene, points)
     return np.asarray(_signals(build, plan.static_key, False, *_split(scene, points)), dtype=float)
 
 

@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-DIFFERENCED = 256
-"""Calls of a program of 4×4 matrices that are left to differences: 10 to 20 fits, which cost 0.3 s more each;
-the compilation takes 7 s."""
 _LEAST, _ENOUGH = 1e-7, 1e-6
 """Change of a function, as a share of its size, below which rounding errors show in its slope, and that which
 a longer step aims at."""
@@ -33,6 +30,11 @@ def steps_within(at: np.ndarray, step: np.ndarray, lower: Any, upper: Any) -> tu
     """Distances of two points from each number: one step to either side, or one and two from a wall."""
     low, high = at - step < lower, at + step > upper
     return np.where(high, -step, step), np.where(low, 2 * step, np.where(high, -2 * step, -step))
+
+
+def evaluations(parameters: int) -> int:
+    """Number of points that the slopes at one point take."""
+    return 2 * parameters + 1
 
 
 def central_differences(function: Function, at: np.ndarray, distances: Sequence[np.ndarray]) -> Slopes:

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from pellicle.fitting.central_differences import DIFFERENCED, central_differences, steps_within
+from pellicle.fitting.central_differences import central_differences, evaluations, steps_within
 from pellicle.fitting.coordinates import Box
 from pellicle.fitting.levenberg_marquardt import Evaluated, normal_equations
 from pellicle.fitting.normal_equations import times
@@ -17,6 +17,10 @@ from pellicle.programs.cache import kept
 
 CHUNK = 128
 """Candidates that one call of the compiled program takes."""
+
+
+_DEVIANCES = 2
+"""How much faster a program without slopes compiles."""
 
 
 class Deviances(NamedTuple):
@@ -30,7 +34,15 @@ def _deviances_by_numpy(form: Form, arrays: Any, values: np.ndarray) -> Deviance
     return None if found is None else Deviances(found.deviance)
 
 
-@partial(kept, at_first=_deviances_by_numpy)
+def _share_of_deviances(form: Form, arrays: Any, values: np.ndarray) -> float:
+    return _DEVIANCES * len(values) * _numpy_share(form, arrays)
+
+
+def _numpy_share(form: Form, arrays: Any) -> float:
+    return form.numpy_share(arrays) if isinstance(form, Elementary) else np.inf
+
+
+@partial(kept, at_first=_deviances_by_numpy, share=_share_of_deviances)
 def deviances(form: Form, arrays: Any, values: Any) -> Deviances:
     """Deviance of one view at candidates `values` (candidates, its parameters)."""
     return Deviances(jax.vmap(lambda each: form.explain(arrays, each).deviance)(values))
@@ -163,13 +175,10 @@ _STEP = 2e-6
 
 def _equations_by_numpy(
     static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: np.ndarray, count: Any
-) -> Evaluated | None:
-    """The equations of `equations` with slopes by differences, where a compilation takes longer."""
+) -> Evaluated:
+    """The equations of `equations` with slopes by differences."""
     (coordinates, looks), _ = static
-    forms = [form for form, _ in looks if isinstance(form, Elementary)]
-    pairs = zip(forms, arrays, strict=False)
-    if len(forms) < len(looks) or not all(form.compiles_slowly(own) for form, own in pairs):
-        return None
+    forms: Any = [form for form, _ in looks]
     size, at = units.shape[1], units[: int(count)]
 
     def residuals(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -195,7 +204,15 @@ def _equations_by_numpy(
     )
 
 
-@partial(kept, at_first=_equations_by_numpy, uncompiled=DIFFERENCED)
+def _share_of_equations(
+    static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: np.ndarray, count: Any
+) -> float:
+    (_, looks), _ = static
+    each = sum(_numpy_share(form, own) for (form, _), own in zip(looks, arrays, strict=True))
+    return int(count) * evaluations(units.shape[1]) * each
+
+
+@partial(kept, at_first=_equations_by_numpy, share=_share_of_equations)
 def equations(
     static: tuple[Static, int], arrays: tuple[Any, ...], box: Box, units: Any, count: Any
 ) -> Evaluated:

@@ -7,7 +7,7 @@ size, are independent enough; the few other fits are solved from their rows, by 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,8 +90,8 @@ def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
 
 
-def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Product of a matrix and a vector of each fit."""
+def times(matrices: Any, vectors: Any) -> Any:
+    """Products (..., rows) of matrices (..., rows, columns) and vectors (..., columns), NumPy's or JAX's."""
     return (matrices @ vectors[..., None])[..., 0]
 
 

@@ -1,10 +1,10 @@
 """Small positive definite systems, solved inside compiled loops."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from pellicle.optics.pair import fori_loop, namespace
+from pellicle.fitting.normal_equations import times
+from pellicle.optics.pair import fori_loop, namespace, while_loop
 
 
 def solve_positive(matrix, b, least=0.0):
@@ -44,68 +44,73 @@ def solve_positive(matrix, b, least=0.0):
 
 
 def nonnegative(matrix, b, bounded, slack: float, free=None):
-    """Minimise ½ xᵀ `matrix` x − bᵀ x with x ≥ 0 where `bounded`, for a positive definite matrix.
+    """Minimise ½ xᵀ `matrix` x − bᵀ x with x ≥ 0 where `bounded`, for positive definite matrices.
 
     Block principal pivoting: all variables that violate their sign or that of their slope change sides at
     once; where that no longer reduces their number, only the last of them, which ends in any case. Most
     problems take one or two rounds, however many variables are bounded.
 
-    **Arguments:** `matrix` (n, n); `b` (n,); `bounded` (n,) booleans; `slack`, by which a variable may be
-    negative before it counts as violating; `free`, the variables that are not at zero at first, all if None.
+    **Arguments:** `matrix` (..., n, n); `b` (..., n); `bounded` (n,) booleans; `slack`, by which a variable
+    may be negative before it counts as violating; `free` (..., n), the variables that are not at zero at
+    first, all if None. Arrays of NumPy or of JAX.
 
     **Returns:** the inverse of the matrix of the free variables, with zeros for those held at zero, and x.
 
     **Source:** J. Kim and H. Park, SIAM J. Sci. Comput. 33, 3261 (2011).
     """
-    n, position = len(b), jnp.arange(len(b))
+    xp, n = namespace(matrix, b), b.shape[-1]
+    position = np.arange(n)
 
     def solved(free):
         inverse = _inverse(matrix, free)
-        x = inverse @ b
-        return inverse, x + inverse @ (b - matrix @ x)
+        x = times(inverse, b)
+        return inverse, x + times(inverse, b - times(matrix, x))
 
     def violating(free, x):
-        slope = matrix @ x - b
-        rounding = 64 * jnp.finfo(x.dtype).eps * (jnp.abs(matrix) @ jnp.abs(x) + jnp.abs(b))
-        return bounded & jnp.where(free, x < -slack, slope < -rounding)
+        slope = times(matrix, x) - b
+        rounding = 64 * np.finfo(x.dtype).eps * (times(xp.abs(matrix), xp.abs(x)) + xp.abs(b))
+        return bounded & xp.where(free, x < -slack, slope < -rounding)
 
     def unfinished(state):
         *_, count, rounds = state
-        return (count > 0) & (rounds < 8 * n)
+        return xp.any(count > 0) & (rounds < 8 * n)
 
     def exchange(state):
         free, _, _, fewest, patience, _, rounds = state
         inverse, x = solved(free)
         wrong = violating(free, x)
-        count = jnp.sum(wrong)
-        patience = jnp.where(count < fewest, 3, patience - 1)
-        last = position == jnp.max(jnp.where(wrong, position, -1))
-        free = free ^ (wrong & (last | (patience > 0)))
-        return free, inverse, x, jnp.minimum(count, fewest), patience, count, rounds + 1
+        count = xp.sum(wrong, axis=-1)
+        patience = xp.where(count < fewest, 3, patience - 1)
+        last = position == xp.max(xp.where(wrong, position, -1), axis=-1, keepdims=True)
+        free = free ^ (wrong & (last | (patience[..., None] > 0)))
+        return free, inverse, x, xp.minimum(count, fewest), patience, count, rounds + 1
 
-    free = jnp.ones(n, bool) if free is None else free
+    free = xp.ones(b.shape, bool) if free is None else free
     if not any(bounded):
         return solved(free)
-    start = (free, jnp.zeros_like(matrix), jnp.zeros_like(b), n + 1, 3, n, 0)
-    _, inverse, x, *_ = jax.lax.while_loop(unfinished, exchange, start)
+    many = xp.full(b.shape[:-1], n)
+    start = (free, xp.zeros_like(matrix), xp.zeros_like(b), many + 1, xp.full_like(many, 3), many, 0)
+    _, inverse, x, *_ = while_loop(unfinished, exchange, start)
     return inverse, x
 
 
 def _inverse(matrix, free):
     """Inverse of the rows and columns of `matrix` that are `free`, zero elsewhere, by the sweep operator."""
-    size = jax.lax.rsqrt(jnp.diagonal(matrix))
-    scaled = matrix * size * size[:, None]
-    position, tiny = jnp.arange(len(scaled)), jnp.finfo(scaled.dtype).tiny
+    xp, n = namespace(matrix, free), matrix.shape[-1]
+    size = 1 / xp.sqrt(xp.diagonal(matrix, axis1=-2, axis2=-1))
+    sizes = size[..., None] * size[..., None, :]
+    position, tiny = np.arange(n), np.finfo(matrix.dtype).tiny
 
     def sweep(k, scaled):
         row, column = position[:, None] == k, position == k
-        across = jnp.sum(jnp.where(row, scaled, 0.0), axis=0)
-        inverse = 1 / jnp.maximum(jnp.sum(jnp.where(column, across, 0.0)), tiny)
+        across = xp.sum(xp.where(row, scaled, 0.0), axis=-2)
+        pivot = xp.sum(xp.where(column, across, 0.0), axis=-1, keepdims=True)
+        inverse = 1 / xp.maximum(pivot, tiny)
         ratio = across * inverse
-        swept = scaled - across[:, None] * ratio
-        swept = jnp.where(row, ratio, jnp.where(column, ratio[:, None], swept))
-        swept = jnp.where(row & column, -inverse, swept)
-        return jnp.where(jnp.any(free & column), swept, scaled)
+        swept = scaled - across[..., None] * ratio[..., None, :]
+        swept = xp.where(row, ratio[..., None, :], xp.where(column, ratio[..., None], swept))
+        swept = xp.where(row & column, -inverse[..., None], swept)
+        return xp.where(xp.any(free & column, axis=-1)[..., None, None], swept, scaled)
 
-    swept = jax.lax.fori_loop(0, len(scaled), sweep, scaled)
-    return jnp.where(free & free[:, None], -swept * size * size[:, None], 0.0)
+    swept = fori_loop(0, n, sweep, matrix * sizes)
+    return xp.where(free[..., None] & free[..., None, :], -swept * sizes, 0.0)

@@ -78,8 +78,9 @@ class Blocked(Hashable, Protocol):
 class Elementary(Hashable, Protocol):
     """A form that NumPy evaluates, where its plan allows it: nothing is then compiled."""
 
-    def compiles_slowly(self, arrays: Any, /) -> bool:
-        """True where NumPy can, and slopes by differences cost less than the compilation of a program."""
+    def numpy_share(self, arrays: Any, /) -> float:
+        """Time of one candidate by NumPy, as a share of the compilation of a program of slopes; infinite
+        where NumPy cannot."""
         ...
 
     def explained(self, arrays: Any, values: np.ndarray, /) -> Explained | None:

@@ -22,21 +22,21 @@ def is_elementary(plan: Plan) -> bool:
     return plan.reference is None and not (plan.on("orders") or plan.on("gradient"))
 
 
-def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> list[np.ndarray]:
-    """Signals of an elementary plan, as of `build`, with the free numbers of the scene at `candidates`
-    (candidates, numbers), as many side by side as have `_VALUES` values."""
+def by_numpy(plan: Plan, scene: Scene, candidates: np.ndarray) -> np.ndarray:
+    """Signals (candidates, values) of an elementary plan, as of `build`, with the free numbers of the scene
+    at `candidates` (candidates, numbers), as many side by side as have `_VALUES` values."""
     # means over a graded medium, and the rays of a ring, have an axis of their own
     own_axis = any(isinstance(layer, Layer) and isinstance(layer.material, Graded) for layer in scene.layers)
     own_axis |= plan.on("angle-spread") and plan.row("anisotropy").count >= GENERAL
     most = 1 if own_axis else max(1, _VALUES // np.size(scene.light.wavelength))
     if len(candidates) > most:
         parts = (candidates[first : first + most] for first in range(0, len(candidates), most))
-        return [signal for part in parts for signal in by_numpy(plan, scene, part)]
+        return np.concatenate([by_numpy(plan, scene, part) for part in parts])
     columns = candidates[0] if len(candidates) == 1 else np.transpose(candidates)[:, :, None]
     numbers = jax.tree.map(np.asarray, insert(scene, [*columns]))
     each, kind = np.empty((len(candidates), 1)), plan.kind
     with np.errstate(all="ignore"):  # a candidate without a signal has NaN
         _, *rows = np.broadcast_arrays(each, *signal_rows(plan)(numbers))
     if not kind.ellipsometric:
-        return [np.asarray(kind.of_power(power)) for power in rows[0]]
-    return [*np.stack(rows, axis=-1).reshape(len(candidates), -1)]
+        return np.asarray(kind.of_power(rows[0]))
+    return np.stack(rows, axis=-1).reshape(len(candidates), -1)

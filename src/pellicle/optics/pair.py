@@ -51,6 +51,15 @@ def fori_loop(lower: int, upper: int, step: Callable[[Any, Any], Any], state: An
     return state
 
 
+def while_loop(test: Callable[[Any], Any], step: Callable[[Any], Any], state: Any) -> Any:
+    """`jax.lax.while_loop`, or a loop in Python where the state is NumPy's."""
+    if namespace(state) is not np:
+        return jax.lax.while_loop(test, step, state)
+    while test(state):
+        state = step(state)
+    return state
+
+
 def cond(test: Any, yes: Callable[[Any], Any], no: Callable[[Any], Any], state: Any) -> Any:
     """`jax.lax.cond`, or a branch of Python where the test is NumPy's."""
     if namespace(test) is not np:

@@ -21,7 +21,6 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import lru_cache, wraps
-from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_type_hints
 
@@ -149,9 +148,14 @@ class _Places(NamedTuple):
         return jax.tree_util.tree_unflatten(self.structure, [arrays[row] for row in self.order])
 
 
-UNCOMPILED = 32
-"""Calls of a program that `kept` leaves to the same formulas without a program. Compilation takes as long as
-20 to 60 of them (`benchmarks/cold_start.py`)."""
+_LARGE = 0.125
+"""Share of a compilation that a single call without a program takes at most: a fit makes some ten of them."""
+
+
+def usual_share(*_: Any) -> float:
+    """Share of a compilation that a call takes without a program: a third to a 60th
+    (`benchmarks/cold_start.py`)."""
+    return 1 / 32
 
 
 _at_once = ContextVar("at_once", default=False)
@@ -172,14 +176,16 @@ def kept(
     *,
     calls: Calls = "some",
     at_first: Program | None = None,
-    uncompiled: int = UNCOMPILED,
+    share: Program = usual_share,
 ) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 
     `function(plan, *pytrees)` must be pure and return a named tuple of arrays; `plan` is hashable, and
     its `repr` says all that the program depends on. The arrays are NumPy's. With many `calls` it is compiled
     to run fast, with few in a short time. `at_first`, of the same arguments and results, takes the first
-    `uncompiled` calls of a program that is not kept yet: it returns None where it cannot.
+    calls of a program that is not kept yet, or returns None where it cannot. The `share` of such a call is
+    its time in units of the compilation's: programs are compiled where the shares of all calls exceed 1, or
+    that of one is large.
     """
 
     @lru_cache(maxsize=1)
@@ -202,7 +208,7 @@ def kept(
         shapes = tuple((np.shape(x), _dtype(x)) for x in own.values())
         # JAX can cache in a cloud, too
         program = function, calls, plan, places, shapes, None if "://" in str(folder) else folder
-        if at_first is not None and _is_new(program, uncompiled):
+        if at_first is not None and _is_new(program, share(plan, *arguments)):
             result = at_first(plan, *arguments)
             if result is not None:
                 return result
@@ -257,15 +263,19 @@ def _place(
     return Path(folder) / "programs" / key.hex(), key
 
 
-def _is_new(program: tuple, uncompiled: int) -> bool:
-    """True at the first `uncompiled` calls of a program that no earlier process has kept."""
-    called = next(_calls_of(*program))
-    return not _at_once.get() and called < uncompiled and not (program[-1] and _place(*program)[0].exists())
+def _is_new(program: tuple, share: float) -> bool:
+    """True while the shares of the calls are below that of a compilation, of a program that no earlier
+    process has kept."""
+    spent = _spent_on(*program)
+    spent[0] += share
+    few = share <= _LARGE and spent[0] <= 1
+    return few and not _at_once.get() and not (program[-1] and _place(*program)[0].exists())
 
 
 @lru_cache(maxsize=256)
-def _calls_of(*program: Any) -> Iterator[int]:
-    return count()
+def _spent_on(*program: Any) -> list[float]:
+    """Sum of the shares of the calls of a program, in a list of one number that is changed."""
+    return [0.0]
 
 
 def _traced(path: Path, flat: Program, inputs: Sequence[jax.ShapeDtypeStruct]) -> Any:

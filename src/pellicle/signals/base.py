@@ -333,7 +333,7 @@ class Signal(ABC):
 
     @abstractmethod
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
-        """Return the channels (points · channels,) of simulated rows (points, rows) (traced)."""
+        """Return the channels (..., points, channels) of simulated rows (..., points, rows)."""
 
     def groups(self, count: int, framed: bool) -> tuple[ChannelGroup, ...]:
         """Return the groups of `count` channels, in a frame or not, that have a noise of their own."""

@@ -129,7 +129,7 @@ class Generalised(Ratios):
         positions = [CHANNELS * place + i for place in self.positions for i in range(CHANNELS)]
         rows = self.waves.columns(rows, positions)
         rows = self.waves.on_spheres(rows) if depolarises else rows
-        return self.waves.in_frame(frame, rows).reshape(-1)
+        return self.waves.in_frame(frame, rows)
 
     def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
         ratios = len(self.parts)

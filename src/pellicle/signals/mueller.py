@@ -84,7 +84,7 @@ class Mueller(Signal):
         return Channels(data.values, np.full(len(data), ROUGH) if data.sigma is None else data.sigma)
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
-        return self.waves.columns(rows, self.positions).reshape(-1)
+        return self.waves.columns(rows, self.positions)
 
     def offsets(self, columns: np.ndarray, allowed: Any) -> list[Offset]:
         """An offset of each element, and a depolarisation that mixes the phases of s and p: elements of the

@@ -46,7 +46,7 @@ class OneColumn(Signal):
         return Channels(data.values, known)
 
     def compared(self, rows: Any, frame: Any, depolarises: bool) -> Any:
-        return rows.reshape(-1)
+        return rows
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,7 @@ class PsiDelta(Ratios):
         elif not self.folded and depolarises:
             rows = self.waves.on_spheres(rows)
         rows = self.waves.in_frame(frame, rows)
-        return rows[:, : self.measured + self.depolarisation].reshape(-1)
+        return rows[..., : self.measured + self.depolarisation]
 
     def groups(self, count: int, framed: bool) -> tuple[base.ChannelGroup, ...]:
         every = tuple(range(count))

@@ -19,31 +19,36 @@ Matrix = Sequence[Sequence[Any]]
 
 
 def columns(rows: Any, chosen: Sequence[int]) -> Any:
-    """Some columns of simulated rows (points, rows)."""
-    return stack_rows([rows[:, i] for i in chosen]).T
+    """Some columns of simulated rows (..., points, rows)."""
+    return _side_by_side([rows[..., i] for i in chosen])
+
+
+def _side_by_side(columns: Sequence[Any]) -> Any:
+    """Columns (..., points) along a last axis."""
+    return namespace(columns).moveaxis(stack_rows(columns), 0, -1)
 
 
 def in_frame(frame: Any, rows: Any) -> Any:
-    """Components of rows (points, channels) in a frame (points, channels, channels), if there is one."""
-    return rows if frame is None else namespace(frame, rows).einsum("pij,pj->pi", frame, rows)
+    """Components of rows (..., points, channels) in a frame (points, channels, channels), if there is one."""
+    return rows if frame is None else namespace(frame, rows).einsum("pij,...pj->...pi", frame, rows)
 
 
-def lengths(rows: Any, axis: int = 1, keep: bool = True) -> tuple[Any, Any]:
+def lengths(rows: Any, keep: bool = True) -> tuple[Any, Any]:
     """Squared length of N, C, S and its inverse root, 0 where nothing is reflected."""
-    square = (rows**2).sum(axis=axis, keepdims=keep)
+    square = (rows**2).sum(axis=-1, keepdims=keep)
     return square, where(square > 0, inverse_root(where(square > 0, square, 1.0)), 0.0)
 
 
 def with_depolarisation(rows: Any, count: int) -> Any:
-    """The first `count` of N, C, S on their sphere, and 1 − N² − C² − S²."""
+    """The first `count` of N, C, S (..., points, 3) on their sphere, and 1 − N² − C² − S²."""
     square, inverse = lengths(rows, keep=False)
-    return stack_rows([*(rows[:, i] * inverse for i in range(count)), 1 - square]).T
+    return _side_by_side([*(rows[..., i] * inverse for i in range(count)), 1 - square])
 
 
 def on_spheres(rows: Any) -> Any:
-    """N, C, S side by side (points, 3 · ratios), each brought to its sphere."""
-    vectors = rows.reshape(len(rows), -1, 3)
-    return (vectors * lengths(vectors, axis=-1)[1]).reshape(rows.shape)
+    """N, C, S side by side (..., points, 3 · ratios), each brought to its sphere."""
+    vectors = rows.reshape(*rows.shape[:-1], -1, 3)
+    return (vectors * lengths(vectors)[1]).reshape(rows.shape)
 
 
 def stokes_of_jones(x: Number, y: Number) -> list[Any]:

@@ -147,7 +147,7 @@ def test_some_ratios_alone():
     one = replace(every, values=every.values[:, 1:], ratios=("aps", "asp"), delta=every.delta[:, 1:])
     target = measured(one, scene())
     rows = np.arange(18.0).reshape(2, 9)
-    np.testing.assert_array_equal(target.signal.compared(rows, None, False), rows[:, 3:].ravel())
+    np.testing.assert_array_equal(target.signal.compared(rows, None, False), rows[:, 3:])
 
 
 def test_offsets_are_changes_of_psi_and_delta():

@@ -10,15 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import ScalarLike
 
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.normal_equations import times
 from pellicle.fitting.positive_definite import nonnegative
-from pellicle.optics.pair import namespace
+from pellicle.optics.pair import namespace, stop_gradient
 from pellicle.scene.free import remembered
 from pellicle.scene.instrument import Drift, Instrument
 
@@ -73,7 +71,7 @@ class Solved(NamedTuple):
 
 def chebyshev(position, degree: int) -> list:
     """T₀ ... T_degree at `position` in −1..1."""
-    terms = [jnp.ones_like(position), position]
+    terms = [namespace(position).ones_like(position), position]
     while len(terms) <= degree:
         terms.append(2 * position * terms[-1] - terms[-2])
     return terms[: degree + 1]
@@ -82,7 +80,7 @@ def chebyshev(position, degree: int) -> list:
 def solve(signal, data: Data, instrument: Instrument) -> Solved:
     """The best scale and offset for a simulated signal, and the deviance.
 
-    Signals of NumPy may have leading axes (...) where scale and offset are known.
+    Signals (..., points) of NumPy or of JAX may have leading axes.
     """
     xp = namespace(signal)
     weight = data.weight * xp.sqrt(data.independent_fraction)
@@ -100,32 +98,39 @@ def solve(signal, data: Data, instrument: Instrument) -> Solved:
     # sums over the points are products with terms and pairs of them that all candidates share
     square = weight * weight
     on_signal = square * signal
-    across = _sums(on_signal, gains.terms, shifts.terms)
-    gram = jnp.block(
-        [
-            [_sums(on_signal * signal, gains.terms, gains.terms), across],
-            [across.T, _sums(square, shifts.terms, shifts.terms)],
-        ]
+    gram = _in_blocks(
+        _sums(on_signal * signal, gains.terms, gains.terms),
+        _sums(on_signal, gains.terms, shifts.terms),
+        _sums(square * one, shifts.terms, shifts.terms),
     )
-    projected = jnp.concatenate([gains.terms @ (on_signal * rest), shifts.terms @ (square * rest)])
+    projected = xp.concatenate([(on_signal * rest) @ gains.terms.T, (square * rest) @ shifts.terms.T], -1)
     # the plain scale, which a single free number would have
-    plain = jnp.sum(on_signal * data.values) / (jnp.sum(on_signal * signal) + 1e-30)
-    unit = jnp.concatenate([jnp.full(first, plain), jnp.full(len(shifts.mean), data.level)])
+    plain = xp.sum(on_signal * data.values, axis=-1) / (xp.sum(on_signal * signal, axis=-1) + 1e-30)
+    sizes = xp.stack(xp.broadcast_arrays(plain, data.level), axis=-1)
+    unit = sizes.repeat(np.array([first, len(shifts.mean)]), axis=-1)
     mean, sd = np.concatenate([gains.mean, shifts.mean]), np.concatenate([gains.sd, shifts.sd])
     coefficients, log_determinant = _project(
-        gram * unit * unit[:, None], projected * unit, mean, sd, (first, len(shifts.mean))
+        gram * unit[..., None] * unit[..., None, :], projected * unit, mean, sd, (first, len(shifts.mean))
     )
     in_units = coefficients * unit
-    gain = gains.known + in_units[:first] @ gains.terms
-    shift = shifts.known + in_units[first:] @ shifts.terms
+    gain = gains.known + in_units[..., :first] @ gains.terms
+    shift = shifts.known + in_units[..., first:] @ shifts.terms
     model = gain * signal + shift
-    residual = jnp.concatenate([weight * (data.values - model), (coefficients - mean) / sd])
-    return Solved(model, residual, gain, shift, log_determinant + jnp.sum(residual**2))
+    residual = xp.concatenate([weight * (data.values - model), (coefficients - mean) / sd], axis=-1)
+    return Solved(model, residual, gain, shift, log_determinant + xp.sum(residual**2, axis=-1))
 
 
 def _sums(weight, left, right):
-    """Σ weight · left · right over the points, for all terms (terms, points) of both sides."""
-    return jnp.einsum("p,ijp->ij", weight, left[:, None] * right)
+    """Σ weight · left · right over the points (..., points), for all terms (terms, points) of both sides."""
+    pairs = (left[:, None] * right).reshape(-1, left.shape[-1])
+    return (weight @ pairs.T).reshape(*weight.shape[:-1], len(left), len(right))
+
+
+def _in_blocks(upper, across, lower):
+    """The symmetric matrix (..., n, n) of two blocks on its diagonal and that to the right of the first."""
+    xp = namespace(across)
+    rows = xp.concatenate([upper, across], -1), xp.concatenate([across.swapaxes(-1, -2), lower], -1)
+    return xp.concatenate(rows, -2)
 
 
 class _Series(NamedTuple):
@@ -143,7 +148,8 @@ def _series(
     """A nuisance as Chebyshev terms, or as a known number without terms."""
     if not isinstance(number, Drift):
         return _Series(np.zeros((0, np.shape(data.position)[-1])), np.zeros(0), np.zeros(0), number)
-    return _Series(jnp.stack(chebyshev(data.position, number.degree)), *prior(number), 0.0)
+    terms = namespace(data.position).stack(chebyshev(data.position, number.degree))
+    return _Series(terms, *prior(number), 0.0)
 
 
 def scale_prior(drift: Drift) -> tuple[np.ndarray, np.ndarray]:
@@ -207,11 +213,11 @@ def _project(gram, projected, mean: np.ndarray, sd: np.ndarray, counts: tuple[in
     """
     matrix, target = gram + np.diag(1 / sd**2), projected + mean / sd**2
     degrees = tuple(count - 1 for count in counts if count)
-    inverse, start = nonnegative_curves(*jax.lax.stop_gradient((matrix, target)), degrees, _SLACK)
+    inverse, start = nonnegative_curves(stop_gradient(matrix), stop_gradient(target), degrees, _SLACK)
     # adds nothing but a rounding error, and carries the implicit derivative A⁻¹(db − dA x)
-    target = target - jax.lax.stop_gradient(target) - (matrix - jax.lax.stop_gradient(matrix)) @ start
-    coefficients = start + inverse @ target
-    _, log_determinant = jnp.linalg.slogdet(matrix)
+    target = target - stop_gradient(target) - times(matrix - stop_gradient(matrix), start)
+    coefficients = start + times(inverse, target)
+    _, log_determinant = namespace(matrix).linalg.slogdet(matrix)
     return coefficients, log_determinant + 2 * float(np.sum(np.log(sd)))
 
 
@@ -221,15 +227,16 @@ _RIDGE = 1e-9
 
 
 def nonnegative_curves(matrix, b, degrees: tuple[int, ...], slack: float):
-    """Minimise ½ xᵀ `matrix` x − bᵀ x, where x are Chebyshev coefficients of curves that are not negative.
+    """Minimise ½ xᵀ `matrix` x − bᵀ x for Chebyshev coefficients x of curves that are not negative.
 
     A curve that bends is held at `_POSITIONS` positions from end to end. So no curve that is nowhere negative
     is excluded; between two positions a parabola may be below zero by an eighth of its coefficient of T₂.
 
-    **Arguments:** `matrix` (n, n), positive definite; `b` (n,); `degrees` of the curves, which have n
-    coefficients together; `slack`, by which a curve may be negative before it is held.
+    **Arguments:** `matrix` (..., n, n), positive definite; `b` (..., n); `degrees` of the curves, which have
+    n coefficients together; `slack`, by which a curve may be negative before it is held. Arrays of NumPy or
+    of JAX.
 
-    **Returns:** the derivative of x by b (n, n), and x (n,).
+    **Returns:** the derivative of x by b (..., n, n), and x (..., n).
 
     **Source:** J. Nocedal and S. Wright, Numerical optimization (2006), section 16.4 (the dual problem).
     """
@@ -241,11 +248,13 @@ def nonnegative_curves(matrix, b, degrees: tuple[int, ...], slack: float):
         own_rows.append(np.pad(own, ((0, 0), (first, count - first - degree - 1))))
         first += degree + 1
     rows = np.vstack(own_rows)
-    inverse, unbounded = nonnegative(matrix, b, np.zeros(len(b), bool), slack)
-    across, values = rows @ inverse, rows @ unbounded
+    xp = namespace(matrix)
+    inverse, unbounded = nonnegative(matrix, b, np.zeros(b.shape[-1], bool), slack)
+    across, values = rows @ inverse, times(rows, unbounded)
     gram = across @ rows.T
-    gram = gram + jnp.diag(_RIDGE * jnp.diagonal(gram))
+    gram = gram + _RIDGE * np.eye(len(rows)) * gram
     held = values < -slack
-    missing = jnp.where(held, -values, -jnp.maximum(values, 0.0))
+    missing = xp.where(held, -values, -xp.maximum(values, 0.0))
     reduced, force = nonnegative(gram, missing, np.ones(len(rows), bool), 0.0, held)
-    return inverse - across.T @ reduced @ across, unbounded + across.T @ force
+    back = across.swapaxes(-1, -2)
+    return inverse - back @ reduced @ across, unbounded + times(back, force)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pellicle.effects.differences import largest_difference, signals
 from pellicle.effects.film_plan import full_plan
-from pellicle.fitting.central_differences import DIFFERENCED
+from pellicle.fitting.central_differences import evaluations
 from pellicle.fitting.coordinates import Array
 from pellicle.fitting.film import nuisance
 from pellicle.fitting.film.nuisance import Coefficient, Data
@@ -22,13 +22,18 @@ from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import Linearised, linearised, linearised_by_numpy
 from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.film_signal import build, depolarises
-from pellicle.forward_model.plan import GENERAL, Plan
+from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
 from pellicle.scene.free import insert
-from pellicle.scene.instrument import Drift
 from pellicle.signals.base import Signal
+
+_POINT = 4e-7
+"""Time of a wavelength by NumPy as a share of the compilation of a program of slopes: 0.1 to 0.4 µs of 0.5 to
+1.2 s for one or two layers, 1.3 µs of 7 s for a tilted axis."""
+_QUICKER = 3
+"""The program of a local model is called once or twice in a fit, and compiles so much faster than others."""
 
 
 @dataclass(frozen=True)
@@ -46,32 +51,32 @@ class SpectrumForm:
         return self.compared(build(self.plan)(scene), scene, data)
 
     def compared(self, signal: Any, scene: Scene, data: Data) -> Any:
-        """The measured channels (points · channels,) of a signal of the plan."""
-        rows = signal.reshape(scene.light.wavelength.size, -1)
-        return self.signal.compared(rows, data.frame, depolarises(self.plan))
+        """The measured channels (..., points · channels) of signals (..., values) of the plan."""
+        rows = signal.reshape(*signal.shape[:-1], scene.light.wavelength.size, -1)
+        seen = self.signal.compared(rows, data.frame, depolarises(self.plan))
+        return seen.reshape(*signal.shape[:-1], -1)
 
     def signals(self, scene: Scene, data: Data, values: np.ndarray) -> np.ndarray | None:
         """The measured channels (candidates, points · channels) of candidates `values` (candidates, free
         numbers) by NumPy; None for a plan that it does not evaluate."""
         if not is_elementary(self.plan):
             return None
-        return np.stack([self.compared(each, scene, data) for each in by_numpy(self.plan, scene, values)])
+        return self.compared(by_numpy(self.plan, scene, values), scene, data)
 
-    def compiles_slowly(self, arrays: tuple[Scene, Data], /) -> bool:
-        """True for 4×4 matrices, whose slopes take 3 to 10 s to compile, where NumPy evaluates them."""
-        return self.plan.row("anisotropy").count >= GENERAL and self._is_quick(arrays[0])
-
-    def _is_quick(self, scene: Scene) -> bool:
-        """True where NumPy evaluates a scene: not scales and offsets that are free, and not averages, which
-        cost it more than a compilation."""
-        averaged = self.plan.row("coherence").count or self.plan.on("angle-spread")
-        free = isinstance(scene.instrument.scale, Drift) or isinstance(scene.instrument.offset, Drift)
-        return is_elementary(self.plan) and not (averaged or free)
+    def numpy_share(self, arrays: tuple[Scene, Data], /) -> float:
+        """Time of one candidate by NumPy, as a share of the compilation of a program of slopes."""
+        if not is_elementary(self.plan):
+            return np.inf
+        scene, _ = arrays
+        nodes = max(len(scene.layers) / 2, 1) * max(self.plan.row("coherence").count, 1)
+        if self.plan.on("angle-spread"):
+            nodes *= self.plan.row("angle-spread").count
+        return _POINT * nodes * np.size(scene.light.wavelength)
 
     def explained(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> Explained | None:
-        """The spectrum at candidates by NumPy, where it is quick."""
+        """The spectrum at candidates by NumPy; None for a plan that it does not evaluate."""
         scene, data = arrays
-        signals = self.signals(scene, data, values) if self._is_quick(scene) else None
+        signals = self.signals(scene, data, values)
         if signals is None:
             return None
         solved = nuisance.solve(signals, data, scene.instrument)
@@ -102,13 +107,15 @@ class Local(NamedTuple):
     layer_slope: Array  # their derivatives, (2, points, parameters)
 
 
-def _local_by_numpy(form: SpectrumForm, scene: Scene, data: Data, values: np.ndarray) -> Local | None:
-    if not form.compiles_slowly((scene, data)):
-        return None
+def _local_by_numpy(form: SpectrumForm, scene: Scene, data: Data, values: np.ndarray) -> Local:
     return _local(linearised_by_numpy(form, scene, data, values), data, scene)
 
 
-@partial(kept, calls="few", at_first=_local_by_numpy, uncompiled=DIFFERENCED)
+def _share_of_local(form: SpectrumForm, scene: Scene, data: Data, values: np.ndarray) -> float:
+    return _QUICKER * evaluations(len(values)) * form.numpy_share((scene, data))
+
+
+@partial(kept, calls="few", at_first=_local_by_numpy, share=_share_of_local)
 def local(form: SpectrumForm, scene: Scene, data: Data, values: Any) -> Local:
     """Signal, its Jacobian, and the layer's index at `values` (parameters,)."""
     return _local(linearised(form, scene, data, values), data, scene)
