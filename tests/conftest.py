@@ -124,6 +124,20 @@ def load_script():
     return load_script
 
 
+@pytest.fixture
+def compiled():
+    """List that grows by an event for each operation that JAX traces, lowers or compiles."""
+    events = []
+
+    def listen(event, seconds, **_):
+        if event.startswith("/jax/core/compile/"):
+            events.append(event)
+
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    yield events
+    jax.monitoring.unregister_event_duration_listener(listen)
+
+
 @pytest.fixture(scope="session")
 def modules_of():
     """Return a context of the modules of a folder that is no package, by their names."""

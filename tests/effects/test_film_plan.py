@@ -129,6 +129,15 @@ def test_what_must_stay_stays():
     assert pl.plan(OVER_GOLD, 1e-2, keep=["precision", "opaque"]).left_out == ()
 
 
+def test_the_signal_without_dispersion_compiles_nothing(compiled):
+    thing = scene("SiO2", "Si")
+    with jax.enable_x64(True):
+        [flat] = alternatives("dispersion", thing)
+        exact, other = (signals(p, tabulated(thing), design(thing), build) for p in (full_plan(thing), flat))
+    assert 0 < largest_difference(exact, other, False) < 0.5
+    assert not compiled
+
+
 def test_single_precision_is_single_throughout():
     """But for scalars, whose type bends."""
     thing = scene(1.46 + 0.1j, instrument=pl.Instrument(bandwidth=3.0), angle=20.0)

@@ -26,7 +26,7 @@ from pellicle.dispersion.base import AbstractDispersion
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.differences import Evaluation, largest_difference
 from pellicle.forward_model.plan import Plan, Removal, Row
-from pellicle.optics.pair import parts, real
+from pellicle.optics.pair import namespace, parts, real
 from pellicle.scene.film import Scene
 from pellicle.scene.free import free_leaves, is_free
 from pellicle.scene.graded import Graded, each_medium
@@ -242,7 +242,7 @@ def _flat(material: AbstractDispersion, wavelength: Any) -> AbstractDispersion:
     if isinstance(material, Anisotropic):
         return material.with_media(lambda medium: _flat(medium, wavelength))
     middle = np.size(wavelength) // 2
-    re, im = (None if x is None else jnp.ravel(x)[middle] for x in parts(material.index(wavelength)))
+    re, im = (None if x is None else namespace(x).ravel(x)[middle] for x in parts(material.index(wavelength)))
     return Constant(0.0 if re is None else re, im)
 
 
