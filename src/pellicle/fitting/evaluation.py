@@ -17,10 +17,8 @@ from pellicle.programs.cache import kept
 
 CHUNK = 128
 """Candidates that one call of the compiled program takes."""
-
-
 _DEVIANCES = 2
-"""How much faster a program without slopes compiles."""
+"""Factor by which a program without slopes compiles faster."""
 
 
 class Deviances(NamedTuple):

@@ -1,4 +1,4 @@
-"""Small positive definite systems, solved inside compiled loops."""
+"""Small positive definite systems, solved side by side or inside compiled loops."""
 
 import jax
 import numpy as np
