@@ -102,8 +102,9 @@ class Coordinates(NamedTuple):
 
     def slope(self, box: Box, unit: np.ndarray) -> np.ndarray:
         """∂ values / ∂ unit at one point, (parameters, parameters)."""
-        if not any(self.log) and self.tilt is None:
-            return np.diag(box.upper - box.lower)
+        if self.tilt is None:
+            growth = np.where(self.log, self.values(box, unit), 1.0) if self.log else 1.0
+            return np.diag((box.upper - box.lower) * growth)
         return np.asarray(_slope(self, box, unit))
 
     def log_area(self, box: Box, unit: Any) -> Any:
