@@ -160,6 +160,13 @@ def test_the_time_of_numpy_grows_with_points_and_rays_and_ends_with_gradients():
 
     few, many = (share(plain, each) for each in data.values())
     assert 0 < few < many < share(cone, data[max(data)]) < np.inf
+    mirror = scene(
+        [pl.Layer("SiO2", FREE), pl.Group([pl.Layer("TiO2", 60.0), pl.Layer("SiO2", 90.0)], 20)], "Si"
+    )
+    assert share(mirror, data[min(data)]) > 15 * few
+    lens = pl.Instrument(numerical_aperture=0.4)
+    tilted, alone = (scene(pl.Layer(TILT, FREE), "Si", "R", **more) for more in ({"instrument": lens}, {}))
+    assert share(tilted, data[min(data)]) > 20 * share(alone, data[min(data)])
     assert share(OTHERS["gradient"], data[min(data)]) == np.inf
 
 

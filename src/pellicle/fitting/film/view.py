@@ -22,7 +22,7 @@ from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import Linearised, linearised, linearised_by_numpy
 from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
 from pellicle.forward_model.film_signal import build, depolarises
-from pellicle.forward_model.plan import Plan
+from pellicle.forward_model.plan import GENERAL, Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
@@ -68,9 +68,10 @@ class SpectrumForm:
         if not is_elementary(self.plan):
             return np.inf
         scene, _ = arrays
-        nodes = max(len(scene.layers) / 2, 1) * max(self.plan.row("coherence").count, 1)
-        if self.plan.on("angle-spread"):
-            nodes *= self.plan.row("angle-spread").count
+        bandwidth, cone = map(self.plan.row, ("coherence", "angle-spread"))
+        layers = sum(getattr(layer, "repeats", 1) for layer in scene.layers)
+        rays = cone.count * (cone.around if self.plan.row("anisotropy").count >= GENERAL else 1)
+        nodes = max(layers / 2, 1) * max(bandwidth.count, 1) * (rays if cone.on else 1)
         return _POINT * nodes * np.size(scene.light.wavelength)
 
     def explained(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> Explained | None:
