@@ -75,6 +75,12 @@ def test_the_most_decisive_measurement_is_first_and_in_the_verdict(plan):
     assert any(m.times == 2 for m in plan.measurements)
     assert plan.report().count("\n") > len(numbers)
     assert plan.not_tried == ()
+    # the best angle of a wider range is not that of the given one
+    assert {(m.signal, m.angle) for m in plan.measurements if m.wider} == {
+        ("R", 0.0),
+        ("R", 70.0),
+        ("psi-delta", 70.0),
+    }
 
 
 def test_error_of_a_thickness_by_noise_is_that_of_its_slope():

@@ -204,9 +204,10 @@ def _candidates(
             for polarised in (may.polarisations if signal == R and angle else POLARISATIONS[:1])
         ]
         yield from ((one, near) for one in every)
+        if wider:  # at each angle: which one is best depends on the range
+            plain = [one for one in every if one.polarisation == every[0].polarisation]
+            yield from ((replace(one, lower=far[0], upper=far[-1], wider=True), far) for one in plain)
         one = every[len(every) // 2 if signal == PSI_DELTA else 0] if every else None
-        if one and wider:
-            yield replace(one, lower=far[0], upper=far[-1], wider=True), far
         if one and thick:
             yield replace(one, times=_TWICE), near
 
