@@ -33,6 +33,24 @@ def test_samples_of_a_brdf_are_described(pellicle, write, tmp_path):
     pellicle("read", path, "--out", tmp_path / "out").refused(2, "--out writes spectra")
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "fault"),
+    [
+        (
+            "a.csv",
+            b"theta_i,phi_i,theta_o,phi_o,value\n30,0,30,180,1\n30,0,40,180,-1\n",
+            "line 3: value: -1 is",
+        ),
+        ("a.txt", b"#DIM 4 1\n#PARAM_IN SPHERICAL_TL_PL_TV_PV\n0 0 0 0 -1\n", "line 3: value: -1 is a BRDF"),
+        ("a.binary", np.array([90, 90, 180, 0], "<i4").tobytes(), "is cut short, 16 bytes"),
+        ("a.bsdf", b"tensor_file\0" + bytes([1, 0, 1, 0, 0, 0]), "is a damaged tensor file"),
+    ],
+)
+def test_faults_of_a_file_of_a_brdf_are_named(pellicle, tmp_path, name, content, fault):
+    (tmp_path / name).write_bytes(content)
+    pellicle("read", tmp_path / name).refused(3, fault)
+
+
 def test_noise_is_the_scatter_of_neighbours(pellicle, write):
     noise = np.random.default_rng(5).normal(0, 0.01, 2000)
     rows = [f"{400 + i / 10},{0.3 + 0.1 * np.sin(i / 300) + x}" for i, x in enumerate(noise)]

@@ -93,7 +93,7 @@ def _measurements(
     try:
         return _spectra(path, options)
     except ValueError as error:
-        if not options.given() and (samples := _samples(path)) is not None:
+        if not options.given() and (samples := _samples(path, error)) is not None:
             return [samples]
         if isinstance(error, UsageError) or not is_netcdf(Path(path)):
             raise
@@ -105,13 +105,17 @@ def _measurements(
         raise
 
 
-def _samples(path: str) -> BrdfSamples | None:
-    """The samples of a BRDF in a file; None where it has none."""
+def _samples(path: str, error: ValueError) -> BrdfSamples | None:
+    """The samples of a BRDF in a file that by this `error` is no spectrum; None if it is not of a BRDF."""
+    from pellicle.data.formats.merl import is_merl
     from pellicle.data.read_brdf import read_brdf_samples
+    from pellicle.data.tabular.text import read_bytes
 
     try:
         return read_brdf_samples(path)
-    except ValueError:
+    except ValueError:  # the fault of a file of a BRDF is what to mend, not that it is no spectrum
+        if "of a BRDF" in str(error) or is_merl(path) or b"#PARAM_IN" in read_bytes(path)[0]:
+            raise
         return None
 
 
