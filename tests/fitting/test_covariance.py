@@ -143,6 +143,16 @@ def test_correlated_channels_count_together():
     np.testing.assert_allclose(thrice.covariance, once.covariance, rtol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_errors_of_data_without_noise_are_finite(seed):
+    """Of simulated samples: they shrink with the residuals, below the rounding of the leverages."""
+    residual = np.random.default_rng(seed).standard_normal((40, 1))
+    bounds_alone = _scaled(DESIGN)._replace(jacobian=np.vstack([DESIGN, np.zeros((3, 3))]))
+    expected = 1e-10 * errors(bounds_alone, {0: residual}).stderr
+    found = errors(bounds_alone, {0: 1e-10 * residual}).stderr
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
 def test_z_under_uneven_noise_is_that_of_a_normal_distribution():
     """2000 data sets whose noise is ten times larger in the peak; with one noise for all, z of c is 1.4."""
     rng = np.random.default_rng(0)

@@ -144,15 +144,20 @@ def errors(scaled: Scaled, uneven: Mapping[int, np.ndarray] = MappingProxyType({
 
 def _by_scores(scaled: Scaled, uneven: Mapping[int, np.ndarray]) -> Errors:
     """The sandwich estimator: see the module's docstring."""
-    left, values, rows = np.linalg.svd(scaled.jacobian, full_matrices=False)
+    left, values, right = np.linalg.svd(scaled.jacobian, full_matrices=False)
     values = above_rounding(values, len(scaled.jacobian) - len(scaled.names))
-    spread = scaled.stretch @ (rows.T / values)
+    spread = scaled.stretch @ (right.T / values)
     plain = spread @ spread.T
-    middle, shares = np.eye(len(values)), np.zeros(len(spread))
+    even, shares = np.ones(len(left), bool), np.zeros(len(spread))
+    middle = np.zeros((len(values), len(values)))
     for first, residuals in uneven.items():
-        block = left[first : first + residuals.size].reshape(*residuals.shape, -1)
-        middle += _sum_of_squares(block, residuals) - np.einsum("rci,rcj->ij", block, block)
+        rows = slice(first, first + residuals.size)
+        even[rows] = False
+        block = left[rows].reshape(*residuals.shape, -1)
+        middle += _sum_of_squares(block, residuals)
         shares += np.sum(np.sum((block @ spread.T) ** 2, axis=1) ** 2, axis=0)
+    # added, not taken from 1, of which residuals without noise would leave rounding, also below zero
+    middle += left[even].T @ left[even]
     # a parameter that few points determine has an error of as few degrees of freedom
     wider = student(np.diag(plain) ** 2 / np.maximum(shares, 1e-300), 1.0)
     return Errors(scaled.names, spread @ middle @ spread.T * np.outer(wider, wider), plain)
