@@ -54,8 +54,9 @@ def linearised(form: Any, scene: Scene, data: Any, values: Any) -> Linearised:
     return Linearised(*reported, *jax.vmap(push, out_axes=-1)(jnp.eye(len(values))))
 
 
-_STEP = 1e-6
-"""Step of a difference, as a share of the number, or in its own unit below 1."""
+_STEP = 1e-7
+"""Step of a difference, as a share of the number, or in its own unit below 1: that of 25 µm turns a phase by
+1e-4 radians."""
 
 
 def linearised_by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Linearised:
