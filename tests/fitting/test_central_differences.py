@@ -96,8 +96,7 @@ def test_equations_and_local_models_are_those_of_the_programs(data):
 
 
 def film(thickness, index, scale):
-    free = {} if scale == 1.0 else {"scale": scale, "offset": scale}
-    instrument = pl.Instrument(**free)
+    instrument = pl.Instrument(scale=scale, offset=scale if scale == "free" else 0.0)
     return pl.Scene(pl.Layer(pl.dispersion.Cauchy(index, 4e3), thickness), "Si", instrument=instrument)
 
 
@@ -109,8 +108,10 @@ def test_the_first_fit_is_that_of_compiled_programs(kind, request):
     if kind == "tilted axis":
         sample, data = SCENE, request.getfixturevalue("data")
     elif kind == "25 µm":  # its signal bends within small steps
-        sample = film(pl.Free(20000, 30000), pl.Free(1.4, 1.6), 1.0)
-        data = pl.simulate(film(25000.0, 1.46, 1.0), np.linspace(420.0, 880.0, 320), noise=0.002, seed=2)
+        medium = pl.dispersion.Constant(pl.Free(1.4, 1.6))
+        sample = pl.Scene(pl.Layer(medium, pl.Free(20000, 30000)), "Si")
+        truth = pl.Scene(pl.Layer(1.5, 25000.0), "Si")
+        data = pl.simulate(truth, np.linspace(420.0, 880.0, 90), noise=0.002, seed=3)
     else:
         sample = film(pl.Free(100, 400), pl.Free(1.3, 1.8), "free")
         data = pl.simulate(film(240.0, 1.46, 1.0), NM, noise=0.002, seed=2)

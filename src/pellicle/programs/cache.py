@@ -150,6 +150,8 @@ class _Places(NamedTuple):
 
 _LARGE = 0.125
 """Share of a compilation that a single call without a program takes at most: a fit makes some ten of them."""
+_LEAST = 1 / 512
+"""Share of a compilation that a call without a program takes at least, however few its points."""
 
 
 def usual_share(*_: Any) -> float:
@@ -267,7 +269,7 @@ def _is_new(program: tuple, share: float) -> bool:
     """True while the shares of the calls are below that of a compilation, of a program that no earlier
     process has kept."""
     spent = _spent_on(*program)
-    spent[0] += share
+    spent[0] += max(share, _LEAST)
     few = share <= _LARGE and spent[0] <= 1
     return few and not _at_once.get() and not (program[-1] and _place(*program)[0].exists())
 

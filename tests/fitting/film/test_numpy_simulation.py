@@ -167,6 +167,9 @@ def test_the_time_of_numpy_grows_with_points_and_rays_and_ends_with_gradients():
     lens = pl.Instrument(numerical_aperture=0.4)
     tilted, alone = (scene(pl.Layer(TILT, FREE), "Si", "R", **more) for more in ({"instrument": lens}, {}))
     assert share(tilted, data[min(data)]) > 20 * share(alone, data[min(data)])
+    cody = pl.dispersion.CodyLorentz(pl.Free(50, 150), 4.0, 2.0, 1.5, 1.0, 1.0, 0.1)
+    slow = scene(pl.Layer(pl.dispersion.Oscillators(1.0, (cody,)), FREE), "Si")
+    assert share(slow, data[min(data)]) > 10 * few
     assert share(OTHERS["gradient"], data[min(data)]) == np.inf
 
 

@@ -20,9 +20,9 @@ from pellicle.fitting.film.sweeps import correlation_in_sweeps, sweeps_of
 from pellicle.fitting.noise import DRIFT_CORRELATION, rounding, uneven_noise
 from pellicle.fitting.problem import Explained, Noise, NoiseGroup
 from pellicle.fitting.reported_layer import Linearised, linearised, linearised_by_numpy
-from pellicle.forward_model.elementary_signal import by_numpy, is_elementary
+from pellicle.forward_model.elementary_signal import by_numpy, is_elementary, points_by_numpy
 from pellicle.forward_model.film_signal import build, depolarises
-from pellicle.forward_model.plan import GENERAL, Plan
+from pellicle.forward_model.plan import Plan
 from pellicle.optics.hoisting import compute_once
 from pellicle.programs.cache import kept
 from pellicle.scene.film import Scene
@@ -30,7 +30,7 @@ from pellicle.scene.free import insert
 from pellicle.signals.base import Signal
 
 _POINT = 4e-7
-"""Time of a wavelength by NumPy as a share of the compilation of a program of slopes: 0.1 to 0.4 µs of 0.5 to
+"""Time of a point by NumPy as a share of the compilation of a program of slopes: 0.1 to 0.4 µs of 0.5 to
 1.2 s for one or two layers, 1.3 µs of 7 s for a tilted axis."""
 _QUICKER = 3
 """The program of a local model is called once or twice in a fit, and compiles so much faster than others."""
@@ -65,14 +65,7 @@ class SpectrumForm:
 
     def numpy_share(self, arrays: tuple[Scene, Data], /) -> float:
         """Time of one candidate by NumPy, as a share of the compilation of a program of slopes."""
-        if not is_elementary(self.plan):
-            return np.inf
-        scene, _ = arrays
-        bandwidth, cone = map(self.plan.row, ("coherence", "angle-spread"))
-        layers = sum(getattr(layer, "repeats", 1) for layer in scene.layers)
-        rays = cone.count * (cone.around if self.plan.row("anisotropy").count >= GENERAL else 1)
-        nodes = max(layers / 2, 1) * max(bandwidth.count, 1) * (rays if cone.on else 1)
-        return _POINT * nodes * np.size(scene.light.wavelength)
+        return _POINT * points_by_numpy(self.plan, arrays[0])
 
     def explained(self, arrays: tuple[Scene, Data], values: np.ndarray, /) -> Explained | None:
         """The spectrum at candidates by NumPy; None for a plan that it does not evaluate."""
@@ -80,7 +73,8 @@ class SpectrumForm:
         signals = self.signals(scene, data, values)
         if signals is None:
             return None
-        solved = nuisance.solve(signals, data, scene.instrument)
+        with np.errstate(all="ignore"):  # of a candidate without a signal
+            solved = nuisance.solve(signals, data, scene.instrument)
         return Explained(solved.model, solved.residual, solved.deviance)
 
     def with_plan(self, plan: Plan) -> SpectrumForm:
