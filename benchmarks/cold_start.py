@@ -7,36 +7,28 @@ their ratios to bare JAX, the least that any program of JAX takes.
 Linux, 2 cores that did nothing else; JAX 0.10.2, Python 3.11, medians of 3:
 
                                           wall s   cpu s  wall ratio  cpu ratio
-    bare JAX                                0.79    0.88        1.00       1.00
-    pellicle --help                         0.25    0.25        0.31       0.28
-    R by a recipe                           1.80    1.99        2.29       2.25
-    R, CSV by flags                         1.68    1.86        2.13       2.10
-    psi and delta, recipe                   1.83    1.93        2.32       2.18
-    R by a recipe, --out                    2.60    2.80        3.31       3.16
-    R by a recipe, empty cache              3.50    3.76        4.45       4.24
-    R, CSV by flags, empty cache            2.79    3.05        3.55       3.45
-    psi and delta, recipe, empty cache      3.87    4.03        4.91       4.55
+    bare JAX                                0.90    1.01        1.00       1.00
+    pellicle --help                         0.28    0.28        0.31       0.28
+    R by a recipe                           1.99    2.19        2.21       2.18
+    R, CSV by flags                         1.97    2.18        2.19       2.17
+    psi and delta, recipe                   2.00    2.10        2.21       2.09
+    R by a recipe, --out                    2.96    3.16        3.28       3.14
+    R by a recipe, empty cache              2.01    2.20        2.23       2.19
+    R, CSV by flags, empty cache            1.92    2.12        2.13       2.11
+    psi and delta, recipe, empty cache      2.03    2.13        2.25       2.12
 
 `--programs` has the programs of `pl.fit` of four scenes instead, each in a new process with an empty cache:
 lines of StableHLO and of optimised HLO, and processor time (s) of tracing with lowering and of compilation.
-
-On two idle cores of a slower machine, where bare JAX takes 1.1 s of processor time:
+Only two layers compile anything. On another day, where bare JAX takes 0.72 s of processor time:
 
                                      StableHLO       HLO   trace compile
-    R, thickness                                                    1.80
-        equations                          921      1889    0.47    0.45
-        local                              562      1350    0.28    0.11
-    psi and delta, Cauchy                                           4.54
-        equations                         1959      4915    1.09    1.35
-        local                             1557      4355    0.75    0.33
-    psi and delta, two layers                                       6.41
-        equations                         2371      5831    1.35    1.68
-        local                             1843      5207    0.91    0.55
-    tilted axis                                                     1.0
+    R, thickness                                                    0.36
+    psi and delta, Cauchy                                           0.98
+    psi and delta, two layers                                       2.13
+        equations                         2371      5831    0.49    0.66
+    tilted axis                                                     0.41
 
-The scan, the simulations of systematic effects and slopes of tilted axes are left to NumPy here. Before they
-were, the same machine took 2.1, 4.4, 6.1 and 22.0 s for the four fits, now 1.6, 3.7, 5.3 (medians of 3 in
-turns) and 0.6 to 1.0 s.
+Before NumPy took slopes by differences, the first three took 0.85, 2.0 and 2.65 s on that day.
 """
 
 from __future__ import annotations
