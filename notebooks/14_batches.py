@@ -59,7 +59,8 @@ true.round(1)
 # ## One scene for all
 #
 # The scene is described once. A file that cannot be read raises `DataError`, whose message says where and
-# what; it must not end the batch. Later fits take a fraction of the time of the first one, which compiles.
+# what; it must not end the batch. Later fits take a fraction of the time of the first ones: programs are
+# compiled when they pay.
 
 # %%
 scene = pl.Scene(pl.Layer("SiO2", pl.Free(100, 1000)), "Si")
