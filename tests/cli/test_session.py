@@ -167,9 +167,11 @@ def test_two_processes_find_what_one_finds(pellicle, spectrum_file, scene, tmp_p
         # one of the processes compiles earlier, and one with fewer threads adds in another order
         pairs = [flat(x | {"seconds": None}) for x in (a, b)]
         assert pairs[0].keys() == pairs[1].keys()
-        for one_value, other in zip(*(x.values() for x in pairs), strict=True):
+        for key, one_value in pairs[0].items():
+            # effects that nearly imitate each other share an error: a part moves by 8e-6 (found)
+            near = {"rel": 5e-5, "abs": 1e-7} if key.startswith("/budget") else {"rel": 1e-6, "abs": 1e-9}
             exact = not isinstance(one_value, float)
-            assert one_value == (other if exact else pytest.approx(other, rel=1e-6, abs=1e-9))
+            assert one_value == (pairs[1][key] if exact else pytest.approx(pairs[1][key], **near)), key
     talk = [line for line in alone.err.splitlines() if "written" not in line]
     assert [line for line in together.err.splitlines() if "written" not in line] == talk
     a, b = (re.split("[,\n]", (tmp_path / name / "summary.csv").read_text()) for name in "ab")
