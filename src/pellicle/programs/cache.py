@@ -154,8 +154,8 @@ _LEAST = 1 / 512
 """Share of a compilation that a call without a program takes at least, however few its points."""
 
 
-def usual_share(*_: Any) -> float:
-    """Share of a compilation that a call takes without a program: a third to a 60th
+def _usual_share(*_: Any) -> float:
+    """Share of a compilation that a call takes without a program: a 20th to a 60th
     (`benchmarks/cold_start.py`)."""
     return 1 / 32
 
@@ -178,7 +178,7 @@ def kept(
     *,
     calls: Calls = "some",
     at_first: Program | None = None,
-    share: Program = usual_share,
+    share: Program = _usual_share,
 ) -> Program:
     """`jax.jit` with the first argument static, kept on disk where there is a cache.
 

@@ -14,6 +14,7 @@ from pellicle.dispersion.anisotropic import Anisotropic
 from pellicle.dispersion.empirical import Constant
 from pellicle.effects.film_plan import exact
 from pellicle.effects.presence import computes_roughness, scene_media
+from pellicle.fitting.evaluation import share_without_slopes
 from pellicle.fitting.film.changed_media import (
     OXIDE_INDEX,
     AllowedEffects,
@@ -70,9 +71,7 @@ def _by_numpy(form: Any, scene: Scene, data: Any, values: np.ndarray) -> Simulat
 
 
 def _share(form: Any, scene: Scene, data: Any, values: np.ndarray) -> float:
-    """Time of `_by_numpy` as a share of the compilation of a program without slopes."""
-    each = form.numpy_share((scene, data)) if isinstance(form, SpectrumForm) else np.inf
-    return 2 * len(np.unique(values, axis=0)) * each
+    return share_without_slopes(form, (scene, data), np.unique(values, axis=0))
 
 
 simulated = kept(_simulated, at_first=_by_numpy, share=_share)
